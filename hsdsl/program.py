@@ -1,0 +1,105 @@
+"""A hybrid system lowered to numbers: straight-line routines and the data around them, free of SymPy.
+
+This is all that `simulate` knows of a model. Names of the file appear only as strings for people; the routines know
+states as ``x0, x1, ...``, parameters as ``p0, p1, ...`` and a sampled input i as the line
+``a_i + b_i (t - c_i)`` of the segment that time is in.
+
+A routine's text is a Python function body in which every constant that is not an integer exponent stands as a name
+``q_N_D`` (the exact fraction N/D, ``q_mN_D`` when negative), so that each number type can put its own value there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+Relation = Literal["zero", "linear"]
+
+
+@dataclass(frozen=True)
+class Routines:
+    """The text of one Python module function that binds data and returns a mode's routines.
+
+    ``source`` defines ``bind(p0, ..., a0, b0, c0, ...)`` returning a tuple of functions in the order of ``names``.
+    """
+
+    names: tuple[str, ...]
+    source: str
+
+
+@dataclass(frozen=True)
+class SampledInput:
+    """A sampled input: where its samples' values stand in ``Program.sample_values``."""
+
+    name: str
+    hold: Relation
+    times: tuple[Fraction, ...] | None  # None: expressions of parameters, evaluated by routine `input_i`
+    values: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class EdgeProgram:
+    """An edge. ``conditional`` says whether it has an `if`; indices count modes in file order."""
+
+    name: str
+    source: int
+    target: int
+    target_states: tuple[str, ...]
+    conditional: bool
+    priority: int
+    text: str
+    reset_texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModeProgram:
+    """A mode: what is known of it without numbers, and its routines.
+
+    Surfaces are numbered edges first (file order), then walls. With n states, m surfaces and k outputs the routines,
+    called as ``name(t, x0, ..., x{n-1})``, are
+
+    ============== =========================================================================
+    flow           n derivatives
+    surfaces       m values r
+    magnitudes     m values |L| + |R|, the part of the round-off bound that r alone cannot show
+    gradients      m tuples (dr/dt, dr/dx0, ...) of n + 1
+    rates          m values L_f r = dr/dt + grad r . f
+    conditions     as many booleans as edges, true where there is no `if`
+    outputs        k values, NaN where the mode lacks a state the output needs
+    reset_K        values of edge K's target states
+    spread_K       n_target tuples (|R_i| + sum |dR_i/dx_k| s_k), called ``spread_K(t, x..., s...)``
+    ============== =========================================================================
+    """
+
+    name: str
+    states: tuple[str, ...]
+    final: bool
+    edges: tuple[EdgeProgram, ...]
+    walls: tuple[str, ...]
+    flow_texts: tuple[str, ...]
+    routines: Routines
+
+
+@dataclass(frozen=True)
+class Program:
+    """A model as a simulator sees it.
+
+    ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``initial(p...)``,
+    ``until(p...)``, ``samples(p...)``, ``input_i(p...)`` (times then values) and the other numbers of the experiment.
+    """
+
+    path: str
+    digest: str
+    title: str | None
+    parameters: tuple[str, ...]
+    parameter_bounds: tuple[tuple[str | None, str | None], ...]
+    inputs: tuple[SampledInput, ...]
+    modes: tuple[ModeProgram, ...]
+    outputs: tuple[str, ...]
+    output_texts: tuple[str, ...]
+    units: dict[str, str]
+    initial_mode: int
+    initial_states: tuple[str, ...]
+    experiment: dict[str, Any]
+    constants: Routines

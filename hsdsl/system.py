@@ -1,0 +1,158 @@
+# pyright: basic
+"""A controlled hybrid system as mathematics: frozen SymPy data that checks itself at birth.
+
+This is Definition 7 of Burden, Gonzalez, Vasudevan, Bajcsy, Sastry (2013), (J, Gamma, D, U, F, G, R), as the
+language writes it down. `elaborate` makes it from a document; `lower` turns it into a SymPy-free `Program`.
+
+Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with its plain name from the file, and time is
+:data:`TIME`. `let` names and expression inputs have been substituted; a sampled input stays as its symbol.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+import sympy as sp
+
+TIME = sp.Symbol("t", real=True)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named constant; ``value`` is an expression of earlier parameters."""
+
+    name: str
+    value: sp.Expr
+    text: str
+    unit: str | None = None
+    minimum: sp.Expr | None = None
+    maximum: sp.Expr | None = None
+    about: str | None = None
+
+
+@dataclass(frozen=True)
+class SampledInput:
+    """An input given by samples; before the first and after the last it keeps that sample's value.
+
+    ``times`` and ``values`` are either exact numbers or expressions of parameters (never mixed with states or t).
+    """
+
+    name: str
+    hold: Literal["zero", "linear"]
+    times: tuple[Fraction | sp.Expr, ...]
+    values: tuple[Fraction | sp.Expr, ...]
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.times) != len(self.values) or not self.times:
+            raise ValueError(f"input {self.name}: as many times as values, at least one")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One inequality ``left R right`` as a surface function r, negative inside the domain.
+
+    For a guard ``when: L >= R`` r = L - R (crossed upwards); for a wall ``domain: L >= R`` r = R - L.
+    ``left`` and ``right`` are the two sides as written, for the round-off bound 32 u (|L| + |R| + ...).
+    """
+
+    left: sp.Expr
+    right: sp.Expr
+    residual: sp.Expr
+    text: str
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A transition: its surface, condition and reset.
+
+    ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
+    ``target_states`` are the target mode's states, or the source's where the target is final without a flow.
+    """
+
+    name: str
+    source: str
+    target: str
+    surface: Surface
+    condition: Any | None  # a SymPy Boolean, None where there is no `if`
+    target_states: tuple[str, ...]
+    reset: tuple[sp.Expr, ...]
+    reset_texts: tuple[str, ...]
+    priority: int = 0
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode: states in file order, their flow, walls, outgoing edges in file order, and outputs.
+
+    ``outputs`` has one entry for each output of the system, None where the mode lacks a state it needs.
+    A final mode without flow has ``states == ()`` here: it has the states it is entered with.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    flow: tuple[sp.Expr, ...]
+    flow_texts: tuple[str, ...]
+    walls: tuple[Surface, ...]
+    edges: tuple[Edge, ...]
+    outputs: tuple[sp.Expr | None, ...]
+    final: bool = False
+
+    def __post_init__(self) -> None:
+        if not len(self.states) == len(self.flow) == len(self.flow_texts):
+            raise ValueError(f"mode {self.name}: one flow expression a state")
+
+
+@dataclass(frozen=True)
+class Initial:
+    """Where a run starts: a mode and expressions of parameters for its states (file order)."""
+
+    mode: str
+    values: tuple[tuple[str, sp.Expr], ...]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What the file asks of a run; None where it says nothing. Numbers are expressions of parameters.
+
+    ``samples`` is an expression (how many equally spaced samples) or a tuple of expressions (their times).
+    """
+
+    until: sp.Expr
+    scheme: str | None = None
+    method: str | None = None
+    step: sp.Expr | None = None
+    tolerance: sp.Expr | None = None
+    relaxation: sp.Expr | None = None
+    samples: sp.Expr | tuple[sp.Expr, ...] | None = None
+    max_transitions: sp.Expr | None = None
+
+
+@dataclass(frozen=True)
+class HybridSystem:
+    """A whole model. ``modes`` are in file order."""
+
+    path: str
+    digest: str  # sha256 of the model's bytes and of its CSV files
+    title: str | None
+    source: str | None
+    parameters: tuple[Parameter, ...]
+    inputs: tuple[SampledInput, ...]
+    modes: tuple[Mode, ...]
+    outputs: tuple[str, ...]
+    output_texts: tuple[str, ...]
+    units: dict[str, str]
+    initial: Initial
+    experiment: Experiment
+    reference: tuple[dict[str, Any], ...]  # checked plain data, numbers as text
+
+    def __post_init__(self) -> None:
+        names = [mode.name for mode in self.modes]
+        if len(set(names)) != len(names):
+            raise ValueError("mode names must differ")
+        for mode in self.modes:
+            for edge in mode.edges:
+                if edge.target not in names:
+                    raise ValueError(f"edge {edge.name} leads to unknown mode {edge.target}")
