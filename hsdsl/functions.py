@@ -1,0 +1,121 @@
+# pyright: basic
+"""The functions of the language, as SymPy knows them.
+
+The smooth ones are SymPy's own. The kinked and jumping ones (abs, sign, min, max, floor) are classes of our own: SymPy's
+rewrite themselves, and differentiate into objects no kernel has (DiracDelta, re, im). Ours stay as written, fold exact
+numbers, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+
+class _Real(sp.Function):
+    is_real = True
+    is_extended_real = True
+    is_finite = True
+
+
+class absolute(_Real):
+    """|x|."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, x):
+        """Fold a number."""
+        return sp.Abs(x) if x.is_number and x.is_real else None
+
+    def fdiff(self, argindex=1):
+        """Almost everywhere."""
+        return sign(self.args[0])
+
+
+class sign(_Real):
+    """-1, 0 or 1."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, x):
+        """Fold a number."""
+        return sp.sign(x) if x.is_number and x.is_real else None
+
+    def fdiff(self, argindex=1):
+        """Almost everywhere."""
+        return sp.S.Zero
+
+
+class floor(_Real):
+    """The largest integer not above x."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, x):
+        """Fold a number."""
+        return sp.floor(x) if x.is_number and x.is_real else None
+
+    def fdiff(self, argindex=1):
+        """Almost everywhere."""
+        return sp.S.Zero
+
+
+class minimum(_Real):
+    """The smaller of two."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, x, y):
+        """Fold numbers."""
+        return sp.Min(x, y) if all(a.is_number and a.is_real for a in (x, y)) else None
+
+    def fdiff(self, argindex=1):
+        """Almost everywhere; half of each side where they are equal."""
+        x, y = self.args
+        return (1 - (1 if argindex == 1 else -1) * sign(x - y)) / 2
+
+
+class maximum(_Real):
+    """The larger of two."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, x, y):
+        """Fold numbers."""
+        return sp.Max(x, y) if all(a.is_number and a.is_real for a in (x, y)) else None
+
+    def fdiff(self, argindex=1):
+        """Almost everywhere; half of each side where they are equal."""
+        x, y = self.args
+        return (1 + (1 if argindex == 1 else -1) * sign(x - y)) / 2
+
+
+# name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)
+FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
+    "sin": (sp.sin, 1, 1),
+    "cos": (sp.cos, 1, 1),
+    "tan": (sp.tan, 1, 1),
+    "asin": (sp.asin, 1, 1),
+    "acos": (sp.acos, 1, 1),
+    "atan": (sp.atan, 1, 1),
+    "atan2": (sp.atan2, 2, 2),
+    "sinh": (sp.sinh, 1, 1),
+    "cosh": (sp.cosh, 1, 1),
+    "tanh": (sp.tanh, 1, 1),
+    "asinh": (sp.asinh, 1, 1),
+    "acosh": (sp.acosh, 1, 1),
+    "atanh": (sp.atanh, 1, 1),
+    "exp": (sp.exp, 1, 1),
+    "log": (sp.log, 1, 1),
+    "sqrt": (sp.sqrt, 1, 1),
+    "abs": (absolute, 1, 1),
+    "sign": (sign, 1, 1),
+    "floor": (floor, 1, 1),
+    "min": (minimum, 2, None),
+    "max": (maximum, 2, None),
+}
+CONSTANTS = {"pi": sp.pi}
