@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
-Relation = Literal["zero", "linear"]
+Hold = Literal["zero", "linear"]
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Routines:
 
 @dataclass(frozen=True)
 class SampledInput:
-    """A sampled input: where its samples' values stand in ``Program.sample_values``."""
+    """A sampled input: exact samples, or None where they are expressions of parameters (routine ``input_i``)."""
 
     name: str
-    hold: Relation
-    times: tuple[Fraction, ...] | None  # None: expressions of parameters, evaluated by routine `input_i`
+    hold: Hold
+    times: tuple[Fraction, ...] | None
     values: tuple[Fraction, ...] | None
 
 
@@ -85,15 +85,16 @@ class ModeProgram:
 class Program:
     """A model as a simulator sees it.
 
-    ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``initial(p...)``,
-    ``until(p...)``, ``samples(p...)``, ``input_i(p...)`` (times then values) and the other numbers of the experiment.
+    ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``minimum_i`` and ``maximum_i``
+    where the file bounds it, ``initial``, ``input_i`` (times, then values; where they are not plain numbers), ``until``
+    and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions`` and ``sample_count`` or
+    ``sample_times``.
     """
 
     path: str
     digest: str
     title: str | None
     parameters: tuple[str, ...]
-    parameter_bounds: tuple[tuple[str | None, str | None], ...]
     inputs: tuple[SampledInput, ...]
     modes: tuple[ModeProgram, ...]
     outputs: tuple[str, ...]
@@ -101,5 +102,6 @@ class Program:
     units: dict[str, str]
     initial_mode: int
     initial_states: tuple[str, ...]
-    experiment: dict[str, Any]
+    scheme: str | None
+    method: str | None
     constants: Routines

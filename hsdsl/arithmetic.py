@@ -1,0 +1,136 @@
+"""The numbers a run computes with: float64, or mpmath at any precision.
+
+An :class:`Arithmetic` is what generated code and the simulator need to know of a number type. Both types behave the
+same where a function has no finite real value: they raise one of :data:`DOMAIN_ERRORS` or return a number that
+``isfinite`` refuses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+Number = Any  # float or mpmath.mpf: whatever the arithmetic makes
+
+DOMAIN_ERRORS = (ValueError, OverflowError, ZeroDivisionError)
+
+
+@dataclass(frozen=True, eq=False)
+class Arithmetic:
+    """A number type.
+
+    Attributes
+    ----------
+    name : str
+        ``float64`` or ``mpmath``.
+    digits : int or None
+        Decimal digits asked for; None for float64.
+    unit : Number
+        The unit round-off u.
+    constant : callable
+        The nearest number to an exact fraction.
+    isfinite : callable
+        Whether a number is finite.
+    functions : mapping
+        What generated code may call, by name.
+    """
+
+    name: str
+    digits: int | None
+    unit: Number
+    constant: Callable[[Fraction], Number]
+    isfinite: Callable[[Number], bool]
+    functions: Mapping[str, Any]
+
+    @property
+    def zero(self) -> Number:
+        """Zero of this type."""
+        return self.constant(Fraction(0))
+
+    def sqrt(self, x: Number) -> Number:
+        """The square root."""
+        return self.functions["sqrt"](x)
+
+
+def _float_sign(x: float) -> float:
+    return float((x > 0.0) - (x < 0.0))
+
+
+def _float_heaviside(x: float) -> float:
+    return 0.5 * (1.0 + _float_sign(x))
+
+
+def _float_floor(x: float) -> float:
+    return float(math.floor(x))
+
+
+def _float_constant(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+_MATH = "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt pow".split()
+
+FLOAT64 = Arithmetic(
+    name="float64",
+    digits=None,
+    unit=2.0**-53,
+    constant=_float_constant,
+    isfinite=math.isfinite,
+    functions={name: getattr(math, name) for name in _MATH}
+    | {
+        "abs": abs,
+        "sign": _float_sign,
+        "heaviside": _float_heaviside,
+        "floor": _float_floor,
+        "min": min,
+        "max": max,
+        "pi": math.pi,
+        "e": math.e,
+        "nan": math.nan,
+    },
+)
+
+
+@cache
+def multiprecision(digits: int) -> Arithmetic:
+    """Make mpmath numbers of ``digits`` decimal digits, in a context of their own (no global state is touched)."""
+    import mpmath
+
+    context = mpmath.MPContext()
+    context.dps = digits
+
+    def real(function: Callable[..., Any]) -> Callable[..., Any]:
+        def checked(*arguments: Any) -> Any:
+            value = function(*arguments)
+            if not isinstance(value, context.mpf):  # mpmath leaves the reals where math raises
+                raise ValueError("no real value")
+            return value
+
+        return checked
+
+    return Arithmetic(
+        name="mpmath",
+        digits=digits,
+        unit=context.ldexp(1, -context.prec),
+        constant=lambda value: context.mpf(value.numerator) / context.mpf(value.denominator),
+        isfinite=context.isfinite,
+        functions={name: real(getattr(context, "power" if name == "pow" else name)) for name in _MATH}
+        | {
+            "abs": abs,
+            "sign": context.sign,
+            "heaviside": lambda x: (1 + context.sign(x)) / 2,
+            "floor": context.floor,
+            "min": min,
+            "max": max,
+            "pi": +context.pi,
+            "e": +context.e,
+            "nan": context.nan,
+        },
+    )

@@ -1,0 +1,87 @@
+"""The Python kernel: a program's routines executed as Python functions, over any number type.
+
+The text comes from `lower` (SymPy's `lambdify` with common subexpressions taken out); it names states, parameters and
+constants only by number, so nothing a model file says reaches the interpreter as code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.kernel import Routine, Vector
+from hsdsl.program import Program, Routines
+
+_CONSTANT = re.compile(r"\bq_(m?)(\d+)_(\d+)\b")
+
+
+@dataclass(frozen=True)
+class PythonMode:
+    """One mode's routines, bound. See `ModeProgram` for what they return."""
+
+    flow: Routine
+    surfaces: Routine
+    magnitudes: Routine
+    gradients: Callable[..., tuple[Vector, ...]]
+    rates: Routine
+    conditions: Callable[..., tuple[bool, ...]]
+    outputs: Routine
+    resets: tuple[Routine, ...]
+    spreads: tuple[Routine, ...]
+
+
+class PythonKernel:
+    """A program over one number type. Modes are compiled when they are first entered."""
+
+    def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
+        self.arithmetic = arithmetic
+        self._program = program
+        self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        constants = compile_routines(program.constants, arithmetic, "constants")
+        self._constants = dict(zip(program.constants.names, constants(), strict=True))
+
+    def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
+        """Evaluate one of ``Program.constants``' routines at parameter values."""
+        return self._constants[name](*parameters)
+
+    def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
+        """Bind a mode to parameter values and input segments."""
+        routines = self._program.modes[mode].routines
+        if mode not in self._modes:
+            self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
+        bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
+        edges = range(len(self._program.modes[mode].edges))
+        return PythonMode(
+            **{name: bound[name] for name in PLAIN},
+            resets=tuple(bound[f"reset_{k}"] for k in edges),
+            spreads=tuple(bound[f"spread_{k}"] for k in edges),
+        )
+
+
+PLAIN = ("flow", "surfaces", "magnitudes", "gradients", "rates", "conditions", "outputs")
+
+
+def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> Callable[..., tuple[Routine, ...]]:
+    """Compile generated text; returns its ``bind``.
+
+    Floats are written into the text as literals (the interpreter is fastest on those); other numbers are names.
+    """
+    namespace: dict[str, Any] = {"__builtins__": {}, **arithmetic.functions}
+    literal = arithmetic.name == "float64"
+
+    def replace(match: re.Match[str]) -> str:
+        value = arithmetic.constant(
+            Fraction(int(match[2]) * (-1 if match[1] else 1), int(match[3]))
+        )
+        if literal:
+            return f"({value!r})" if match[1] else repr(value)
+        namespace[match[0]] = value
+        return match[0]
+
+    text = _CONSTANT.sub(replace, routines.source)
+    exec(compile(text, f"<hsdsl {name}>", "exec"), namespace)
+    return namespace["bind"]

@@ -1,0 +1,140 @@
+"""From a table to straight-line step functions for one dimension and one number type.
+
+The loops over stages and states run here, once, while the text is written; what remains is a function that a reader
+(and another language) can follow line by line, its sums left to right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.integrators.tableau import ButcherTableau
+
+State = tuple[Number, ...]
+Stages = tuple[State, ...]
+Flow = Callable[..., State]
+Polynomial = tuple[State, ...]  # (c_1, c_2, ...): x + c_1 s + c_2 s**2 + ...
+
+
+@dataclass(frozen=True)
+class Stepper:
+    """A method for states of one dimension.
+
+    Attributes
+    ----------
+    step : callable
+        ``step(flow, t, h, x, slope) -> (z, stages)``; ``slope = flow(t, *x)`` is the first stage. A last stage that is
+        the flow at the step's end is not evaluated.
+    piece : callable
+        ``piece(h, x, z, stages, slope, end) -> (c_1, ...)`` with ``end = flow(t + h, *z)``: the interpolant.
+    error : callable or None
+        ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
+    """
+
+    table: ButcherTableau
+    step: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]]
+    piece: Callable[[Number, State, State, Stages, State, State], Polynomial]
+    error: Callable[[Number, Stages, State], State] | None
+
+
+@cache
+def stepper(table: ButcherTableau, dimension: int, arithmetic: Arithmetic) -> Stepper:
+    """Write and compile the step functions of ``table`` for ``dimension`` states."""
+    writer = _Writer(table, dimension, arithmetic)
+    return Stepper(
+        table,
+        writer.compile("step", writer.step()),
+        writer.compile("piece", writer.piece()),
+        writer.compile("error", writer.error()) if table.adaptive else None,
+    )
+
+
+def hermite(h: Number, x: State, z: State, slope: State, end: State) -> Polynomial:
+    """Cubic Hermite interpolant of a step from its ends and the flow there, order 3 (error O(h**4))."""
+    first = tuple(h * f for f in slope)
+    second = tuple(3 * (b - a) - h * (2 * f + g) for a, b, f, g in zip(x, z, slope, end, strict=True))
+    third = tuple(h * (f + g) - 2 * (b - a) for a, b, f, g in zip(x, z, slope, end, strict=True))
+    return first, second, third
+
+
+class _Writer:
+    def __init__(self, table: ButcherTableau, dimension: int, arithmetic: Arithmetic) -> None:
+        self.table, self.arithmetic = table, arithmetic
+        self.states = range(dimension)
+        self.namespace: dict[str, Any] = {"__builtins__": {}, "hermite": hermite}
+        self.evaluated = table.stages - table.last_is_next
+
+    def compile(self, name: str, lines: list[str]) -> Any:
+        exec(compile("\n    ".join(lines) + "\n", f"<hsdsl {self.table.name} {name}>", "exec"), self.namespace)
+        return self.namespace[name]
+
+    def number(self, value: Fraction) -> str:
+        if self.arithmetic.name == "float64":
+            return repr(self.arithmetic.constant(value))
+        name = f"q_{'m' if value < 0 else ''}{abs(value.numerator)}_{value.denominator}"
+        self.namespace[name] = self.arithmetic.constant(value)
+        return name
+
+    def weighted(self, weights: tuple[Fraction, ...], state: int) -> str:
+        """Write sum_i weights_i k_i for one state, left to right."""
+        terms = [
+            self.stage(i, state) if w == 1 else f"{self.number(w)}*{self.stage(i, state)}"
+            for i, w in enumerate(weights)
+            if w
+        ]
+        return " + ".join(terms) or self.number(Fraction(0))
+
+    def stage(self, i: int, state: int) -> str:
+        return f"g{state}" if i >= self.evaluated else f"k{i}_{state}"
+
+    def row(self, letter: str) -> str:
+        return self.tuple(f"{letter}{s}" for s in self.states)
+
+    def tuple(self, items: Any) -> str:
+        return "(" + "".join(f"{item}, " for item in items).rstrip() + ")"
+
+    def unpack(self, stages: range) -> list[str]:
+        if not self.states:
+            return []
+        return [f"{self.row(f'k{i}_')} = k[{i}]" for i in stages]
+
+    def step(self) -> list[str]:
+        lines = ["def step(flow, t, h, x, k0):"]
+        if self.states:
+            lines += [f"{self.row('x')} = x", f"{self.row('k0_')} = k0"]
+        for i in range(1, self.evaluated):
+            c = self.table.c[i]
+            time = "t + h" if c == 1 else f"t + {self.number(c)}*h"
+            at = [f"x{s} + h*({self.weighted(self.table.a[i], s)})" for s in self.states]
+            lines.append(f"k{i} = flow({', '.join([time, *at])})")
+            lines += [f"{self.row(f'k{i}_')} = k{i}"] if self.states else []
+        z = self.tuple(f"x{s} + h*({self.weighted(self.table.b, s)})" for s in self.states)
+        return [*lines, f"return {z}, {self.tuple(f'k{i}' for i in range(self.evaluated))}"]
+
+    def piece(self) -> list[str]:
+        lines = ["def piece(h, x, z, k, f, g):"]
+        if self.table.interpolant == "hermite":
+            return [*lines, "return hermite(h, x, z, f, g)"]
+        if self.table.dense is None:
+            unpack = [f"{self.row('x')} = x", f"{self.row('z')} = z"] if self.states else []
+            return [*lines, *unpack, f"return ({self.tuple(f'z{s} - x{s}' for s in self.states)},)"]
+        if self.states:
+            lines += [*self.unpack(range(self.evaluated)), f"{self.row('g')} = g"]
+        powers = [
+            self.tuple(f"h*({self.weighted(weights, s)})" for s in self.states)
+            for weights in zip(*self.table.dense, strict=True)
+        ]
+        return [*lines, f"return {self.tuple(powers)}"]
+
+    def error(self) -> list[str]:
+        lines = ["def error(h, k, g):"]
+        if self.states:
+            lines += [*self.unpack(range(self.evaluated)), f"{self.row('g')} = g"]
+        assert self.table.embedded is not None
+        difference = tuple(b - e for b, e in zip(self.table.b, self.table.embedded, strict=True))
+        return [*lines, f"return {self.tuple(f'h*({self.weighted(difference, s)})' for s in self.states)}"]

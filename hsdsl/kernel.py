@@ -1,0 +1,53 @@
+"""What a simulator may call: one mode's routines with parameters and input segment bound, and who binds them.
+
+Any engine's kernel fits here (generated Python over float or mpmath today), so a fault can be told to be the loop's or
+the code generator's by exchanging one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from hsdsl.arithmetic import Arithmetic, Number
+
+Vector = tuple[Number, ...]
+Routine = Callable[..., Vector]  # called as routine(t, x0, ..., x{n-1})
+
+
+class ModeKernel(Protocol):
+    """One mode, data bound; `ModeProgram` says what each routine returns."""
+
+    @property
+    def flow(self) -> Routine: ...
+    @property
+    def surfaces(self) -> Routine: ...
+    @property
+    def magnitudes(self) -> Routine: ...
+    @property
+    def gradients(self) -> Callable[..., tuple[Vector, ...]]: ...
+    @property
+    def rates(self) -> Routine: ...
+    @property
+    def conditions(self) -> Callable[..., tuple[bool, ...]]: ...
+    @property
+    def outputs(self) -> Routine: ...
+    @property
+    def resets(self) -> Sequence[Routine]: ...
+    @property
+    def spreads(self) -> Sequence[Routine]: ...
+
+
+class Kernel(Protocol):
+    """A program compiled for one number type."""
+
+    @property
+    def arithmetic(self) -> Arithmetic: ...
+
+    def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
+        """Evaluate one of ``Program.constants``' routines at parameter values."""
+        ...
+
+    def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
+        """Bind a mode to ``data``: parameter values, then (a, b, c) of each sampled input's segment."""
+        ...

@@ -1,0 +1,175 @@
+# pyright: basic
+"""HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
+
+The pipeline is in :func:`lower`. What each routine returns stands in `hsdsl.program.ModeProgram`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from hsdsl import program as lowered
+from hsdsl.functions import absolute
+from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
+
+_NAN = sp.Symbol("nan", real=True)
+
+
+@dataclass(frozen=True)
+class Names:
+    """The numbered symbols that stand for the file's names in generated code."""
+
+    parameters: tuple[sp.Symbol, ...]
+    data: tuple[sp.Symbol, ...]
+    shared: dict[sp.Symbol, sp.Expr]  # parameters and sampled inputs
+
+    def of_states(self, states: tuple[str, ...], letter: str = "x") -> tuple[sp.Symbol, ...]:
+        """Number a mode's states."""
+        return tuple(_symbol(f"{letter}{i}") for i in range(len(states)))
+
+    def mapping(self, states: tuple[str, ...]) -> dict[sp.Symbol, sp.Expr]:
+        """Everything an expression of a mode with these states may name."""
+        return self.shared | dict(zip(map(_symbol, states), self.of_states(states), strict=True))
+
+
+def lower(system: HybridSystem) -> lowered.Program:
+    """Lower a system; the result needs no SymPy to run."""
+    names = _number(system)
+    experiment = system.experiment
+    return lowered.Program(
+        path=system.path,
+        digest=system.digest,
+        title=system.title,
+        parameters=tuple(p.name for p in system.parameters),
+        inputs=tuple(_sampled(i) for i in system.inputs),
+        modes=tuple(_mode(system, mode, names) for mode in system.modes),
+        outputs=system.outputs,
+        output_texts=system.output_texts,
+        units=system.units,
+        initial_mode=[m.name for m in system.modes].index(system.initial.mode),
+        initial_states=tuple(name for name, _ in system.initial.values),
+        scheme=experiment.scheme,
+        method=experiment.method,
+        constants=print_routines(_constants(system, names), ()),
+    )
+
+
+def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
+    """Lower expressions of parameters (what overrides are made of): each a routine of all parameters."""
+    names = _number(system)
+    return print_routines(
+        [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
+    )
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+def _number(system: HybridSystem) -> Names:
+    parameters = tuple(_symbol(f"p{i}") for i in range(len(system.parameters)))
+    shared: dict[sp.Symbol, sp.Expr] = dict(zip((_symbol(p.name) for p in system.parameters), parameters, strict=True))
+    data = list(parameters)
+    for i, sampled in enumerate(system.inputs):
+        start, slope, since = (_symbol(f"{letter}{i}") for letter in "abc")
+        shared[_symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
+        data += [start, slope, since]
+    return Names(parameters, tuple(data), shared)
+
+
+def _sampled(given: SampledInput) -> lowered.SampledInput:
+    exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
+    return lowered.SampledInput(
+        given.name, given.hold, given.times if exact else None, given.values if exact else None
+    )
+
+
+def _constants(system: HybridSystem, names: Names):
+    def define(name, *expressions, arguments=names.parameters):
+        return Definition(name, arguments, tuple(sp.sympify(e).xreplace(names.shared) for e in expressions))
+
+    for i, parameter in enumerate(system.parameters):
+        yield define(f"parameter_{i}", parameter.value, arguments=names.parameters[:i])
+        if parameter.minimum is not None:
+            yield define(f"minimum_{i}", parameter.minimum)
+        if parameter.maximum is not None:
+            yield define(f"maximum_{i}", parameter.maximum)
+    yield define("initial", *(value for _, value in system.initial.values))
+    for i, given in enumerate(system.inputs):
+        if any(isinstance(v, sp.Basic) for v in given.times + given.values):
+            yield define(f"input_{i}", *given.times, *given.values)
+    experiment = system.experiment
+    for key in ("until", "step", "tolerance", "relaxation", "max_transitions"):
+        if getattr(experiment, key) is not None:
+            yield define(key, getattr(experiment, key))
+    if isinstance(experiment.samples, tuple):
+        yield define("sample_times", *experiment.samples)
+    elif experiment.samples is not None:
+        yield define("sample_count", experiment.samples)
+
+
+def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram:
+    indices = {m.name: i for i, m in enumerate(system.modes)}
+    edges = tuple(
+        lowered.EdgeProgram(
+            name=edge.name,
+            source=indices[edge.source],
+            target=indices[edge.target],
+            target_states=edge.target_states,
+            conditional=edge.condition is not None,
+            priority=edge.priority,
+            text=edge.surface.text,
+            reset_texts=edge.reset_texts,
+        )
+        for edge in mode.edges
+    )
+    return lowered.ModeProgram(
+        name=mode.name,
+        states=mode.states,
+        final=mode.final,
+        edges=edges,
+        walls=tuple(wall.text for wall in mode.walls),
+        flow_texts=mode.flow_texts,
+        routines=print_routines(_mode_routines(mode, names), names.data),
+    )
+
+
+def _mode_routines(mode: Mode, names: Names):
+    states = names.of_states(mode.states)
+    mapping = names.mapping(mode.states)
+    arguments = (TIME, *states)
+
+    def place(expressions):
+        return tuple(sp.sympify(e).xreplace(mapping) for e in expressions)
+
+    surfaces = [edge.surface for edge in mode.edges] + list(mode.walls)
+    flow = place(mode.flow)
+    residuals = place(s.residual for s in surfaces)
+    sides = place(absolute(s.left) + absolute(s.right) for s in surfaces)
+    gradients = tuple(tuple(r.diff(a) for a in arguments) for r in residuals)
+    rates = tuple(sp.Add(g[0], *(d * f for d, f in zip(g[1:], flow, strict=True))) for g in gradients)
+    outputs = place(_NAN if output is None else output for output in mode.outputs)
+
+    yield Definition("flow", arguments, flow)
+    yield Definition("surfaces", arguments, residuals)
+    yield Definition("magnitudes", arguments, sides)
+    yield Definition("gradients", arguments, gradients)
+    yield Definition("rates", arguments, rates)
+    yield Definition("outputs", arguments, outputs)
+    yield Definition(
+        "conditions",
+        arguments,
+        place(sp.true if edge.condition is None else edge.condition for edge in mode.edges),
+    )
+    scales = names.of_states(mode.states, "s")
+    for k, edge in enumerate(mode.edges):
+        reset = place(edge.reset)
+        yield Definition(f"reset_{k}", arguments, reset)
+        yield Definition(f"spread_{k}", (*arguments, *scales), tuple(_spread(r, states, scales) for r in reset))
+
+
+def _spread(value: sp.Expr, states, scales) -> sp.Expr:
+    return sp.Add(absolute(value), *(absolute(value.diff(x)) * s for x, s in zip(states, scales, strict=True)))

@@ -1,0 +1,49 @@
+# pyright: basic
+"""Named tuples of expressions -> the text of routines, through SymPy's `lambdify` with common subexpressions taken out."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from hsdsl.lower.printer import KernelPrinter
+from hsdsl.program import Routines
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A routine before printing: its name, arguments and (possibly nested) tuple of results."""
+
+    name: str
+    arguments: tuple[sp.Symbol, ...]
+    results: tuple
+
+
+def _take_out_common(expressions):
+    return sp.cse(expressions, symbols=sp.numbered_symbols("w", real=True), list=False)
+
+
+def text_of(definition: Definition) -> str:
+    """Print one routine as a Python function."""
+    function = sp.lambdify(
+        definition.arguments,
+        definition.results,
+        modules=[{}],
+        printer=KernelPrinter(),
+        cse=_take_out_common,
+        docstring_limit=0,
+    )
+    return inspect.getsource(function).replace("def _lambdifygenerated", f"def {definition.name}", 1)
+
+
+def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol]) -> Routines:
+    """Put routines into one ``bind`` whose arguments are the data they close over."""
+    definitions = tuple(definitions)
+    names = tuple(d.name for d in definitions)
+    body = "".join(textwrap.indent(text_of(d), "    ") for d in definitions)
+    head = f"def bind({', '.join(s.name for s in data)}):\n"
+    return Routines(names, f"{head}{body}    return ({', '.join(names)},)\n")
