@@ -1,0 +1,231 @@
+"""Write the reference pages that the code itself knows: language, command line, integrators, error codes.
+
+python docs/generate.py           write docs/reference/*.md
+python docs/generate.py --check   write nothing; name the pages that are stale and exit 1
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import typer.main
+
+from hsdsl import cli, errors, integrators, schema
+from hsdsl.functions import CONSTANTS, FUNCTIONS
+from hsdsl.integrators import ButcherTableau
+
+REFERENCE = Path(__file__).parent / "reference"
+NOTE = "<!-- Written by docs/generate.py: edit the code it reads, not this page. -->\n\n"
+
+LANGUAGE = """# Language
+
+A model is one YAML document. `schemas/model.schema.json` is this page for editors. What a model *means* is on
+[its own page](../meaning.md).
+
+An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers, names, `+ - * / **`,
+parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
+
+## Model
+
+"""
+
+COMMAND_LINE = """# Command line
+
+Answers go to standard output, messages and progress to standard error.
+
+| exit code | meaning |
+| --- | --- |
+| 0 | the run reached `until` or a final mode; the model has no errors |
+| 1 | the model has errors |
+| 2 | wrong usage, or a file that cannot be read |
+| 3 | the run stopped for [another reason](../meaning.md#m10-stop) |
+| 130 | interrupted; what was computed is kept |
+
+"""
+
+ERROR_CODES = """# Error codes
+
+A code keeps its meaning for ever; a retired one is not used again.
+
+"""
+
+INTEGRATORS = """# Integrators
+
+The values of `method` and `--method`; `auto` means `{auto}`. A method with fixed steps takes `step`, an
+adaptive one `tolerance`.
+
+"""
+
+INTERPOLANTS = {
+    "secant": "the straight line between its ends",
+    "hermite": "the cubic Hermite polynomial of its ends",
+    "dense": "dense output of order {order}, from the stages",
+}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Make a Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    cells = ([" ".join(text.split()).replace("|", "\\|") for text in row] for row in lines)
+    return "".join("| " + " | ".join(row) + " |\n" for row in cells) + "\n"
+
+
+def language() -> str:
+    """Document every key of a model from the JSON Schema."""
+    document = schema.json_schema()
+    parts = [LANGUAGE, keys_of(document)]
+    for name, node in document.get("$defs", document.get("definitions", {})).items():
+        parts.append(f"## {name}\n\n")
+        parts.append(f"{node['description']}\n\n" if "description" in node else "")
+        parts.append(keys_of(node) if "properties" in node else f"Value: {value_of(node)}.\n\n")
+    parts.append("## Functions and constants\n\n" + table(("name", "arguments"), callables()))
+    return "".join(parts)
+
+
+def keys_of(node: Mapping[str, Any]) -> str:
+    """Tabulate the keys of an object."""
+    required = node.get("required", ())
+    rows = [
+        (f"`{key}`", value_of(value), "yes" if key in required else "", value.get("description", ""))
+        for key, value in node["properties"].items()
+    ]
+    return table(("key", "value", "required", "meaning"), rows)
+
+
+def value_of(node: Mapping[str, Any]) -> str:
+    """Say in words what a JSON Schema node admits."""
+    if "$ref" in node:
+        name = node["$ref"].rsplit("/", 1)[1]
+        return f"[{name}](#{name.lower()})"
+    if "const" in node or "enum" in node:
+        return " or ".join(f"`{value}`" for value in node.get("enum", [node.get("const")]))
+    for union in ("anyOf", "oneOf", "allOf"):
+        if union in node:
+            words = (value_of(part) for part in node[union] if part != {"type": "null"})
+            return " or ".join(dict.fromkeys(words))
+    kind = node.get("type", "anything")
+    if kind == "array":
+        return f"list of {value_of(node.get('items', {}))}"
+    if kind == "object" and isinstance(node.get("additionalProperties"), dict):
+        return f"map from name to {value_of(node['additionalProperties'])}"
+    return " or ".join(kind) if isinstance(kind, list) else kind
+
+
+def callables() -> Iterator[tuple[str, str]]:
+    """List what an expression may name beside the model's own names."""
+    for name, (_, least, most) in FUNCTIONS.items():
+        yield f"`{name}`", f"{least}" if most == least else f"{least} to {most or 'any number'}"
+    for name in (*CONSTANTS, "t"):
+        yield f"`{name}`", "time" if name == "t" else "constant"
+
+
+def command_line() -> str:
+    """Document every verb and option from the program itself."""
+    parts = [COMMAND_LINE]
+    commands: dict[str, Any] = getattr(typer.main.get_command(cli.app), "commands", {})
+    for name, command in commands.items():
+        parts.append(f"## hsdsl {name}\n\n{(command.help or '').strip()}\n\n")
+        parameters = [p for p in command.params if p.name != "help"]
+        rows = [(as_typed(p), (getattr(p, "help", None) or "").strip()) for p in parameters]
+        parts.append(table(("argument or option", "meaning"), rows) if rows else "")
+    return "".join(parts)
+
+
+def as_typed(parameter: Any) -> str:
+    """Name a parameter as one would type it."""
+    if parameter.param_type_name == "argument":
+        return f"`{(parameter.metavar or parameter.name).upper()}`"
+    names = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts))
+    return names if parameter.is_flag else f"{names} `{parameter.metavar or parameter.type.name.upper()}`"
+
+
+def error_codes() -> str:
+    """List the codes a diagnostic may carry."""
+    rows = [(f"`{code}`", text) for code, text in sorted(errors.CODES.items())]
+    return ERROR_CODES + table(("code", "about"), rows)
+
+
+def integrator_page() -> str:
+    """Document every integrator from its table."""
+    methods = integrators.INTEGRATORS
+    summary = [
+        (f"[`{name}`](#{name})", str(m.order), str(m.stages), "adaptive" if m.adaptive else "fixed")
+        for name, m in methods.items()
+    ]
+    parts = [
+        INTEGRATORS.format(auto=integrators.AUTO),
+        table(("method", "order", "stages", "steps"), summary),
+    ]
+    for name, method in methods.items():
+        between = INTERPOLANTS[method.interpolant].format(order=method.dense_order)
+        error = f"; embedded method of order {method.order - 1}" if method.adaptive else ""
+        parts.append(
+            f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.\n\n"
+        )
+        parts.append(f"Source: {method.source}.\n\n{tableau(method)}")
+    return "".join(parts)
+
+
+def tableau(method: ButcherTableau) -> str:
+    """Write a Butcher tableau, and the dense output's weights where there are any."""
+    stages = [f"k{i + 1}" for i in range(method.stages)]
+    triangle = zip(method.c, method.a, strict=True)
+    rows = [weights(f"**{c}**", row) + [""] * (method.stages - len(row)) for c, row in triangle]
+    rows.append(weights("**b**", method.b))
+    if method.embedded is not None:
+        rows.append(weights("**b̂**", method.embedded))
+    text = table(["c", *stages], rows)
+    if method.dense is not None:
+        text += "Dense output: each stage's weight as a polynomial in s = (t - t_k)/h.\n\n"
+        powers = [f"s^{m + 1}" for m in range(len(method.dense[0]))]
+        text += table(
+            ["stage", *powers], [weights(k, row) for k, row in zip(stages, method.dense, strict=True)]
+        )
+    return text
+
+
+def weights(label: str, row: Iterable[Fraction]) -> list[str]:
+    """Make a table row of exact weights."""
+    return [label, *(str(value) for value in row)]
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "language.md": language,
+    "command-line.md": command_line,
+    "errors.md": error_codes,
+    "integrators.md": integrator_page,
+}
+
+
+def render(name: str) -> str:
+    """Make the text of one page."""
+    return NOTE + PAGES[name]().rstrip() + "\n"
+
+
+def stale() -> list[str]:
+    """Name the pages that differ from what the code says."""
+    files = {name: REFERENCE / name for name in PAGES}
+    return [
+        n for n, file in files.items() if not file.is_file() or file.read_text(encoding="utf-8") != render(n)
+    ]
+
+
+def main() -> int:
+    """Write or check."""
+    if "--check" in sys.argv[1:]:
+        old = stale()
+        for name in old:
+            print(f"docs/reference/{name} is stale; run python docs/generate.py", file=sys.stderr)
+        return 1 if old else 0
+    REFERENCE.mkdir(exist_ok=True)
+    for name in PAGES:
+        (REFERENCE / name).write_text(render(name), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
