@@ -1,0 +1,61 @@
+# pyright: basic
+"""Numbers as decimal text and back without loss, for float64 and for mpmath numbers of any precision.
+
+A number of P bits, written with the digits :func:`text` chooses and read at P bits, is the same number again
+(Steele and White: ceil(P log10 2) + 1 digits are enough; a few more are spent, and trailing zeros are not
+written).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+FLOAT_BITS = 53
+
+
+def is_multiprecision(x: Any) -> bool:
+    """Whether ``x`` is an mpmath number (of any context)."""
+    return hasattr(x, "_mpf_")
+
+
+def is_finite(x: Any) -> bool:
+    """Whether a number is neither infinite nor not-a-number."""
+    if is_multiprecision(x):
+        return bool(x.context.isfinite(x))
+    return math.isfinite(x)
+
+
+def bits(numbers: Iterable[Any]) -> int:
+    """How many bits hold every one of ``numbers`` exactly, at least those of float64."""
+    return max((x._mpf_[3] for x in numbers if is_multiprecision(x)), default=FLOAT_BITS)
+
+
+def text(x: Any, precision: int = FLOAT_BITS) -> str:
+    """Write a number: ``repr`` of a float, and of an mpmath number the digits that ``precision`` bits need.
+
+    Not-a-number and infinities are ``nan``, ``inf`` and ``-inf``.
+    """
+    if not is_multiprecision(x):
+        return repr(float(x))
+    if not is_finite(x):
+        return repr(float(x))
+    from mpmath.libmp import to_str
+
+    needed = max(precision, x._mpf_[3], FLOAT_BITS)
+    return str(to_str(x._mpf_, math.ceil(needed * math.log10(2)) + 3))
+
+
+def read(written: str, precision: int, context: Any) -> Any:
+    """Read what :func:`text` wrote, rounded to ``precision`` bits, as a number of an mpmath ``context``."""
+    from mpmath.libmp import from_str
+
+    return context.make_mpf(from_str(written, precision, "n"))
+
+
+def context_of(digits: int) -> Any:
+    """Return mpmath's context for ``digits`` decimal digits, the one that runs compute in."""
+    from hsdsl.arithmetic import multiprecision
+
+    return multiprecision(digits).zero.context

@@ -1,0 +1,91 @@
+"""What an execution is made of: arcs, transitions, how it stopped, and what may be said about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["flow", "strip"]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Rows ``first..last`` (inclusive) of an execution, in one mode, with one jump counter."""
+
+    mode: str
+    states: tuple[str, ...]
+    kind: Kind
+    jump: int
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One transition.
+
+    ``time`` is when the guard was reached and ``resumed`` when flow went on (None when the run ended in the
+    strip, and then ``after`` is None too). ``alternatives`` are the edges that were reached within the tie
+    tolerance and passed over. ``entry`` says that it fired at once because the state entered its mode beyond
+    the surface.
+    """
+
+    index: int
+    time: Any
+    resumed: Any | None
+    edge: str
+    source: str
+    target: str
+    before: dict[str, Any]
+    after: dict[str, Any] | None
+    alternatives: tuple[str, ...]
+    entry: bool = False
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why and when a run ended: one word of :data:`REASONS`, and a sentence for a person."""
+
+    reason: str
+    time: Any
+    message: str
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run got to where it was going (exit code 0)."""
+        return self.reason in ("until", "final")
+
+
+REASONS = (
+    "until",
+    "final",
+    "left_domain",
+    "zeno",
+    "transition_limit",
+    "not_finite",
+    "step_underflow",
+    "interrupted",
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What can be said about the theorem's hypotheses for this run: ``holds``, ``left`` or ``unknown``."""
+
+    theorem: Literal["holds", "left", "unknown"]
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Point:
+    """The value of an execution at one time. ``state`` and ``outputs`` are by name; indexing finds either."""
+
+    time: Any
+    mode: str
+    jump: int
+    kind: Kind
+    state: dict[str, Any]
+    outputs: dict[str, Any]
+
+    def __getitem__(self, name: str) -> Any:
+        return self.state[name] if name in self.state else self.outputs[name]

@@ -1,0 +1,203 @@
+"""The execution itself: the arrays a run filled, and the questions that can be asked of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
+from hsdsl.execution.same import same
+from hsdsl.execution.sampling import Samples, Side, evaluate, find
+
+Array = npt.NDArray[Any]
+OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Execution:
+    """A run's result; see the package's docstring for the arrays.
+
+    Two executions are equal when every field is, not-a-number being equal to itself; ``output_function`` is
+    left out.
+
+    Attributes
+    ----------
+    output_function : callable or None
+        ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only:
+        between rows this function gives them from the state there; without it (an execution read from a file)
+        they are interpolated linearly between the two rows.
+    """
+
+    model: str
+    digest: str
+    engine: str
+    scheme: str
+    method: str
+    settings: dict[str, Any]
+    stop: Stop
+    transitions: tuple[Transition, ...]
+    final: Point
+    verdict: Verdict
+    output_names: tuple[str, ...]
+    times: Array
+    values: Array
+    outputs: Array
+    depth: Array
+    coefficients: Array
+    arcs: tuple[Arc, ...]
+    seconds: dict[str, float]
+    digits: int | None = None  # decimal digits of the numbers, None for float64
+    title: str | None = None
+    output_function: OutputFunction | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.times)
+        if not (len(self.values) == len(self.outputs) == len(self.depth) == len(self.coefficients) == n):
+            raise ValueError("columns differ in length")
+        if self.stop.reason not in REASONS:
+            raise ValueError(f"unknown stop reason {self.stop.reason}")
+        if not self.arcs or self.arcs[0].first != 0 or self.arcs[-1].last != n - 1:
+            raise ValueError("arcs must cover the rows")
+        if any(b.first != a.last + 1 for a, b in zip(self.arcs, self.arcs[1:], strict=False)):
+            raise ValueError("arcs must follow each other")
+        if n > 1 and bool(np.any(self.times[1:] < self.times[:-1])):
+            raise ValueError("time must not run backwards")
+        if any(self.times[arc.last] != self.times[arc.last + 1] for arc in self.arcs[:-1]):
+            raise ValueError("an arc must begin at the time at which the one before it ends")
+
+    def __eq__(self, other: object) -> bool:
+        return same(self, other) if isinstance(other, Execution) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        start, end = self.time_span
+        count = len(self.transitions)
+        return (
+            f"<Execution of {self.model}: {self.scheme} {self.method}, "
+            f"t = {float(start):.6g} to {float(end):.6g}, {count} transition{'' if count == 1 else 's'}, {len(self.arcs)} arcs, {len(self.times)} rows, "
+            f"stop: {self.stop.reason}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Show a short summary in Jupyter."""
+        from hsdsl import report
+
+        return report.html(self, limit=12)
+
+    @property
+    def time_span(self) -> tuple[Any, Any]:
+        """The first and the last time."""
+        return self.times[0], self.times[-1]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of all states, in the order in which the run first has them."""
+        return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
+
+    def __call__(self, t: Any, side: Side = "right") -> Point:
+        """Return the execution's value at a time.
+
+        Parameters
+        ----------
+        t : number
+            Within :attr:`time_span`, or outside it by no more than the tie tolerance.
+        side : {"right", "left"}
+            At a jump: the value after the last transition at that instant, or before the first.
+
+        Raises
+        ------
+        ValueError
+            For a time outside the run.
+        """
+        rows, times = find(self, t, side)
+        one = evaluate(self, rows, times)
+        state = {
+            name: value
+            for name, value, there in zip(
+                one.states, one.state_columns[0].tolist(), one.present[0], strict=True
+            )
+            if there
+        }
+        outputs = dict(zip(one.outputs, one.output_columns[0].tolist(), strict=True))
+        kind = "strip" if one.kind[0] == "strip" else "flow"
+        return Point(times.tolist()[0], str(one.mode[0]), int(one.jump[0]), kind, state, outputs)
+
+    def sample(self, times: Any, side: Side = "right") -> Samples:
+        """Return the values at many times, given in any order.
+
+        Raises
+        ------
+        ValueError
+            For a time outside the run; the message names the first such time.
+        """
+        return evaluate(self, *find(self, times, side))
+
+    def rows(self) -> Samples:
+        """Return the recorded rows, two at each jump, without those that only repeat the one above."""
+        rows = np.arange(len(self.times))
+        return evaluate(self, rows[_changes(self)], self.times[_changes(self)])
+
+    def to_pandas(self) -> Any:
+        """Make a pandas DataFrame of :meth:`rows`: ``time``, ``mode``, ``j``, states, outputs.
+
+        Raises
+        ------
+        UsageError
+            When pandas is not installed.
+        """
+        return self.rows().to_pandas()
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        samples: Any | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> tuple[Path, ...]:
+        """Save to ``.npz`` (everything, without loss), or to ``.csv`` or ``.parquet`` (a table, with a JSON
+        sidecar).
+
+        Files are written beside their place and renamed, so that a failure leaves what was there.
+
+        Parameters
+        ----------
+        path : path
+            The suffix says which.
+        samples : times, optional
+            For a table: rows at these times and both rows of each jump, instead of the rows the integrator
+            chose. Times outside the run are left out (a run may stop early).
+        columns : names, optional
+            For a table: which states and outputs, in this order.
+
+        Returns
+        -------
+        tuple of Path
+            The files written.
+
+        Raises
+        ------
+        UsageError
+            For an unknown suffix or column, a file that cannot be written, or a missing library.
+        """
+        from hsdsl import store
+
+        return store.save(self, path, samples=samples, columns=columns)
+
+
+def _changes(execution: Execution) -> Array:
+    """Mark the rows that are not the first of an arc that goes on exactly as the arc before it ended."""
+    keep = np.ones(len(execution.times), dtype=bool)
+    for before, after in zip(execution.arcs, execution.arcs[1:], strict=False):
+        if (before.mode, before.jump, before.states) == (after.mode, after.jump, after.states):
+            last, first = before.last, after.first
+            keep[first] = not (
+                same(execution.values[last], execution.values[first])
+                and same(execution.outputs[last], execution.outputs[first])
+            )
+    return keep
