@@ -1,0 +1,114 @@
+"""What holds the project together: layers at run time, nothing unregistered, undocumented or stale."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import hsdsl
+from hsdsl import integrators
+from hsdsl.errors import CODES
+
+ROOT = Path(__file__).parent.parent.parent
+SOURCES = sorted((ROOT / "hsdsl").rglob("*.py"))
+HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "typer", "pandas")
+
+
+def reference_pages() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def modules_after(statement: str) -> set[str]:
+    """Import in a fresh process and return the top-level packages that this brought in."""
+    program = f"{statement}\nimport sys\nprint(*{{name.partition('.')[0] for name in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_simulation_needs_no_heavy_library():
+    assert modules_after("import hsdsl.simulate").isdisjoint(HEAVY)
+
+
+def test_importing_the_package_alone_is_light():
+    assert modules_after("import hsdsl").isdisjoint(HEAVY)
+
+
+def test_the_probe_for_heavy_libraries_sees_them():
+    assert "sympy" in modules_after("import hsdsl.system")
+
+
+@pytest.mark.parametrize("name", reference_pages().PAGES)
+def test_reference_page_says_what_the_code_says(name):
+    pages = reference_pages()
+    assert pages.written(name) == pages.render(name), "run python docs/generate.py"
+
+
+def test_every_integrator_is_registered():
+    tables = set()
+    for info in pkgutil.iter_modules(integrators.__path__):
+        module = importlib.import_module(f"hsdsl.integrators.{info.name}")
+        tables |= {value for value in vars(module).values() if isinstance(value, integrators.ButcherTableau)}
+    assert tables == set(integrators.INTEGRATORS.values())
+
+
+def test_integrators_are_registered_under_their_names():
+    assert all(name == table.name for name, table in integrators.INTEGRATORS.items())
+
+
+def mentioned(paths: list[Path]) -> set[str]:
+    return {code for path in paths for code in re.findall(r"\bHS\d{3}\b", path.read_text(encoding="utf-8"))}
+
+
+def test_error_codes_are_registered_and_used():
+    assert mentioned([path for path in SOURCES if path.name != "errors.py"]) == set(CODES)
+
+
+def test_every_error_code_is_tested():
+    tests = [path for path in (ROOT / "tests").rglob("*") if path.suffix in (".py", ".yaml")]
+    assert set(CODES) - mentioned(tests) == set()
+
+
+def calls(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    names = {f.id for f in functions if isinstance(f, ast.Name)}
+    return names | {f.attr for f in functions if isinstance(f, ast.Attribute)}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_text_is_evaluated(path):
+    # Generated straight-line text is executed in these two places, over numbered names only.
+    allowed = {"exec"} if path.match("backends/python.py") or path.match("integrators/stepper.py") else set()
+    assert calls(path) & {"eval", "exec", "parse_expr", "safe_load", "unsafe_load"} <= allowed
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "models").glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_model_says_where_it_comes_from_and_what_is_known(path):
+    system = hsdsl.load(path).system
+    assert system.title and system.source and system.reference
+
+
+def readme_command(mark: str) -> str:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = re.findall(rf"^<!-- {mark} -->\n```sh\n(.*?)\n```$", text, flags=re.MULTILINE | re.DOTALL)
+    assert len(found) == 1
+    return found[0]
+
+
+@pytest.mark.parametrize("mark", ["setup-and-run", "setup-and-test"])
+def test_readme_command_starts_from_nothing_and_is_what_the_ci_runs(mark):
+    assert readme_command(mark).startswith("python3 -m venv .venv && ")
+    assert f"run_readme_command {mark}" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
