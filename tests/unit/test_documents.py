@@ -56,11 +56,10 @@ def assert_prints(expected: str, got: str) -> None:
         pytest.fail(checker.output_difference(doctest.Example("", expected), got, FLAGS))
 
 
-def runnable(page: Path) -> bool:
-    return any(kind == "run" for kind, *_ in blocks(page))
+RUNNABLE = [page for page in PAGES if any(kind == "run" for kind, *_ in blocks(page))]
 
 
-@pytest.mark.parametrize("page", filter(runnable, PAGES), ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", RUNNABLE, ids=lambda page: str(page.relative_to(ROOT)))
 def test_examples_run_and_print_what_the_page_says(page, tmp_path):
     (tmp_path / "models").symlink_to(ROOT / "models")
     printed = ""
@@ -81,4 +80,4 @@ def test_examples_run_and_print_what_the_page_says(page, tmp_path):
 
 
 def test_tutorial_and_readme_have_examples_that_run():
-    assert {page.name for page in PAGES if runnable(page)} >= {"README.md", "tutorial.md"}
+    assert {page.name for page in RUNNABLE} >= {"README.md", "tutorial.md"}
