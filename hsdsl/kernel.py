@@ -51,3 +51,7 @@ class Kernel(Protocol):
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to ``data``: parameter values, then (a, b, c) of each sampled input's segment."""
         ...
+
+    def expressions(self, mode: int, data: Sequence[Number]) -> Sequence[tuple[str, Routine]]:
+        """Return a mode's expressions one by one, named for a person: which of them is not finite?"""
+        ...

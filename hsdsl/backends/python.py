@@ -61,6 +61,12 @@ class PythonKernel:
             spreads=tuple(bound[f"spread_{k}"] for k in edges),
         )
 
+    def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
+        """Return a mode's expressions one by one, named for a person."""
+        program = self._program.modes[mode]
+        functions = compile_routines(program.diagnosis, self.arithmetic, f"expressions of mode {mode}")(*data)
+        return tuple(zip(program.expressions, functions, strict=True))
+
 
 PLAIN = ("flow", "surfaces", "magnitudes", "gradients", "rates", "conditions", "outputs")
 

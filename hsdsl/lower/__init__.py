@@ -134,7 +134,25 @@ def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram
         walls=tuple(wall.text for wall in mode.walls),
         flow_texts=mode.flow_texts,
         routines=print_routines(_mode_routines(mode, names), names.data),
+        expressions=tuple(text for text, _ in _expressions(mode)),
+        diagnosis=print_routines(_diagnosis(mode, names), names.data),
     )
+
+
+def _expressions(mode: Mode):
+    for state, text, expression in zip(mode.states, mode.flow_texts, mode.flow, strict=True):
+        yield f"the flow of {state}, {text}", expression
+    for edge in mode.edges:
+        yield f"the guard of {edge.name}, {edge.surface.text}", edge.surface.residual
+    for wall in mode.walls:
+        yield f"the domain's {wall.text}", wall.residual
+
+
+def _diagnosis(mode: Mode, names: Names):
+    mapping = names.mapping(mode.states)
+    for k, (_, expression) in enumerate(_expressions(mode)):
+        result = sp.sympify(expression).xreplace(mapping)
+        yield Definition(f"expression_{k}", (TIME, *names.of_states(mode.states)), (result,))
 
 
 def _mode_routines(mode: Mode, names: Names):

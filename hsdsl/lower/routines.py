@@ -46,4 +46,5 @@ def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol])
     names = tuple(d.name for d in definitions)
     body = "".join(textwrap.indent(text_of(d), "    ") for d in definitions)
     head = f"def bind({', '.join(s.name for s in data)}):\n"
-    return Routines(names, f"{head}{body}    return ({', '.join(names)},)\n")
+    result = f"({', '.join(names)},)" if names else "()"
+    return Routines(names, f"{head}{body}    return {result}\n")

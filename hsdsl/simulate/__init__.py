@@ -1,0 +1,121 @@
+"""From a program to an execution. `relaxed` is the paper's algorithm; `SCHEMES` is what a model may name.
+
+==================  ===========================================================================================
+`relaxed`           the loop: step, strip, reset (Fig. 12)
+`entry`             entering a mode: transitions that fire at once
+`surfaces`          round-off, depth, and where a step crossed a surface
+`control`           the step size
+`timeline`          sampled inputs as segments no step crosses
+`run`               what stays for a whole run, and where it stands
+`recorder`          rows, arcs and transitions, and the execution's columns
+==================  ===========================================================================================
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from hsdsl.arithmetic import Number
+from hsdsl.execution import Execution, Point, Stop, Verdict
+from hsdsl.integrators.stepper import State
+from hsdsl.kernel import Kernel
+from hsdsl.program import Program
+from hsdsl.simulate.control import make_control
+from hsdsl.simulate.entry import enter
+from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.relaxed import relaxed
+from hsdsl.simulate.run import Here, Run, show
+from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.timeline import make_timeline
+
+SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed}
+_DEGREE = {"secant": 0, "hermite": 3, "dense": 4}
+
+__all__ = ["SCHEMES", "Settings", "simulate"]
+
+
+def simulate(
+    program: Program,
+    kernel: Kernel,
+    settings: Settings,
+    parameters: Sequence[Number],
+    mode: int,
+    states: tuple[str, ...],
+    x: State,
+    watch: Callable[[Recorder], None] | None = None,
+) -> Execution:
+    """Run a program from mode and state ``x`` at t = 0.
+
+    ``watch`` is given the recorder before the run starts, so that another thread can show how far it is.
+    An interrupt (Ctrl-C) ends the run with what was computed.
+    """
+    timeline = make_timeline(program, kernel, parameters, settings.until)
+    recorder = Recorder(kernel.arithmetic, _DEGREE[settings.method.interpolant], len(program.outputs))
+    run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
+    if watch is not None:
+        watch(recorder)
+    zero = kernel.arithmetic.zero
+    began = time.perf_counter()
+    try:
+        here = enter(run, mode, states, zero, x, tuple(zero for _ in x))
+        stop = SCHEMES[settings.scheme](run, here)
+    except KeyboardInterrupt:
+        stop = Stop("interrupted", recorder.now, f"interrupted at t = {show(recorder.now)}; what was computed is kept")
+    return _execution(run, stop, time.perf_counter() - began)
+
+
+def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
+    program, settings, recorder = run.program, run.settings, run.recorder
+    columns = recorder.columns()
+    last, width = columns["arcs"][-1], len(columns["arcs"][-1].states)
+    row = last.last
+    native = float if run.arithmetic.name == "float64" else (lambda v: v)
+    final = Point(
+        time=native(columns["times"][row]),
+        mode=last.mode,
+        jump=last.jump,
+        kind=last.kind,
+        state={s: native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)},
+        outputs={name: native(v) for name, v in zip(program.outputs, columns["outputs"][row], strict=True)},
+    )
+    return Execution(
+        model=program.path,
+        digest=program.digest,
+        engine="python",
+        scheme=settings.scheme,
+        method=settings.method.name,
+        settings=described(settings),
+        stop=stop,
+        transitions=tuple(recorder.transitions),
+        final=final,
+        verdict=verdict(recorder),
+        output_names=program.outputs,
+        seconds={"simulate": seconds},
+        digits=run.arithmetic.digits,
+        **columns,
+    )
+
+
+def described(settings: Settings) -> dict[str, Number]:
+    """Return the settings that governed the run, by the names of the model file."""
+    size = {"step": settings.step} if settings.tolerance is None else {"tolerance": settings.tolerance}
+    return {
+        "until": settings.until,
+        **size,
+        "relaxation": settings.relaxation,
+        "max_transitions": settings.max_transitions,
+    }
+
+
+def verdict(recorder: Recorder) -> Verdict:
+    """Say what is known of the theorem's hypotheses for this run: nothing checks them yet, and it says so."""
+    reasons = ["nothing checks yet whether the theorem's hypotheses hold for this run"]
+    at_once = [t for t in recorder.transitions if t.entry]
+    if at_once:
+        first = at_once[0]
+        reasons.append(
+            f"{len(at_once)} transition{'s' * (len(at_once) > 1)} fired at once on entry, the first {first.edge} at "
+            f"t = {show(first.time)}: the state entered {first.source} outside its domain"
+        )
+    return Verdict("unknown", tuple(reasons))

@@ -1,0 +1,62 @@
+"""The step size: fixed, or from the embedded error estimate by one documented formula.
+
+With e the estimate and x, z the step's ends, the error ratio is max_i |e_i| / (tolerance (1 + max(|x_i|, |z_i|))). A
+step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
+above 1 after a rejection). Trials halved to stay in the relaxed domain do not feed the formula.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.settings import Settings
+
+SAFETY, LEAST, MOST = 0.9, 0.2, 5
+LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
+
+
+@dataclass
+class Control:
+    """The step to try next, ``h``; ``tolerance`` is None for a fixed step."""
+
+    h: Number
+    tolerance: Number | None
+    order: int
+    largest: Number
+    power: Callable[[Number, Number], Number] | None
+
+    def ratio(self, error: State, x: State, z: State) -> Number:
+        """Error ratio of a step; at most 1 is acceptable."""
+        assert self.tolerance is not None
+        worst = self.h * 0
+        for e, a, b in zip(error, x, z, strict=True):
+            worst = max(worst, abs(e) / (self.tolerance * (1 + max(abs(a), abs(b)))))
+        return worst
+
+    def factor(self, ratio: Number) -> Number:
+        """Factor from one step to the next."""
+        if ratio == 0 or self.power is None:
+            return MOST
+        return min(MOST, max(LEAST, SAFETY * self.power(ratio, -1 / (ratio * 0 + self.order))))
+
+    def accept(self, taken: Number, ratio: Number) -> None:
+        """Learn from an accepted, unhalved step; one cut short by a boundary never shrinks the next."""
+        proposed = taken * self.factor(ratio)
+        self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
+
+    def reject(self, taken: Number, ratio: Number) -> None:
+        """Shrink after a rejected, unhalved step."""
+        self.h = taken * min(1, self.factor(ratio))
+
+
+def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
+    """Start from the fixed step, or from a hundredth of the largest step and the error formula."""
+    if settings.step is not None:
+        return Control(settings.step, None, settings.method.order, settings.step, None)
+    largest = settings.until * LARGEST_SHARE
+    return Control(
+        largest / 100, settings.tolerance, settings.method.order, largest, arithmetic.functions["pow"]
+    )

@@ -1,0 +1,137 @@
+"""Collects a run's rows as it goes, and makes the execution's columns of them at the end.
+
+The loop appends to plain lists; a run that is interrupted at any moment still closes to a legal execution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.execution import Arc, Array, Transition
+from hsdsl.integrators.stepper import Polynomial, State
+
+Outputs = Callable[..., State]
+
+
+@dataclass
+class OpenArc:
+    """An arc being written: its rows are lists that the loop appends to."""
+
+    mode: str
+    states: tuple[str, ...]
+    kind: Literal["flow", "strip"]
+    jump: int
+    outputs: Outputs | None
+    times: list[Number]
+    values: list[State]
+    pieces: list[Polynomial]  # one fewer than rows
+    depths: list[Number] = field(default_factory=list[Number])
+
+    def append(self, t: Number, x: State, piece: Polynomial) -> None:
+        """Add the piece that leads to a row, and the row."""
+        self.times.append(t)
+        self.values.append(x)
+        self.pieces.append(piece)
+
+
+@dataclass
+class Recorder:
+    """All arcs and transitions so far. ``keep_pieces`` is false where the interpolant is the straight line."""
+
+    arithmetic: Arithmetic
+    degree: int  # of the pieces; 0 for straight lines
+    output_count: int
+    arcs: list[OpenArc] = field(default_factory=list[OpenArc])
+    transitions: list[Transition] = field(default_factory=list[Transition])
+
+    @property
+    def jump(self) -> int:
+        """Transitions made so far."""
+        return sum(1 for t in self.transitions[-1:]) and self.transitions[-1].index + 1
+
+    @property
+    def now(self) -> Number:
+        """Time of the last row written."""
+        return self.arcs[-1].times[-1] if self.arcs else self.arithmetic.zero
+
+    def begin(
+        self,
+        mode: str,
+        states: tuple[str, ...],
+        kind: Literal["flow", "strip"],
+        outputs: Outputs | None,
+        t: Number,
+        x: State,
+    ) -> OpenArc:
+        """Open an arc at its first row."""
+        arc = OpenArc(mode, states, kind, len(self.transitions), outputs, [t], [x], [])
+        self.arcs.append(arc)
+        return arc
+
+    def strip(self, arc: OpenArc, rows: list[tuple[Number, Number]], q: State) -> None:
+        """Write a strip behind ``arc``: the state waits at q while the depth grows; rows are (time, depth)."""
+        strip = self.begin(arc.mode, arc.states, "strip", arc.outputs, rows[0][0], q)
+        for t, _ in rows[1:]:
+            strip.append(t, q, ())
+        strip.depths = [depth for _, depth in rows]
+
+    def columns(self) -> dict[str, Any]:
+        """Build the execution's arrays (see `hsdsl.execution`)."""
+        rows = [min(len(a.times), len(a.values), len(a.pieces) + 1) for a in self.arcs]
+        ends = np.cumsum(rows)
+        arcs = tuple(
+            Arc(a.mode, a.states, a.kind, a.jump, int(end - n), int(end - 1))
+            for a, n, end in zip(self.arcs, rows, ends, strict=True)
+        )
+        width = max(len(a.states) for a in self.arcs)
+        total = int(ends[-1])
+        nan = self.arithmetic.functions["nan"]
+        times, depth = self._filled((total,), self.arithmetic.zero), self._filled((total,), self.arithmetic.zero)
+        values = self._filled((total, width), nan)
+        outputs = self._filled((total, self.output_count), nan)
+        coefficients = self._filled((total, self.degree, width), self.arithmetic.zero)
+        for arc, opened, n in zip(arcs, self.arcs, rows, strict=True):
+            here = slice(arc.first, arc.last + 1)
+            d = len(arc.states)
+            times[here] = opened.times[:n]
+            if d:
+                values[here, :d] = opened.values[:n]
+            if opened.depths:
+                depth[here] = opened.depths[:n]
+            if self.output_count:
+                outputs[here] = [self._outputs(opened, k) for k in range(n)]
+            if self.degree and d and arc.kind == "flow" and n > 1:
+                coefficients[arc.first : arc.last, :, :d] = [self._padded(p, d) for p in opened.pieces[: n - 1]]
+        return {
+            "times": times,
+            "values": values,
+            "outputs": outputs,
+            "depth": depth,
+            "coefficients": coefficients,
+            "arcs": arcs,
+        }
+
+    def _filled(self, shape: tuple[int, ...], value: Number) -> Array:
+        if self.arithmetic.name == "float64":
+            return np.full(shape, value, dtype=np.float64)
+        return np.full(shape, value, dtype=object)
+
+    def _padded(self, piece: Polynomial, dimension: int) -> Polynomial:
+        """Fill up a piece of lower degree (a secant where the flow beyond a guard has no value)."""
+        missing = self.degree - len(piece)
+        return (*piece, *((self.arithmetic.zero,) * dimension for _ in range(missing))) if missing else piece
+
+    def _outputs(self, arc: OpenArc, k: int) -> State:
+        try:
+            return arc.outputs(arc.times[k], *arc.values[k]) if arc.outputs else self._no_outputs
+        except DOMAIN_ERRORS:
+            return self._no_outputs
+
+    @property
+    def _no_outputs(self) -> State:
+        return (self.arithmetic.functions["nan"],) * self.output_count

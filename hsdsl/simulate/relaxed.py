@@ -1,0 +1,194 @@
+"""The relaxed scheme: discrete approximation of a relaxed execution (Burden et al. 2013, Fig. 12, Sec. IV-C).
+
+Each guard carries a strip of depth epsilon. A step may end in the domain or in a strip; otherwise it is halved. In the
+strip the state waits at the point q where the step crossed the guard, until epsilon has passed, and is reset. No event
+is located on the flow: only the step's own interpolant is asked where it crossed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log2
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Stop
+from hsdsl.integrators.stepper import Polynomial, State
+from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.run import Here, Run, choose, reset, show
+from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
+
+ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
+NOT_FINITE = Obstacle("not finite")
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A step that ended in a strip: where it left the domain, when the step ended, and what it was computed from."""
+
+    crossing: Crossing
+    alternatives: tuple[str, ...]
+    t1: Number
+    piece: Polynomial
+    scale: State
+
+
+def relaxed(run: Run, here: Here | Stop) -> Stop:
+    """Follow the relaxed execution from ``here`` until it stops."""
+    while not isinstance(here, Stop):
+        outcome = flow(run, here)
+        if isinstance(outcome, Landing):
+            here = through_strip(run, here, outcome)
+        elif isinstance(outcome, Here):
+            here = at_boundary(run, outcome)
+        else:
+            here = outcome
+    return here
+
+
+def flow(run: Run, here: Here) -> Landing | Here | Stop:
+    """Step inside the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
+    control, epsilon, isfinite = run.control, run.settings.relaxation, run.arithmetic.isfinite
+    field, surfaces, append = here.kernel.flow, here.kernel.surfaces, here.arc.append
+    method = run.stepper(len(here.x))
+    step, piece, curved = method.step, method.piece, run.recorder.degree > 0
+    t, x, limit = here.t, here.x, here.segment.end
+    most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
+    try:
+        slope = field(t, *x)
+    except DOMAIN_ERRORS:
+        return not_finite(run, here, t, (x,))
+    while t < limit:
+        h, halvings, ratio = control.h, 0, None
+        while True:
+            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            try:
+                z, stages = step(field, t, h, x, slope)
+                values = surfaces(t1, *z)
+                if not isfinite(sum(z) + sum(values)):
+                    found, end = NOT_FINITE, slope
+                elif not values or max(values) <= 0:
+                    found, end = (), field(t1, *z)
+                else:
+                    trial = Trial(t, h, t1, x, slope, z, stages, field, method)
+                    found, end = here.surfaces.judge(trial, values, epsilon), trial.end or slope
+                if not isfinite(sum(end)):
+                    found = NOT_FINITE
+            except DOMAIN_ERRORS:
+                found = NOT_FINITE
+            if not isinstance(found, Obstacle):
+                if control.tolerance is None:
+                    break
+                ratio = control.ratio(method.error(h, stages, end), x, z)
+                if ratio <= 1:
+                    break
+                found = Obstacle("error")
+            if found.kind == "error" and halvings == 0:
+                control.reject(h, ratio)
+                h = control.h
+            else:
+                h, halvings = h / 2, halvings + 1
+            if halvings > most_halvings or not t + h > t and found.kind == "error":
+                return stuck(run, here.moved(t, x), found, slope)
+        if ratio is not None and halvings == 0:
+            control.accept(h, ratio)
+        if found:
+            chosen, alternatives = choose(here.mode.edges, found, run.tie(t))
+            return Landing(chosen, alternatives, t1, trial.piece, sizes(x, z))
+        append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
+        t, x, slope = t1, z, end
+    return here.moved(t, x)
+
+
+def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
+    """Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14)."""
+    crossing, epsilon, until = landing.crossing, run.settings.relaxation, run.settings.until
+    t, q, depth = crossing.time, crossing.state, crossing.depth
+    if crossing.theta > 0:
+        here.arc.append(t, q, shortened(landing.piece, crossing.theta))
+    if stop := run.limit_reached(t):
+        return stop
+    resumed = landing.t1 + (epsilon - depth)
+    edge = here.mode.edges[crossing.edge]
+    if resumed > until + run.tie(until):
+        depth_at_end = depth + (until - landing.t1)
+        run.recorder.strip(here.arc, [(t, depth * 0), (landing.t1, depth), (until, depth_at_end)], q)
+        run.record(here, crossing, None, None, landing.alternatives)
+        return Stop("until", until, f"reached t = {show(until)} inside the strip of {edge.name}, mode unchanged")
+    resumed = min(resumed, until)
+    run.recorder.strip(here.arc, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
+    outcome = reset(here, crossing, landing.scale, run)
+    if isinstance(outcome, Stop):
+        return outcome
+    after, scale = outcome
+    run.record(here, crossing, resumed, after, landing.alternatives)
+    return enter(run, edge.target, edge.target_states, resumed, after, scale, here)
+
+
+def at_boundary(run: Run, here: Here) -> Here | Stop:
+    """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
+    t, x, until = here.t, here.x, run.settings.until
+    mode = run.program.modes.index(here.mode)
+    if t < until:
+        scale = here.surfaces.scale
+        if run.timeline.at(t).jump:
+            return enter(run, mode, here.mode.states, t, x, scale)
+        return run.place(mode, here.mode.states, t, x, scale)
+    standing = standing_on(run, here)
+    if standing and (stop := run.limit_reached(t)):
+        return stop
+    if standing:
+        chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
+        run.recorder.strip(here.arc, [(t, run.arithmetic.zero)], x)
+        run.record(here, chosen, None, None, alternatives)
+        name = here.mode.edges[chosen.edge].name
+        return Stop("until", t, f"reached t = {show(t)} on the guard of {name}, at the edge of its strip, mode unchanged")
+    return Stop("until", t, f"reached t = {show(t)}")
+
+
+def standing_on(run: Run, here: Here) -> list[Crossing]:
+    """Guards that the state stands on, to round-off or a tie in time, with the flow pointing out and `if` true."""
+    t, x, zero = here.t, here.x, run.arithmetic.zero
+    try:
+        values, noise = here.kernel.surfaces(t, *x), here.surfaces.noise(t, x)
+        rates, conditions = here.kernel.rates(t, *x), here.kernel.conditions(t, *x)
+    except DOMAIN_ERRORS:
+        return []
+    return [
+        Crossing(k, zero, t, x, zero)
+        for k in range(len(here.mode.edges))
+        if abs(values[k]) <= max(noise[k], rates[k] * run.tie(t)) and rates[k] > 0 and conditions[k]
+    ]
+
+
+def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | Stop:
+    """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
+    t, x = here.t, here.x
+    if obstacle.kind in ("wall", "deep", "flat", "inward") and (standing := standing_on(run, here)):
+        chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
+        return Landing(chosen, alternatives, t, (), sizes(x, x))
+    if obstacle.kind == "wall" and obstacle.surface is not None:
+        return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
+    if obstacle.kind == "not finite":
+        h = run.control.h
+        ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
+        return not_finite(run, here, t, ahead)
+    why = {
+        "error": "the error estimate stays above the tolerance",
+        "flat": "the gradient of a guard's surface vanishes on it",
+    }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
+    return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
+
+
+def shortened(piece: Polynomial, theta: Number) -> Polynomial:
+    """Return the part of an interpolant before theta, over [0, 1] again."""
+    power, parts = theta, []
+    for c in piece:
+        parts.append(tuple(a * power for a in c))
+        power = power * theta
+    return tuple(parts)
+
+
+def sizes(x: State, z: State) -> State:
+    """Return the sizes of the numbers that a point between x and z is computed from."""
+    return tuple(max(abs(a), abs(b)) for a, b in zip(x, z, strict=True))

@@ -1,0 +1,152 @@
+"""A run under way: what it was asked, what it has recorded, and where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.execution import Stop, Transition
+from hsdsl.integrators.stepper import State, Stepper, stepper
+from hsdsl.kernel import Kernel, ModeKernel
+from hsdsl.program import EdgeProgram, ModeProgram, Program
+from hsdsl.simulate.control import Control
+from hsdsl.simulate.recorder import OpenArc, Recorder
+from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.surfaces import TIE, Crossing, Surfaces
+from hsdsl.simulate.timeline import Segment, Timeline
+
+
+@dataclass(frozen=True)
+class Here:
+    """Where a run stands, ready to flow: mode, input segment, time and state.
+
+    ``scale`` is the size of the numbers each state was computed from when the mode was entered.
+    """
+
+    mode: ModeProgram
+    kernel: ModeKernel
+    surfaces: Surfaces
+    segment: Segment
+    arc: OpenArc
+    t: Number
+    x: State
+
+    def moved(self, t: Number, x: State) -> Here:
+        """Return the same place in the mode's life, later."""
+        return Here(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything that stays for a whole run, and what it writes to."""
+
+    program: Program
+    kernel: Kernel
+    timeline: Timeline
+    settings: Settings
+    control: Control
+    recorder: Recorder
+
+    @property
+    def arithmetic(self) -> Arithmetic:
+        """The run's number type."""
+        return self.kernel.arithmetic
+
+    def stepper(self, dimension: int) -> Stepper:
+        """The method for states of one dimension."""
+        return stepper(self.settings.method, dimension, self.arithmetic)
+
+    def tie(self, t: Number) -> Number:
+        """Times closer than this are the same instant."""
+        return TIE * max(1, abs(t))
+
+    def place(
+        self,
+        mode: int,
+        states: tuple[str, ...],
+        t: Number,
+        x: State,
+        scale: State,
+        before: Here | None = None,
+    ) -> Here:
+        """Enter a mode: bind its routines to the input segment of this time and open an arc.
+
+        A final mode without a flow has the states, and so the outputs, of the mode ``before`` it.
+        """
+        segment = self.timeline.at(t)
+        program, kernel = self.program.modes[mode], self.kernel.bind(mode, segment.data)
+        outputs = kernel.outputs if program.states == states else None
+        if outputs is None and before is not None and before.mode.states == states:
+            outputs = before.kernel.outputs
+        arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
+        return Here(program, kernel, Surfaces(kernel, program.edges, scale, self.arithmetic), segment, arc, t, x)
+
+    def limit_reached(self, t: Number) -> Stop | None:
+        """Stop where one more transition would exceed what the run may make."""
+        if len(self.recorder.transitions) < self.settings.max_transitions:
+            return None
+        return Stop(
+            "transition_limit",
+            t,
+            f"made max_transitions = {self.settings.max_transitions} transitions by t = {show(t)}",
+        )
+
+    def record(
+        self,
+        here: Here,
+        crossing: Crossing,
+        resumed: Number | None,
+        after: State | None,
+        alternatives: tuple[str, ...],
+        entry: bool = False,
+    ) -> None:
+        """Write one transition down."""
+        edge = here.mode.edges[crossing.edge]
+        self.recorder.transitions.append(
+            Transition(
+                index=len(self.recorder.transitions),
+                time=crossing.time,
+                resumed=resumed,
+                edge=edge.name,
+                source=here.mode.name,
+                target=self.program.modes[edge.target].name,
+                before=dict(zip(here.arc.states, crossing.state, strict=True)),
+                after=None if after is None else dict(zip(edge.target_states, after, strict=True)),
+                alternatives=alternatives,
+                entry=entry,
+            )
+        )
+
+
+def choose(edges: tuple[EdgeProgram, ...], crossings: list[Crossing], tie: Number) -> tuple[Crossing, tuple[str, ...]]:
+    """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
+
+    Returns the chosen crossing and the names of those tied with it.
+    """
+    first = min(c.time for c in crossings)
+    tied = [c for c in crossings if c.time - first <= tie]
+    chosen = min(tied, key=lambda c: (-edges[c.edge].priority, c.edge))
+    return chosen, tuple(edges[c.edge].name for c in tied if c is not chosen)
+
+
+def reset(here: Here, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
+    """Apply a reset to the values before the jump; also the sizes of the numbers the new state came from."""
+    k, t, q = crossing.edge, crossing.time, crossing.state
+    edge = here.mode.edges[k]
+    try:
+        after = here.kernel.resets[k](t, *q)
+        spread = here.kernel.spreads[k](t, *q, *scale)
+    except DOMAIN_ERRORS:
+        after = spread = (run.arithmetic.functions["nan"],)
+    if all(map(run.arithmetic.isfinite, after)):
+        return after, spread
+    texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))
+    return Stop("not_finite", t, f"the reset of {edge.name} ({texts}) has no finite value at t = {show(t)}")
+
+
+def show(x: Any) -> str:
+    """Write a number for a person."""
+    return f"{float(x):.10g}"
+
+

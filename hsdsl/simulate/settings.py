@@ -1,0 +1,34 @@
+"""What a run is asked to do, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Number
+from hsdsl.integrators import ButcherTableau
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of one run, resolved and checked.
+
+    Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to 1 + |x|) is given.
+    ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time.
+    """
+
+    scheme: str
+    method: ButcherTableau
+    step: Number | None
+    tolerance: Number | None
+    relaxation: Number
+    until: Number
+    max_transitions: int
+    sample_times: tuple[Number, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.step is None) == (self.tolerance is None):
+            raise ValueError("exactly one of step and tolerance")
+        if self.tolerance is not None and not self.method.adaptive:
+            raise ValueError(f"{self.method.name} has no error estimate")
+        if not self.relaxation > 0 or not self.until >= 0:
+            raise ValueError("relaxation must be positive and until not negative")

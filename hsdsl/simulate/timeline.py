@@ -1,0 +1,91 @@
+"""Sampled inputs over time: the segments between their samples, each a boundary no step may cross.
+
+On a segment an input is a line ``a + b (t - c)``, so every stage of a step sees the values of the step's own open
+interval, and the stage at its right end takes the left limit.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Number
+from hsdsl.kernel import Kernel
+from hsdsl.program import Program, SampledInput
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Time from ``start`` to ``end``, what routines are bound to on it, and whether an input jumps at its start."""
+
+    start: Number
+    end: Number
+    data: tuple[Number, ...]
+    jump: bool
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The segments of a run, from 0 to ``until``."""
+
+    segments: tuple[Segment, ...]
+
+    def at(self, t: Number) -> Segment:
+        """Return the segment that time is in; at a boundary the later one."""
+        return self.segments[max(0, bisect_right(self.segments, t, key=lambda s: s.start) - 1)]
+
+
+def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number], until: Number) -> Timeline:
+    """Cut time at every sample of every sampled input.
+
+    Raises
+    ------
+    ValueError
+        An input's sample times do not increase, or a sample is not finite.
+    """
+    samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
+    zero = kernel.arithmetic.zero
+    cuts = sorted({zero} | {t for times, _ in samples for t in times if zero < t < until})
+    ends = [*cuts[1:], until]
+    segments: list[Segment] = []
+    held_before: tuple[Number, ...] = ()
+    for start, end in zip(cuts, ends, strict=True):
+        lines = [
+            _line(given, times, values, start) for given, (times, values) in zip(program.inputs, samples, strict=True)
+        ]
+        held = tuple(a for given, (a, _, _) in zip(program.inputs, lines, strict=True) if given.hold == "zero")
+        data = (*parameters, *(number for line in lines for number in line))
+        segments.append(Segment(start, end, data, jump=bool(segments) and held != held_before))
+        held_before = held
+    return Timeline(tuple(segments))
+
+
+def _samples(
+    index: int, given: SampledInput, kernel: Kernel, parameters: Sequence[Number]
+) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+    if given.times is not None and given.values is not None:
+        times, values = (tuple(map(kernel.arithmetic.constant, column)) for column in (given.times, given.values))
+    else:
+        both = kernel.constant(f"input_{index}", parameters)
+        times, values = both[: len(both) // 2], both[len(both) // 2 :]
+    if not all(map(kernel.arithmetic.isfinite, (*times, *values))):
+        raise ValueError(f"input {given.name} has a sample that is not finite")
+    if any(not a < b for a, b in zip(times, times[1:], strict=False)):
+        raise ValueError(f"the sample times of input {given.name} do not increase")
+    return times, values
+
+
+def _line(
+    given: SampledInput, times: tuple[Number, ...], values: tuple[Number, ...], t: Number
+) -> tuple[Number, Number, Number]:
+    """Return (a, b, c) of the segment that starts at or before t; constant before the first and after the last sample."""
+    k = bisect_right(times, t) - 1
+    still = values[0] * 0
+    if k < 0:
+        return values[0], still, times[0]
+    if given.hold == "zero" or k + 1 == len(times):
+        return values[k], still, times[k]
+    return values[k], (values[k + 1] - values[k]) / (times[k + 1] - times[k]), times[k]
+
+
