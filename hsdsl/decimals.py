@@ -1,9 +1,8 @@
 # pyright: basic
 """Numbers as decimal text and back without loss, for float64 and for mpmath numbers of any precision.
 
-A number of P bits, written with the digits :func:`text` chooses and read at P bits, is the same number again
-(Steele and White: ceil(P log10 2) + 1 digits are enough; a few more are spent, and trailing zeros are not
-written).
+A number of P bits, written by :func:`text` and read at P bits, is the same number again: ceil(P log10 2) + 1 digits are
+always enough (Steele and White 1990), and like ``repr`` the text is the shortest that does it.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ def bits(numbers: Iterable[Any]) -> int:
 
 
 def text(x: Any, precision: int = FLOAT_BITS) -> str:
-    """Write a number: ``repr`` of a float, and of an mpmath number the digits that ``precision`` bits need.
+    """Write a number: ``repr`` of a float, and of of an mpmath number the fewest digits that read back.
 
     Not-a-number and infinities are ``nan``, ``inf`` and ``-inf``.
     """
@@ -41,10 +40,12 @@ def text(x: Any, precision: int = FLOAT_BITS) -> str:
         return repr(float(x))
     if not is_finite(x):
         return repr(float(x))
-    from mpmath.libmp import to_str
+    from mpmath.libmp import from_str, to_str
 
     needed = max(precision, x._mpf_[3], FLOAT_BITS)
-    return str(to_str(x._mpf_, math.ceil(needed * math.log10(2)) + 3))
+    enough = math.ceil(needed * math.log10(2)) + 3
+    shorter = (str(to_str(x._mpf_, digits)) for digits in range(enough - 4, enough))
+    return next((s for s in shorter if from_str(s, needed, "n") == x._mpf_), str(to_str(x._mpf_, enough)))
 
 
 def read(written: str, precision: int, context: Any) -> Any:

@@ -81,8 +81,8 @@ class Execution:
         count = len(self.transitions)
         return (
             f"<Execution of {self.model}: {self.scheme} {self.method}, "
-            f"t = {float(start):.6g} to {float(end):.6g}, {count} transition{'' if count == 1 else 's'}, {len(self.arcs)} arcs, {len(self.times)} rows, "
-            f"stop: {self.stop.reason}>"
+            f"t = {float(start):.6g} to {float(end):.6g}, {count} transition{'' if count == 1 else 's'}, "
+            f"{len(self.arcs)} arcs, {len(self.times)} rows, stop: {self.stop.reason}>"
         )
 
     def _repr_html_(self) -> str:
@@ -120,9 +120,7 @@ class Execution:
         one = evaluate(self, rows, times)
         state = {
             name: value
-            for name, value, there in zip(
-                one.states, one.state_columns[0].tolist(), one.present[0], strict=True
-            )
+            for name, value, there in zip(one.states, one.state_columns[0].tolist(), one.present[0], strict=True)
             if there
         }
         outputs = dict(zip(one.outputs, one.output_columns[0].tolist(), strict=True))

@@ -124,8 +124,7 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     if not inside.all():
         first = asked[int(np.argmin(inside))]
         raise ValueError(
-            f"time {float(first):.17g} is outside the run, "
-            f"which goes from {float(start):.17g} to {float(end):.17g}"
+            f"time {float(first):.17g} is outside the run, which goes from {float(start):.17g} to {float(end):.17g}"
         )
     asked = np.minimum(np.maximum(asked, start), end)
     rows = np.searchsorted(execution.times, asked, side=side)

@@ -1,0 +1,49 @@
+"""The summary as a piece of HTML: for Jupyter, and beside the plot of a page."""
+
+from __future__ import annotations
+
+from html import escape
+
+from hsdsl.execution import Execution, Transition
+from hsdsl.report import words
+
+
+def html(execution: Execution, *, limit: int = 60) -> str:
+    """Sum a run up in HTML (a ``div``), with at most ``limit`` transitions; every text of the model is escaped."""
+    facts = [
+        ("stop", words.stop(execution)),
+        ("final", words.final(execution.final)),
+        ("state", words.values(execution.final.state)),
+        ("outputs", words.outputs(execution.final)),
+        ("verdict", words.verdict(execution)),
+        ("time", words.seconds(execution)),
+    ]
+    rows = "".join(f"<tr><th>{label}</th><td>{escape(text)}</td></tr>" for label, text in facts if text)
+    settings = escape(", ".join(words.settings(execution)))
+    return (
+        f'<div class="hsdsl"><p><strong>{escape(words.heading(execution))}</strong><br>{settings}</p>'
+        f"<table>{rows}</table>{_transitions(execution, limit)}</div>"
+    )
+
+
+def _transitions(execution: Execution, limit: int) -> str:
+    transitions = execution.transitions
+    if not transitions:
+        return "<p>No transitions.</p>"
+    head, tail = words.shortened(len(transitions), limit)
+    instants = words.times([transitions[i].time for i in (*head, *tail)])
+    rows = [_row(transitions[i], time) for i, time in zip((*head, *tail), instants, strict=True)]
+    if tail:
+        left_out = len(transitions) - len(rows)
+        rows.insert(len(head), f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
+    names = ("#", "time", "delay", "edge", "from &rarr; to", "state")
+    header = "".join(f"<th>{name}</th>" for name in names)
+    return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _row(transition: Transition, time: str) -> str:
+    between = f"{escape(transition.source)} &rarr; {escape(transition.target)}"
+    note = "; ".join(filter(None, (words.changes(transition), words.remarks(transition))))
+    cells = (str(transition.index), time, words.delay(transition), escape(transition.edge))
+    plain = "".join(f"<td>{cell}</td>" for cell in cells)
+    return f"<tr>{plain}<td>{between}</td><td>{escape(note)}</td></tr>"

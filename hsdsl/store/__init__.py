@@ -1,0 +1,49 @@
+"""Executions in files: ``.npz`` without loss, ``.csv`` and ``.parquet`` as tables with a JSON sidecar.
+
+The sidecar of ``run.csv`` is ``run.csv.json``: the name keeps its suffix so that the sidecar never takes the place of a
+``run.json`` that somebody else writes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.store.atomic import replacing
+from hsdsl.store.npz import load, save_npz
+from hsdsl.store.sidecar import write_sidecar
+from hsdsl.store.table import at_samples, select, write_csv, write_parquet
+
+__all__ = ["load", "save"]
+
+_TABLES = {".csv": write_csv, ".parquet": write_parquet}
+
+
+def save(
+    execution: Execution,
+    path: str | os.PathLike[str],
+    samples: Any | None = None,
+    columns: Sequence[str] | None = None,
+) -> tuple[Path, ...]:
+    """Save an execution; see :meth:`hsdsl.execution.Execution.save`."""
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix == ".npz":
+        if columns is not None:
+            raise UsageError("an .npz file holds the whole execution: choose columns for .csv or .parquet only")
+        with replacing(target) as file:
+            save_npz(execution, file)
+        return (target,)
+    if suffix not in _TABLES:
+        raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix says what to write")
+    rows = execution.rows() if samples is None else at_samples(execution, samples)
+    table = select(rows, columns)
+    beside = target.with_name(target.name + ".json")
+    with replacing(target) as file, replacing(beside) as description:
+        _TABLES[suffix](table, file)
+        write_sidecar(execution, table, target.name, description)
+    return target, beside

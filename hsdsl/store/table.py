@@ -1,0 +1,122 @@
+"""An execution as a table: which rows, which columns, and how they are written."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from hsdsl import decimals
+from hsdsl.errors import UsageError
+from hsdsl.execution import Array, Execution, Samples
+from hsdsl.execution.sampling import evaluate, find, optional
+
+
+def at_samples(execution: Execution, samples: Any) -> Samples:
+    """Give the rows at sample times, and both rows of each jump, in the order of hybrid time.
+
+    Samples outside the run are left out: a run may stop before the last one.
+    """
+    start, end = (float(t) for t in execution.time_span)
+    slack = 1e-12 * max(1.0, abs(start), abs(end))
+    asked = [t for t in np.atleast_1d(np.asarray(samples)).ravel() if start - slack <= t <= end + slack]
+    rows, times = find(execution, asked, "right")
+    ends = [
+        row
+        for before, after in zip(execution.arcs, execution.arcs[1:], strict=False)
+        if before.jump != after.jump
+        for row in (before.last, after.first)
+    ]
+    points = {(int(row), execution.times[row]) for row in ends} | set(zip(rows.tolist(), times, strict=True))
+    ordered = sorted(points)
+    instants = np.array([time for _, time in ordered], dtype=execution.times.dtype)
+    return evaluate(execution, np.array([row for row, _ in ordered], dtype=int), instants)
+
+
+def select(samples: Samples, columns: Sequence[str] | None) -> Samples:
+    """Keep only the states and outputs named, in the order named (states still stand before outputs).
+
+    Raises
+    ------
+    UsageError
+        For a name that is neither a state nor an output; the closest one is suggested.
+    """
+    if columns is None:
+        return samples
+    for name in columns:
+        if name not in samples.names:
+            close = difflib.get_close_matches(name, samples.names, 1)
+            hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(samples.names) or 'none'}"
+            raise UsageError(f"no state or output is called {name}", hint=hint)
+    asked = list(dict.fromkeys(columns))
+    states = [samples.states.index(name) for name in asked if name in samples.states]
+    outputs = [samples.outputs.index(name) for name in asked if name not in samples.states]
+    return replace(
+        samples,
+        states=tuple(samples.states[i] for i in states),
+        outputs=tuple(samples.outputs[i] for i in outputs),
+        state_columns=samples.state_columns[:, states],
+        output_columns=samples.output_columns[:, outputs],
+        present=samples.present[:, states],
+    )
+
+
+def write_csv(samples: Samples, file: BinaryIO) -> None:
+    """Write CSV (UTF-8): ``time,mode,j``, states, outputs; numbers such that they read back exactly.
+
+    A cell is empty where the mode lacks the state, or a state that the output needs; a state that is not a number
+    is ``nan``.
+    """
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(samples.labels)
+    number = _writer_of(samples)
+    cells = [_cells(values, present, number) for _, values, present in samples.columns()]
+    writer.writerows(zip(*cells, strict=True))
+    text.flush()
+    text.detach()
+
+
+def _writer_of(samples: Samples) -> Callable[[Any], str]:
+    """Choose how numbers are written; all multiprecision ones are given the digits that the longest needs."""
+    if samples.time.dtype != object:
+        return repr
+    numbers = (x for _, values, _ in samples.columns() if values.dtype == object for x in values)
+    precision = decimals.bits(numbers)
+    return lambda x: decimals.text(x, precision)
+
+
+def _cells(values: Array, present: Array | None, number: Callable[[Any], str]) -> Iterable[str]:
+    listed = values.tolist()
+    if values.dtype.kind in "Ui":
+        return map(str, listed)
+    if present is None or present.all():
+        return map(number, listed)
+    return [number(x) if there else "" for x, there in zip(listed, present.tolist(), strict=True)]
+
+
+def write_parquet(samples: Samples, file: BinaryIO) -> None:
+    """Write Parquet: the CSV's columns, null where it has an empty cell.
+
+    Multiprecision numbers are decimal text, since Parquet has no type that holds them.
+
+    Raises
+    ------
+    UsageError
+        When pyarrow is not installed.
+    """
+    arrow = optional("pyarrow", "a Parquet file")
+    parquet = optional("pyarrow.parquet", "a Parquet file")
+    number = _writer_of(samples)
+    columns: dict[str, Any] = {}
+    for label, values, present in samples.columns():
+        missing = None if present is None else ~present
+        if values.dtype == object:
+            values = np.array([number(x) for x in values], dtype=object)
+        columns[label] = arrow.array(values, mask=missing, from_pandas=False)
+    parquet.write_table(arrow.table(columns), file)
