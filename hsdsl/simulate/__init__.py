@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Execution, Point, Stop, Verdict
@@ -97,14 +98,16 @@ def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
     )
 
 
-def described(settings: Settings) -> dict[str, Number]:
+def described(settings: Settings) -> dict[str, Any]:
     """Return the settings that governed the run, by the names of the model file."""
+    samples = settings.samples if isinstance(settings.samples, int | None) else list(settings.samples)
     size = {"step": settings.step} if settings.tolerance is None else {"tolerance": settings.tolerance}
     return {
         "until": settings.until,
         **size,
         "relaxation": settings.relaxation,
         "max_transitions": settings.max_transitions,
+        **({} if samples is None else {"samples": samples}),
     }
 
 

@@ -13,7 +13,8 @@ class Settings:
     """Settings of one run, resolved and checked.
 
     Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to 1 + |x|) is given.
-    ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time.
+    ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
+    spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     """
 
     scheme: str
@@ -23,7 +24,7 @@ class Settings:
     relaxation: Number
     until: Number
     max_transitions: int
-    sample_times: tuple[Number, ...] | None = None
+    samples: int | tuple[Number, ...] | None = None
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

@@ -1,0 +1,40 @@
+"""Hybrid systems written as mathematics in YAML: checked, simulated, measured.
+
+One pipeline, each stage a module that imports only from below::
+
+    text --source--> nodes --schema--> document --elaborate--> HybridSystem     SymPy, the mathematics
+         --lower--> Program --backends--> Kernel                                numbers, free of SymPy
+         --simulate--> Execution --report, plot, store--> what people see
+
+`hsdsl.model` runs it from end to end; `hsdsl.simulate.relaxed` is the algorithm of Burden, Gonzalez, Vasudevan,
+Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+__all__ = ["Execution", "Model", "ModelError", "UsageError", "__version__", "load"]
+
+if TYPE_CHECKING:
+    from hsdsl.errors import ModelError, UsageError
+    from hsdsl.execution import Execution
+    from hsdsl.model import Model, load
+
+_HOMES = {
+    "Execution": "hsdsl.execution",
+    "Model": "hsdsl.model",
+    "ModelError": "hsdsl.errors",
+    "UsageError": "hsdsl.errors",
+    "load": "hsdsl.model",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import public names on first use: importing one stage must not load the others."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hsdsl' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES[name]), name)

@@ -1,0 +1,5 @@
+"""``python -m hsdsl``."""
+
+from hsdsl.cli import main
+
+main()

@@ -1,0 +1,66 @@
+"""The command line: one short function a verb, no numerics.
+
+Exit codes: 0 done, 1 the model has errors, 2 wrong usage or an unreadable file, 3 the run stopped before its end, 130
+interrupted. Messages and progress go to standard error; with ``--json`` standard output carries one object and nothing
+else.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import click
+import typer
+
+from hsdsl import __version__
+from hsdsl.cli.doctor import doctor
+from hsdsl.cli.run import run
+from hsdsl.cli.schema import schema
+from hsdsl.cli.validate import validate
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="hsdsl",
+    help="Hybrid systems written as mathematics in YAML: checked, simulated, measured.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for verb in (run, validate, schema, doctor):
+    app.command()(verb)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"hsdsl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(  # pyright: ignore[reportUnusedFunction]
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line (the ``hsdsl`` script)."""
+    try:
+        code = app(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        print("interrupted", file=sys.stderr)
+        code = INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads: nothing left to say
+        code = 0
+    sys.exit(code or 0)

@@ -1,0 +1,82 @@
+"""What the verbs share in speaking: errors in both forms, and progress on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import typer
+
+from hsdsl.diagnose import as_json, render
+from hsdsl.errors import ModelError, UsageError
+from hsdsl.report import dumps
+from hsdsl.simulate.recorder import Recorder
+
+MODEL_ERRORS, WRONG_USAGE = 1, 2
+FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
+
+
+def say(text: str) -> None:
+    """Write a message to standard error."""
+    print(text, file=sys.stderr)
+
+
+@contextmanager
+def errors_reported(json: bool) -> Iterator[None]:
+    """Turn the two exceptions of the house into messages and exit codes; never a traceback for bad input."""
+    try:
+        yield
+    except ModelError as error:
+        if json:
+            print(dumps(as_json(error.diagnostics)))
+        else:
+            say("\n\n".join(render(d) for d in error.diagnostics))
+            count = len(error.diagnostics)
+            say(f"\n{count} error{'s' * (count > 1)}")
+        raise typer.Exit(MODEL_ERRORS) from None
+    except UsageError as error:
+        report_usage(error, json)
+        raise typer.Exit(WRONG_USAGE) from None
+
+
+def report_usage(error: UsageError, json: bool) -> None:
+    """Say what is wrong with a request."""
+    if json:
+        empty = {"code": None, "path": None, "line": None, "column": None}
+        print(dumps({"errors": [{**empty, "message": str(error), "hint": error.hint}]}))
+    say(f"hsdsl: {error}" + (f"\n  hint: {error.hint}" if error.hint else ""))
+
+
+@contextmanager
+def progress(until: Callable[[], float | None], quiet: bool) -> Iterator[Callable[[Recorder], None] | None]:
+    """Show how far a run is, on a terminal, once it takes longer than a moment. Yields the run's ``watch``."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    watched: list[Recorder] = []
+    done = threading.Event()
+
+    def show() -> None:
+        wait = FIRST_SIGN
+        while not done.wait(wait):
+            wait, end = INTERVAL, until()
+            if watched and end:
+                _bar(float(watched[0].now) / end, len(watched[0].transitions))
+
+    thread = threading.Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield watched.append
+    finally:
+        done.set()
+        thread.join()
+        sys.stderr.write("\r\x1b[K")
+        sys.stderr.flush()
+
+
+def _bar(share: float, transitions: int, width: int = 30) -> None:
+    full = round(width * min(1.0, share))
+    sys.stderr.write(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")
+    sys.stderr.flush()

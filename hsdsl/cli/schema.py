@@ -1,0 +1,12 @@
+"""``hsdsl schema``: the JSON Schema of model files, for editors."""
+
+from __future__ import annotations
+
+
+def schema() -> None:
+    """Print the JSON Schema of the language (draft 7)."""
+    import json
+
+    from hsdsl.schema import json_schema
+
+    print(json.dumps(json_schema(), indent=2))

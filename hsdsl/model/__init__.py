@@ -1,0 +1,242 @@
+"""A model: a YAML file turned into something that runs. The pipeline in one place."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
+from hsdsl.backends.python import PythonKernel
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.lower import lower
+from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
+from hsdsl.model.values import Values, initial_state, with_parameters
+from hsdsl.model.values import samples as samples_of
+from hsdsl.names import did_you_mean
+from hsdsl.program import Program
+from hsdsl.simulate import Settings, simulate
+from hsdsl.simulate.recorder import Recorder
+from hsdsl.system import HybridSystem
+
+ENGINES = ("auto", "python", "c")
+LEAST_DIGITS, MOST_DIGITS = 16, 10_000
+
+
+def load(path: str | os.PathLike[str]) -> Model:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path
+        A YAML file in the language.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; all of them are carried.
+    UsageError
+        The file cannot be read.
+    """
+    began = time.perf_counter()
+    system = elaborate(path)
+    return Model(system, time.perf_counter() - began)
+
+
+class Model:
+    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs."""
+
+    def __init__(self, system: HybridSystem, load_seconds: float = 0.0) -> None:
+        self.system = system
+        self._seconds = {"load": load_seconds, "compile": 0.0}
+        self._kernels: dict[int | None, PythonKernel] = {}
+
+    def __repr__(self) -> str:
+        modes = ", ".join(mode.name for mode in self.system.modes[:8])
+        return f"<hsdsl model {Path(self.system.path).name}: modes {modes}{', ...' * (len(self.system.modes) > 8)}>"
+
+    @cached_property
+    def program(self) -> Program:
+        """The model lowered to routines, free of SymPy."""
+        began = time.perf_counter()
+        program = lower(self.system)
+        self._seconds["compile"] += time.perf_counter() - began
+        return program
+
+    def simulate(
+        self,
+        until: Any = None,
+        *,
+        scheme: str | None = None,
+        method: str | None = None,
+        step: Any = None,
+        tolerance: Any = None,
+        relaxation: Any = None,
+        samples: Any = None,
+        max_transitions: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        settings: Mapping[str, Any] | None = None,
+        engine: str = "auto",
+        precision: int | None = None,
+        watch: Callable[[Recorder], None] | None = None,
+    ) -> Execution:
+        """Run the model from t = 0.
+
+        Every number may be given as a number or as an expression of the model's parameters, such as ``"40*pi"``.
+
+        Parameters
+        ----------
+        until : number or str, optional
+            End of the run.
+        scheme, method : str, optional
+            ``relaxed``; a name of :data:`hsdsl.integrators.INTEGRATORS`, or ``auto``.
+        step, tolerance : number or str, optional
+            Fixed step, or bound on the local error relative to 1 + |x|; they exclude each other.
+        relaxation : number or str, optional
+            The paper's epsilon: a depth in the model's own units, and a time.
+        samples : int, str or sequence, optional
+            How many equally spaced samples, or their times; what files are written at.
+        max_transitions : int or str, optional
+            Stop rather than make more.
+        parameters, initial : mapping, optional
+            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed anew.
+        settings : mapping, optional
+            Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
+        engine : {"auto", "python"}
+            What runs it.
+        precision : int, optional
+            Decimal digits (mpmath numbers) instead of float64.
+        watch : callable, optional
+            Given the recorder before the run starts.
+
+        Returns
+        -------
+        Execution
+
+        Raises
+        ------
+        UsageError
+            A name, value or combination that cannot be served.
+        """
+        asked = dict(
+            until=until,
+            scheme=scheme,
+            method=method,
+            step=step,
+            tolerance=tolerance,
+            relaxation=relaxation,
+            samples=samples,
+            max_transitions=max_transitions,
+        )
+        request = self.resolve(settings, asked)
+        _check_engine(engine)
+        values = with_parameters(self._values(_arithmetic(precision)), parameters or {})
+        chosen = self._settings(request, values)
+        mode, states, x = initial_state(values, initial or {})
+        try:
+            execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        return replace(execution, title=self.system.title, seconds={**self._seconds, **execution.seconds})
+
+    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
+        """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.requests`)."""
+        experiment = self.system.experiment
+        in_file = {key: getattr(experiment, key) for key in KEYS}
+        return resolve((Source(FILE, in_file), Source("--set", settings or {}), Source("the call", asked or {})))
+
+    def _values(self, arithmetic: Arithmetic) -> Values:
+        program = self.program
+        if arithmetic.digits not in self._kernels:
+            began = time.perf_counter()
+            self._kernels[arithmetic.digits] = PythonKernel(program, arithmetic)
+            self._seconds["compile"] += time.perf_counter() - began
+        return Values(self.system, program, self._kernels[arithmetic.digits])
+
+    def _settings(self, request: Request, values: Values) -> Settings:
+        def number(key: str) -> Number:
+            asked = request.values[key]
+            if asked.place == FILE:
+                return values.constant(key)[0]
+            return values.number(asked.value, key)
+
+        def positive(key: str) -> Number:
+            value = number(key)
+            if not value > 0:
+                raise UsageError(f"{key} must be positive, not {value}")
+            return value
+
+        until = number("until")
+        if until < 0:
+            raise UsageError(f"until must not be negative, not {until}")
+        most = number("max_transitions")
+        if most < 0 or most != int(most):
+            raise UsageError(f"max_transitions must be a whole number, not {most}")
+        return Settings(
+            scheme=request.scheme,
+            method=request.method,
+            step=positive("step") if request.size == "step" else None,
+            tolerance=positive("tolerance") if request.size == "tolerance" else None,
+            relaxation=positive("relaxation"),
+            until=until,
+            max_transitions=int(most),
+            samples=self._samples(request, values),
+        )
+
+    def _samples(self, request: Request, values: Values) -> int | tuple[Number, ...] | None:
+        asked = request.values.get("samples")
+        if asked is None:
+            return None
+        if asked.place != FILE:
+            return samples_of(values, asked.value)
+        if values.has("sample_times"):
+            return values.constant("sample_times")
+        return samples_of(values, values.constant("sample_count")[0])
+
+
+def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+    """Sort ``NAME=VALUE`` texts into parameters, initial values and settings; of a repeated name the last counts.
+
+    Raises
+    ------
+    UsageError
+        A text is not of that form.
+    """
+    parameters, initial, settings = sorted_into = ({}, {}, {})  # type: tuple[dict[str, str], dict[str, str], dict[str, str]]
+    for pair in pairs:
+        name, equals, value = (part.strip() for part in pair.partition("="))
+        if not (name and equals and value):
+            raise UsageError(f"--set wants NAME=VALUE, not '{pair}'", "for example --set c=0.8 or --set initial.v=20")
+        group, dot, rest = name.partition(".")
+        if not dot:
+            parameters[name] = value
+        elif group == "initial":
+            initial[rest] = value
+        elif group == "experiment":
+            settings[rest] = value
+        else:
+            hint = did_you_mean(group, ("initial", "experiment"))
+            raise UsageError(f"--set reaches NAME, initial.NAME and experiment.NAME, not '{name}'", hint)
+    return sorted_into
+
+
+def _arithmetic(precision: int | None) -> Arithmetic:
+    if precision is None:
+        return FLOAT64
+    if not LEAST_DIGITS <= precision <= MOST_DIGITS:
+        raise UsageError(f"precision is {LEAST_DIGITS} to {MOST_DIGITS} decimal digits, not {precision}")
+    return multiprecision(precision)
+
+
+def _check_engine(engine: str) -> None:
+    if engine not in ENGINES:
+        raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
+    if engine == "c":
+        raise UsageError("there is no compiled engine yet", "use engine 'python', or 'auto'")

@@ -1,0 +1,110 @@
+"""What a run is asked, from four places: the file, `--set`, and options or a call; the later place wins.
+
+``step`` and ``tolerance`` exclude each other: the one given later removes the other. A method that the file names and
+that cannot serve what a later place asks gives way to the default; asked for explicitly, it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from hsdsl.errors import UsageError
+from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
+from hsdsl.names import did_you_mean
+from hsdsl.simulate import SCHEMES
+
+KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
+SCHEMES_TO_COME = ("located",)
+FILE = "the file"
+DEFAULTS: dict[str, Any] = {"scheme": "relaxed", "method": "auto", "relaxation": Fraction("1e-6"), "max_transitions": 10**6}
+DEFAULT_TOLERANCE = Fraction("1e-9")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A value and the place that gave it."""
+
+    value: Any
+    place: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """One place and what it gives, by the names of :data:`KEYS`; None counts as not given."""
+
+    place: str
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the places agree on: ``size`` is ``step`` or ``tolerance``, and ``values`` holds it with the rest."""
+
+    scheme: str
+    method: ButcherTableau
+    size: str
+    values: dict[str, Asked]
+
+
+def resolve(sources: Sequence[Source]) -> Request:
+    """Resolve what the places ask, lowest first.
+
+    Raises
+    ------
+    UsageError
+        Step and tolerance in one place, an unknown name, or a method that cannot serve.
+    """
+    values = {key: Asked(value, "default") for key, value in DEFAULTS.items()}
+    for source in sources:
+        given = {key: value for key, value in source.values.items() if value is not None}
+        for key in given:
+            if key not in KEYS:
+                raise UsageError(f"{source.place}: the experiment has no setting '{key}'", did_you_mean(key, KEYS))
+        if "step" in given and "tolerance" in given:
+            raise UsageError(
+                f"{source.place} gives both step and tolerance, which exclude each other",
+                "keep step for a fixed step size, tolerance for an adaptive one",
+            )
+        for size, other in (("step", "tolerance"), ("tolerance", "step")):
+            if size in given:
+                values.pop(other, None)
+        values |= {key: Asked(value, source.place) for key, value in given.items()}
+    if "step" not in values:
+        values.setdefault("tolerance", Asked(DEFAULT_TOLERANCE, "default"))
+    size = "step" if "step" in values else "tolerance"
+    return Request(_scheme(values["scheme"]), _method(values["method"], values[size], size), size, values)
+
+
+def _scheme(asked: Asked) -> str:
+    if asked.value in SCHEMES:
+        return asked.value
+    if asked.value in SCHEMES_TO_COME:
+        raise UsageError(
+            f"scheme '{asked.value}' ({asked.place}) is part of the language but not built yet; it is not imitated",
+            "use scheme 'relaxed'",
+        )
+    raise UsageError(
+        f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES])
+    )
+
+
+def _method(asked: Asked, size_asked: Asked, size: str) -> ButcherTableau:
+    if asked.value == "auto":
+        return INTEGRATORS[AUTO]
+    if asked.value not in INTEGRATORS:
+        raise UsageError(
+            f"there is no method '{asked.value}' ({asked.place})",
+            did_you_mean(str(asked.value), ["auto", *INTEGRATORS]),
+        )
+    table = INTEGRATORS[asked.value]
+    if size == "step" or table.adaptive:
+        return table
+    if asked.place == FILE and size_asked.place not in (FILE, "default"):
+        return INTEGRATORS[AUTO]
+    raise UsageError(
+        f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",
+        "give a step, or use method 'auto'",
+    )

@@ -1,0 +1,147 @@
+"""Overrides: values a call or `--set` gives, as numbers or as expressions of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.backends.python import PythonKernel, compile_routines
+from hsdsl.elaborate import parameter_expression
+from hsdsl.errors import UsageError
+from hsdsl.lower import lower_expressions
+from hsdsl.names import did_you_mean
+from hsdsl.program import Program
+from hsdsl.simulate.run import show
+from hsdsl.system import HybridSystem
+
+
+@dataclass(frozen=True)
+class Values:
+    """A model's numbers for one run: its kernel, and parameter values with overrides applied."""
+
+    system: HybridSystem
+    program: Program
+    kernel: PythonKernel
+    parameters: tuple[Number, ...] = ()
+
+    def number(self, value: Any, where: str) -> Number:
+        """Turn a number or an expression of parameters into a finite number.
+
+        Raises
+        ------
+        UsageError
+            It is neither, or has no finite value.
+        """
+        arithmetic = self.kernel.arithmetic
+        try:
+            number = self._evaluate(value, where)
+        except DOMAIN_ERRORS:
+            number = arithmetic.functions["nan"]
+        if not arithmetic.isfinite(number):
+            raise UsageError(f"{where}: {value} has no finite value")
+        return number
+
+    def _evaluate(self, value: Any, where: str) -> Number:
+        arithmetic = self.kernel.arithmetic
+        if isinstance(value, str):
+            known = self.program.parameters[: len(self.parameters)]
+            expression = parameter_expression(self.system, value, where, allowed=known)
+            routine = compile_routines(
+                lower_expressions(self.system, {"value": expression}), arithmetic, where
+            )()[0]
+            missing = len(self.program.parameters) - len(self.parameters)
+            return routine(*self.parameters, *(arithmetic.zero,) * missing)[0]
+        if isinstance(value, bool) or value is None:
+            raise UsageError(f"{where}: a number or an expression is wanted, not {value}")
+        if hasattr(value, "_mpf_"):
+            return arithmetic.zero + value if arithmetic.name == "mpmath" else float(value)
+        try:
+            return arithmetic.constant(Fraction(value))
+        except (TypeError, ValueError, OverflowError):
+            raise UsageError(f"{where}: a finite number or an expression is wanted, not {value!r}") from None
+
+    def constant(self, name: str) -> tuple[Number, ...]:
+        """Evaluate one of the program's constants; its numbers must be finite."""
+        values = self.kernel.constant(name, self.parameters)
+        if not all(map(self.kernel.arithmetic.isfinite, values)):
+            raise UsageError(f"{name} has no finite value with these parameters")
+        return values
+
+    def has(self, name: str) -> bool:
+        """Whether the file gives this constant."""
+        return name in self.program.constants.names
+
+
+def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
+    """Evaluate the parameters in file order, derived ones anew, and check the bounds the file gives them."""
+    program = values.program
+    for name in overrides:
+        if name not in program.parameters:
+            raise UsageError(f"the model has no parameter '{name}'", did_you_mean(name, program.parameters))
+    for i, name in enumerate(program.parameters):
+        if name in overrides:
+            value = values.number(overrides[name], f"parameter {name}")
+        else:
+            try:
+                value = values.constant(f"parameter_{i}")[0]
+            except DOMAIN_ERRORS:
+                raise UsageError(f"parameter {name} has no finite value with these parameters") from None
+        values = Values(values.system, program, values.kernel, (*values.parameters, value))
+    _check_bounds(values)
+    return values
+
+
+def _check_bounds(values: Values) -> None:
+    for i, (name, value) in enumerate(zip(values.program.parameters, values.parameters, strict=True)):
+        for kind, sign in (("minimum", 1), ("maximum", -1)):
+            if values.has(f"{kind}_{i}"):
+                bound = values.constant(f"{kind}_{i}")[0]
+                if sign * (value - bound) < 0:
+                    raise UsageError(f"parameter {name} = {show(value)} is beyond its {kind} {show(bound)}")
+
+
+def initial_state(
+    values: Values, overrides: Mapping[str, Any]
+) -> tuple[int, tuple[str, ...], tuple[Number, ...]]:
+    """Return the initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
+    program = values.program
+    names = [mode.name for mode in program.modes]
+    wanted = overrides.get("mode")
+    if wanted is not None and wanted not in names:
+        raise UsageError(f"the model has no mode '{wanted}'", did_you_mean(str(wanted), names))
+    index = program.initial_mode if wanted is None else names.index(wanted)
+    mode = program.modes[index]
+    given = dict(zip(program.initial_states, values.constant("initial"), strict=True))
+    free = mode.final and not mode.states
+    states = mode.states if not free else tuple(given)
+    for name in overrides:
+        if name != "mode" and name not in states:
+            raise UsageError(f"mode {mode.name} has no state '{name}'", did_you_mean(name, states))
+    for name, value in overrides.items():
+        if name != "mode":
+            given[name] = values.number(value, f"initial.{name}")
+    if missing := [name for name in states if name not in given]:
+        raise UsageError(
+            f"mode {mode.name} starts with {', '.join(states)}, but no value is given for {', '.join(missing)}",
+            f"--set initial.{missing[0]}=VALUE",
+        )
+    return index, states, tuple(given[name] for name in states)
+
+
+def samples(values: Values, asked: Any) -> int | tuple[Number, ...]:
+    """Return the times a run is sampled at, or how many equally spaced ones.
+
+    Raises
+    ------
+    UsageError
+        Neither a list of times nor a whole number of at least 2.
+    """
+    if isinstance(asked, Sequence) and not isinstance(asked, str):
+        return tuple(values.number(t, "samples") for t in asked)  # pyright: ignore[reportUnknownVariableType]
+    count = values.number(asked, "samples")
+    if count != int(count) or count < 2:
+        raise UsageError(f"samples must be a list of times or a whole number of at least 2, not {show(count)}")
+    return int(count)
