@@ -60,5 +60,97 @@ class UsageError(Exception):
         self.hint = hint
 
 
+@dataclass
+class Findings:
+    """The diagnostics of one reading, gathered so that all are reported and not the first alone."""
+
+    diagnostics: list[Diagnostic] = field(default_factory=list[Diagnostic])
+
+    def add(self, diagnostic: Diagnostic) -> None:
+        """Keep a diagnostic, once."""
+        if diagnostic not in self.diagnostics:
+            self.diagnostics.append(diagnostic)
+
+    def raise_if_any(self) -> None:
+        """Raise everything found so far, in source order.
+
+        Raises
+        ------
+        ModelError
+            When there is at least one diagnostic.
+        """
+        if self.diagnostics:
+            raise ModelError(sorted(self.diagnostics, key=_source_order))
+
+
+def _source_order(diagnostic: Diagnostic) -> tuple[int, int]:
+    span = diagnostic.span
+    return (span.line, span.column) if span else (0, 0)
+
+
 # One line a code: what the code is about. The codes are stable; a retired one is never used again.
-CODES: dict[str, str] = {}
+CODES: dict[str, str] = {
+    # the file and its YAML
+    "HS001": "the file is not UTF-8 text",
+    "HS002": "a character that does not belong in a model",
+    "HS003": "the file is too large, too deeply nested or too much repeated",
+    "HS004": "the file is not valid YAML",
+    "HS005": "a tab where YAML wants spaces",
+    "HS006": "the indentation fits no line above",
+    "HS007": "YAML reads this expression as something else: it needs quotes",
+    "HS008": "the same key twice in one mapping",
+    "HS009": "a tag, which models do not use",
+    "HS010": "more than one document in the file",
+    "HS011": "the file is empty",
+    "HS012": "an alias without its anchor, or inside it",
+    "HS013": "a key that is not a plain word",
+    # expressions
+    "HS101": "a character that expressions do not have",
+    "HS102": "an expression that ends or goes on where it should not",
+    "HS103": "parentheses that do not match",
+    "HS104": "an operator is missing between two operands",
+    "HS105": "a number that cannot be read",
+    "HS106": "`^` where `**` is meant",
+    "HS107": "an equality where an inequality is wanted",
+    "HS108": "a logical operator of another language",
+    "HS109": "a construct of another language",
+    "HS110": "an expression that is too long or too deeply nested",
+    "HS111": "a name that nothing defines",
+    "HS112": "a function that does not exist, or a function without its parentheses",
+    "HS113": "a function with the wrong number of arguments",
+    "HS114": "a condition where a number is wanted",
+    "HS115": "a number where a condition is wanted",
+    "HS116": "not exactly one inequality",
+    "HS117": "a name that cannot be used here",
+    "HS118": "a constant without a finite real value",
+    "HS119": "a numeric exponent above 1,000",
+    "HS120": "an expression that grows too large once names are replaced",
+    "HS121": "no expression where one is wanted",
+    # the shape of the document
+    "HS201": "a key that does not exist here",
+    "HS202": "a key that is missing",
+    "HS203": "a mapping, a list or a single value where another is wanted",
+    "HS204": "a value that is not one of those possible",
+    "HS205": "a name that cannot be a name",
+    "HS206": "a version of the language that is not known",
+    # the meaning
+    "HS301": "two things with one name",
+    "HS302": "a definition that uses itself or a later one",
+    "HS303": "a mode that does not exist",
+    "HS304": "a mode without a flow",
+    "HS305": "a transition that leaves a state of its target without a value",
+    "HS306": "a reset of a state that the target does not have",
+    "HS307": "two transitions of one mode with one name",
+    "HS308": "initial values that are not those of the initial mode's states",
+    "HS309": "a parameter outside its own bounds",
+    "HS310": "samples that do not make an input",
+    "HS311": "a data file that cannot be read",
+    "HS312": "a data file with wrong content",
+    "HS313": "a unit for something that does not exist",
+    "HS314": "a reference to something that does not exist",
+    "HS315": "a transition or a domain in a mode that has no states",
+    "HS320": "both a step and a tolerance",
+    "HS321": "a setting outside its range",
+}
+
+STEP_AND_TOLERANCE = "HS320"  # wrong usage rather than a wrong model: the command line exits with 2

@@ -1,0 +1,6 @@
+"""Expressions: text to a small tree, and the tree to SymPy by whitelist. Nothing is ever evaluated as a program."""
+
+from hsdsl.expression.parse import parse
+from hsdsl.expression.syntax import ExpressionError, Wanted
+
+__all__ = ["ExpressionError", "Wanted", "parse"]

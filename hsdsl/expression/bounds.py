@@ -1,0 +1,59 @@
+# pyright: basic
+"""What SymPy must not be asked to compute: exact numbers of millions of digits, and expressions without end.
+
+SymPy folds numbers wherever they meet, also inside symbolic powers, so every operation is measured before it is done.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+LARGEST_EXPONENT = 1000
+MOST_BITS = 6_000  # of one exact number: the product of two must still print as a decimal (4,300 digits)
+MOST_NODES = 100_000
+MOST_LEVELS = 600
+
+
+def bits(expr: Any) -> int:
+    """How long the exact numbers are that stand as factors of an expression."""
+    if expr.is_Rational:
+        return max(int(expr.p).bit_length(), int(expr.q).bit_length())
+    if expr.is_Mul:
+        return sum(bits(factor) for factor in expr.args if factor.is_Rational or factor.is_Pow)
+    if expr.is_Pow and expr.args[0].is_Rational:
+        return bits(expr.args[0]) * _constant_part(expr.args[1])
+    return 0
+
+
+def _constant_part(exponent: Any) -> int:
+    constant = exponent if exponent.is_Rational else exponent.as_coeff_Add()[0]
+    return int(abs(constant)) + 1 if constant.is_Rational else 1
+
+
+def sum_bits(terms: list[Any]) -> int:
+    """How long the common denominator of a sum can get."""
+    coefficients = [part.as_coeff_Mul()[0] for term in terms for part in sp.Add.make_args(term)]
+    denominators = {int(c.q) for c in coefficients if c.is_Rational}
+    return sum(q.bit_length() for q in denominators if q > 1)
+
+
+def power_bits(base: Any, exponent: Any) -> int:
+    """How long the number is that ``base**exponent`` contains."""
+    return bits(base) * _constant_part(exponent)
+
+
+def large_exponent(exponent: Any) -> bool:
+    """Whether a numeric exponent is above the cap, also one hidden in a logarithm: ``exp(10**9*log(3))``."""
+    if exponent.is_Rational:
+        return abs(exponent) > LARGEST_EXPONENT
+    return any(_large_logarithm(term) for term in sp.Add.make_args(exponent))
+
+
+def _large_logarithm(term: Any) -> bool:
+    coefficient, rest = term.as_coeff_Mul()
+    logarithms = [f for f in sp.Mul.make_args(rest) if isinstance(f, sp.log)]
+    if not logarithms:
+        return False
+    return abs(coefficient) * max([1, *(bits(f.args[0]) // 64 for f in logarithms)]) > LARGEST_EXPONENT

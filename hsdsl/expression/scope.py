@@ -1,0 +1,171 @@
+# pyright: basic
+"""What names mean where an expression stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.expression.syntax import Call, ExpressionError, Name, Tree, walk
+from hsdsl.functions import CONSTANTS, FUNCTIONS
+from hsdsl.names import WORDS, closest, did_you_mean, shown
+
+RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
+_SPELLED = {
+    "e": "write exp(1) for Euler's number",
+    "π": "write pi",
+    "PI": "write pi",
+    "Pi": "write pi",
+    "inf": "every number is finite here",
+    "nan": "every number is finite here",
+    "arcsin": "write asin",
+    "arccos": "write acos",
+    "arctan": "write atan",
+    "arctan2": "write atan2",
+    "ln": "write log",
+    "log10": "write log(x)/log(10)",
+    "log2": "write log(x)/log(2)",
+    "fabs": "write abs",
+    "sgn": "write sign",
+    "pow": "write x**y",
+    "ceil": "write -floor(-x)",
+    "cbrt": "write x**(1/3), for x that is not negative",
+    "der": "a derivative is what `flow` gives a state",
+}
+
+
+@dataclass(frozen=True)
+class Value:
+    """What an expression stands for.
+
+    Attributes
+    ----------
+    expr : sympy.Expr
+        The expression in states, inputs, parameters and time.
+    number : mpmath number or None
+        Its value with the file's own parameters where no state, input or time is in it; NaN where it has none.
+    constant : bool
+        Whether not even a parameter is in it.
+    uses : frozenset of str
+        The states it was written with.
+    size, depth : int
+        Its nodes and height, written out in full.
+    """
+
+    expr: Any
+    number: Any = None
+    constant: bool = False
+    uses: frozenset[str] = frozenset()
+    size: int = 1
+    depth: int = 1
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A name that exists and cannot be used here."""
+
+    code: str
+    message: str
+    hint: str | None = None
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The names that can be used in an expression.
+
+    Attributes
+    ----------
+    values : mapping
+        What each name stands for: a value, a refusal, or None where its own definition is broken.
+    states : collection of str or None
+        The states of the mode the expression belongs to; None where every state may be used.
+    place : str
+        Where that is, for a sentence: "mode 'free'".
+    """
+
+    values: Mapping[str, Value | Refusal | None]
+    states: frozenset[str] | None = None
+    place: str = "here"
+
+    def faults(self, tree: Tree) -> list[ExpressionError]:
+        """Every name of an expression that cannot be used, and every function that cannot be called so."""
+        found: list[ExpressionError] = []
+        for node in walk(tree):
+            fault = None
+            if isinstance(node, Name):
+                fault = self._name(node)
+            elif isinstance(node, Call):
+                fault = self._call(node)
+            if fault and fault.message not in [other.message for other in found]:
+                found.append(fault)
+        return found
+
+    def broken(self, tree: Tree) -> bool:
+        """Whether a name in it has a definition that is reported already."""
+        missing = object()
+        return any(isinstance(n, Name) and self.values.get(n.name, missing) is None for n in walk(tree))
+
+    def _name(self, node: Name) -> ExpressionError | None:
+        if node.name in CONSTANTS:
+            return None
+        if node.name in FUNCTIONS:
+            message = f"`{node.name}` is a function and needs its arguments"
+            return ExpressionError("HS112", message, node.start, node.end, f"write {node.name}(...)")
+        if node.name not in self.values:
+            message = f"nothing here is called '{shown(node.name)}'"
+            return ExpressionError("HS111", message, node.start, node.end, self._hint(node.name))
+        value = self.values[node.name]
+        if isinstance(value, Refusal):
+            return ExpressionError(value.code, value.message, node.start, node.end, value.hint)
+        if value is None or self.states is None or value.uses <= self.states:
+            return None
+        lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
+        message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
+        if value.uses == {node.name}:
+            message = f"{self.place} has no state '{node.name}'"
+        return ExpressionError("HS117", message, node.start, node.end)
+
+    def _call(self, node: Call) -> ExpressionError | None:
+        if node.function not in FUNCTIONS:
+            end = node.start + len(node.function)
+            if node.function in self.values or node.function in CONSTANTS:
+                message, hint = f"'{shown(node.function)}' is not a function", f"write {node.function}*(...)"
+            else:
+                message = f"there is no function '{shown(node.function)}'"
+                hint = _SPELLED.get(node.function) or _nearest(node.function) or "functions: " + " ".join(FUNCTIONS)
+            return ExpressionError("HS112", message, node.start, end, hint)
+        _, fewest, most = FUNCTIONS[node.function]
+        given = len(node.arguments)
+        if given >= fewest and (most is None or given <= most):
+            return None
+        wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
+        noun = "argument" if fewest == 1 else "arguments"
+        message = f"`{node.function}` takes {wanted} {noun}, not {given}"
+        return ExpressionError("HS113", message, node.start, node.end)
+
+    def _hint(self, name: str) -> str | None:
+        if name in _SPELLED:
+            return _SPELLED[name]
+        known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
+        return did_you_mean(name, [*known, *CONSTANTS])
+
+    def _reachable(self, value: Value) -> bool:
+        return self.states is None or value.uses <= self.states
+
+
+def _nearest(name: str) -> str | None:
+    best = closest(name, FUNCTIONS)
+    return f"did you mean '{best}'?" if best else None
+
+
+def symbol(name: str) -> sp.Symbol:
+    """The symbol of a state, parameter or sampled input: real, and never a thing of SymPy's own."""
+    return sp.Symbol(name, real=True)
+
+
+def state(name: str) -> Value:
+    """A state's value."""
+    return Value(symbol(name), uses=frozenset((name,)))

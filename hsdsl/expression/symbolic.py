@@ -1,0 +1,271 @@
+# pyright: basic
+"""Trees to SymPy, by whitelist. Names are looked up in a scope: nothing is substituted afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from hsdsl import functions
+from hsdsl.expression import bounds, numeric
+from hsdsl.expression.scope import Scope, Value
+from hsdsl.expression.syntax import (
+    CONDITIONS,
+    Call,
+    Comparison,
+    ExpressionError,
+    Logic,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Power,
+    Product,
+    Sum,
+    Tree,
+    Truth,
+)
+from hsdsl.functions import CONSTANTS, FUNCTIONS
+from hsdsl.names import shown
+
+_RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
+_NOT_REAL = frozenset((sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I))
+# SymPy's own kinked functions, which it makes by itself, against those the rest of the house knows
+_KINKED = {
+    sp.Abs: functions.absolute,
+    sp.sign: functions.sign,
+    sp.floor: functions.floor,
+    sp.Heaviside: lambda x, *_: (1 + functions.sign(x)) / 2,
+}
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """``left operator right``."""
+
+    left: Value
+    operator: str
+    right: Value
+
+
+def number(tree: Tree, scope: Scope, text: str) -> Value:
+    """The value of an expression whose names the scope has.
+
+    Raises
+    ------
+    ExpressionError
+        Where a condition stands for a number, a constant has no finite real value, or the expression is too large.
+    """
+    return _Builder(scope, text).number(tree)
+
+
+def condition(tree: Tree, scope: Scope, text: str) -> Any:
+    """The SymPy Boolean of a condition whose names the scope has.
+
+    Raises
+    ------
+    ExpressionError
+        As :func:`number`, and where a number stands for a condition.
+    """
+    return _Builder(scope, text).condition(tree)
+
+
+def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
+    """The two sides of the one inequality that ``when`` and ``domain`` take.
+
+    Raises
+    ------
+    ExpressionError
+        As :func:`number`, and where there is no inequality or more than one.
+    """
+    refuse_all_but_one_inequality(tree, key)
+    assert isinstance(tree, Comparison)
+    builder = _Builder(scope, text)
+    left, right = map(builder.number, tree.operands)
+    return Inequality(left, tree.operators[0], right)
+
+
+def refuse_all_but_one_inequality(tree: Tree, key: str) -> None:
+    """Raise where a tree is not exactly one inequality."""
+    more = "put the rest under `if`" if key == "when" else "write each inequality as an item of its own"
+    if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operators) > 1):
+        raise ExpressionError("HS116", f"`{key}` takes one inequality", tree.start, tree.end, more)
+    if not isinstance(tree, Comparison):
+        message = f"`{key}` takes an inequality, and this is not one"
+        raise ExpressionError("HS116", message, tree.start, tree.end, "write it as left >= right")
+    if tree.operators[0] in ("==", "!="):
+        message = f"`{key}` takes an inequality, not `{tree.operators[0]}`"
+        hint = "write `>=` or `<=`, with the side on which the mode ends" if key == "when" else "write `>=` or `<=`"
+        raise ExpressionError("HS107", message, tree.start, tree.end, hint)
+
+
+class _Builder:
+    """One expression in one scope."""
+
+    def __init__(self, scope: Scope, text: str) -> None:
+        self.scope = scope
+        self.text = text
+
+    def number(self, tree: Tree) -> Value:
+        """The value of a node that must be a number."""
+        if isinstance(tree, CONDITIONS):
+            message = f"`{self.said(tree)}` is a condition where a number is wanted"
+            raise ExpressionError("HS114", message, tree.start, tree.end, "conditions stand under `if`")
+        match tree:
+            case Number():
+                expr = sp.Rational(tree.value.numerator, tree.value.denominator)
+                return Value(expr, numeric.of_rational(expr), True)
+            case Name():
+                return self.name(tree)
+            case Negative():
+                inner = self.number(tree.operand)
+                return self.value(tree, -inner.expr, numeric.product([inner.number, -1]), [inner])
+            case Sum():
+                return self.sum(tree)
+            case Product():
+                return self.product(tree)
+            case Power():
+                return self.power(tree)
+            case Call():
+                return self.call(tree)
+        raise AssertionError(tree)
+
+    def name(self, tree: Name) -> Value:
+        """A constant, or what the scope has."""
+        if tree.name in CONSTANTS:
+            return Value(CONSTANTS[tree.name], numeric.PI, True)
+        found = self.scope.values[tree.name]
+        assert isinstance(found, Value)
+        return found
+
+    def sum(self, tree: Sum) -> Value:
+        """Terms added; the common denominator is measured first."""
+        values = [self.number(term) for _, term in tree.terms]
+        terms = [-v.expr if minus else v.expr for v, (minus, _) in zip(values, tree.terms, strict=True)]
+        if bounds.sum_bits(terms) > bounds.MOST_BITS:
+            raise self.too_long(tree)
+        numbers = [v.number if v.number is None or not minus else -v.number
+                   for v, (minus, _) in zip(values, tree.terms, strict=True)]
+        return self.value(tree, sp.Add(*terms), numeric.total(numbers), values)
+
+    def product(self, tree: Product) -> Value:
+        """Factors multiplied; the length of their exact numbers is measured first."""
+        values = [self.number(factor) for _, factor in tree.factors]
+        if sum(bounds.bits(v.expr) for v in values) > bounds.MOST_BITS:
+            raise self.too_long(tree)
+        for value, (divided, factor) in zip(values, tree.factors, strict=True):
+            if divided and value.expr.is_zero and value.expr.is_number:
+                message = f"`{self.said(factor)}` is 0, and nothing can be divided by it"
+                raise ExpressionError("HS118", message, factor.start, factor.end)
+        divided = [d for d, _ in tree.factors]
+        factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
+        numbers = [numeric.inverse(v.number) if d else v.number for v, d in zip(values, divided, strict=True)]
+        return self.value(tree, sp.Mul(*factors), numeric.product(numbers), values)
+
+    def power(self, tree: Power) -> Value:
+        """A power; what it would make SymPy compute is measured first."""
+        base, exponent = self.number(tree.base), self.number(tree.exponent)
+        if bounds.large_exponent(exponent.expr):
+            message = f"the exponent `{self.said(tree.exponent)}` is above {bounds.LARGEST_EXPONENT:,} in magnitude"
+            raise ExpressionError("HS119", message, tree.exponent.start, tree.exponent.end)
+        number = numeric.power(base.number, exponent.number)
+        if base.constant and exponent.constant:
+            self.refuse_unless_finite(tree, number)
+        if bounds.power_bits(base.expr, exponent.expr) > bounds.MOST_BITS:
+            raise self.too_long(tree)
+        return self.value(tree, sp.Pow(base.expr, exponent.expr), number, [base, exponent])
+
+    def call(self, tree: Call) -> Value:
+        """A function of the language. min and max of many are taken pair by pair."""
+        values = [self.number(argument) for argument in tree.arguments]
+        number = numeric.apply(tree.function, [v.number for v in values])
+        if all(v.constant for v in values):
+            self.refuse_unless_finite(tree, number)
+        exprs = [v.expr for v in values]
+        if tree.function == "exp" and bounds.large_exponent(exprs[0]):
+            message = f"`{self.said(tree)}` is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
+            raise ExpressionError("HS119", message, tree.start, tree.end)
+        function: Any = FUNCTIONS[tree.function][0]
+        if tree.function in ("min", "max"):
+            expr = exprs[0]
+            for other in exprs[1:]:
+                expr = function(expr, other)
+        else:
+            expr = function(*exprs)
+        return self.value(tree, expr, number, values)
+
+    def value(self, tree: Tree, expr: Any, number: Any, parts: list[Value]) -> Value:
+        """A value made of parts, checked."""
+        constant = all(part.constant for part in parts)
+        expr = _with_our_kinks(expr)
+        if _not_real(expr):
+            raise self.not_finite(tree)
+        if bounds.bits(expr) > bounds.MOST_BITS:
+            raise self.too_long(tree)
+        if expr.is_Rational:
+            number = numeric.of_rational(expr)
+        if constant:
+            self.refuse_unless_finite(tree, number)
+        uses = frozenset().union(*(part.uses for part in parts))
+        size, depth = 1 + sum(p.size for p in parts), 1 + max(p.depth for p in parts)
+        if size > bounds.MOST_NODES or depth > bounds.MOST_LEVELS:
+            message = "the expression grows too large once the names of `let` and inputs are written out"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+        return Value(expr, number, constant, uses, size, depth)
+
+    def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
+        """Raise where a constant has no finite real value."""
+        if number is not None and not numeric.finite(number):
+            raise self.not_finite(tree)
+
+    def not_finite(self, tree: Tree) -> ExpressionError:
+        """The error for something like 1/0 or sqrt(-1)."""
+        message = f"`{self.said(tree)}` has no finite real value"
+        return ExpressionError("HS118", message, tree.start, tree.end)
+
+    def too_long(self, tree: Tree) -> ExpressionError:
+        """The error for an exact number that would fill the memory."""
+        message = f"`{self.said(tree)}` contains an exact number of more than {bounds.MOST_BITS:,} bits"
+        return ExpressionError("HS120", message, tree.start, tree.end, "write it as a decimal")
+
+    def condition(self, tree: Tree) -> Any:
+        """The Boolean of a node that must be a condition."""
+        match tree:
+            case Truth():
+                return sp.true if tree.value else sp.false
+            case Not():
+                return sp.Not(self.condition(tree.operand))
+            case Logic():
+                parts = [self.condition(operand) for operand in tree.operands]
+                return sp.And(*parts) if tree.operator == "and" else sp.Or(*parts)
+            case Comparison():
+                values = [self.number(operand).expr for operand in tree.operands]
+                pairs = zip(tree.operators, values, values[1:], strict=False)
+                return sp.And(*(_RELATIONS[operator](a, b, evaluate=False) for operator, a, b in pairs))
+        message = f"`{self.said(tree)}` is a number where a condition is wanted"
+        hint = "compare it with something: `> 0`"
+        raise ExpressionError("HS115", message, tree.start, tree.end, hint)
+
+    def said(self, tree: Tree) -> str:
+        """The text of a node, cut to what a sentence carries."""
+        return shown(self.text[tree.start : tree.end], 40)
+
+
+def _not_real(expr: Any) -> bool:
+    """Whether SymPy has found infinity, or that there is no real value."""
+    parts = expr.args if expr.is_Mul or expr.is_Add else (expr,)
+    return any(p in _NOT_REAL or (p.is_Pow and _root_of_negative(*p.args)) for p in (expr, *parts))
+
+
+def _root_of_negative(base: Any, exponent: Any) -> bool:
+    return bool(base.is_Rational and base < 0 and exponent.is_Rational and not exponent.is_Integer)
+
+
+def _with_our_kinks(expr: Any) -> Any:
+    if expr.is_Atom or expr.is_Add or not expr.has(*_KINKED):
+        return expr
+    for theirs, ours in _KINKED.items():
+        expr = expr.replace(theirs, ours)
+    return expr

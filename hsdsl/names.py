@@ -1,0 +1,49 @@
+"""Names: which are legal, which are taken by the language, and which one was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+import unicodedata
+from collections.abc import Iterable
+
+WORDS = ("and", "or", "not", "true", "false")
+_LONGEST_TO_COMPARE = 60
+
+
+def normalised(name: str) -> str:
+    """The one spelling of a name that Unicode can write in several ways (NFC)."""
+    return name if name.isascii() else unicodedata.normalize("NFC", name)
+
+
+def is_identifier(name: str) -> bool:
+    """Whether a text has the form of a name: letters, digits and underscores, no digit first."""
+    return normalised(name).isidentifier()
+
+
+def closest(name: str, candidates: Iterable[str]) -> str | None:
+    """The candidate that looks most like a name, None where none looks like it."""
+    if len(name) > _LONGEST_TO_COMPARE:
+        return None
+    names = [c for c in dict.fromkeys(candidates) if len(c) <= _LONGEST_TO_COMPARE]
+    for candidate in names:
+        if candidate.lower() == name.lower() and candidate != name:
+            return candidate
+    found = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    return found[0] if found else None
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
+    """A hint with the closest candidate, or with all of them where they are few."""
+    names = list(dict.fromkeys(candidates))
+    best = closest(name, names)
+    if best is not None:
+        return f"did you mean '{best}'?"
+    if 0 < len(names) <= 8:
+        return "known here: " + ", ".join(names)
+    return None
+
+
+def shown(text: str, limit: int = 60) -> str:
+    """A text cut to what a sentence can carry."""
+    text = " ".join(text.split())
+    return text if len(text) <= limit else text[: limit - 3] + "..."

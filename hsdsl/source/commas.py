@@ -1,0 +1,66 @@
+"""What YAML cuts apart: in ``{v: min(v, 0)}`` the comma ends the value, and ``0)`` becomes a key without a value.
+
+The pieces are put together again, so that the rest of the model is still read, and the quotes are asked for.
+"""
+
+from __future__ import annotations
+
+from hsdsl.errors import Findings
+from hsdsl.source.nodes import Node, Place, Scalar
+
+
+def rejoined_items(items: list[Node], findings: Findings) -> list[Node]:
+    """The items of a list in brackets, with what a comma inside parentheses cut apart in one piece."""
+    joined: list[Node] = []
+    at = 0
+    while at < len(items):
+        run = _run(items[at:])
+        joined.append(_one(run, findings))
+        at += len(run)
+    return joined
+
+
+def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
+    """The entries of a mapping in braces, with what a comma inside parentheses cut apart in one piece."""
+    joined: list[tuple[Node, Node]] = []
+    at = 0
+    while at < len(entries):
+        key, value = entries[at]
+        pieces: list[Node] = [value]
+        for name, rest in entries[at + 1 :]:
+            if not (isinstance(rest, Scalar) and rest.plain and rest.value == ""):
+                break
+            pieces.append(name)
+        run = _run(pieces)
+        joined.append((key, _one(run, findings)))
+        at += len(run)
+    return joined
+
+
+def _run(nodes: list[Node]) -> list[Scalar] | list[Node]:
+    """The pieces from the first node on that close the parentheses it opens; the first alone where none do."""
+    run: list[Scalar] = []
+    open_now = 0
+    for node in nodes:
+        if not (isinstance(node, Scalar) and node.plain):
+            break
+        run.append(node)
+        open_now += node.value.count("(") - node.value.count(")")
+        if open_now <= 0:
+            return run
+    return nodes[:1]
+
+
+def _one(run: list[Scalar] | list[Node], findings: Findings) -> Node:
+    first, last = run[0], run[-1]
+    if first is last:
+        return first
+    text = first.place.text
+    place = Place(text, first.place.start, last.place.end)
+    value = " ".join(text.content[place.start[0] : place.end[0]].split())
+    findings.add(
+        place.diagnostic(
+            "HS007", "inside braces or brackets YAML ends a value at its comma", f'quote this expression: "{value}"'
+        )
+    )
+    return Scalar(value, True, place)

@@ -1,0 +1,128 @@
+"""What the YAML parser says, said again for a person who wanted to write mathematics."""
+
+from __future__ import annotations
+
+import re
+
+import yaml
+
+from hsdsl.errors import Diagnostic
+from hsdsl.source.text import Text
+
+_VALUE = re.compile(r"^\s*(?:- +)*(?:[^\s:{\[,'\"][^:{\[,]*:\s+)?(?P<value>\S.*)$")
+_KEY_AND_VALUE = re.compile(r"^\s*(?:- +)*[^:]+:\s+\S")
+_MEANS = {
+    "*": "an alias",
+    "&": "an anchor",
+    "!": "a tag",
+    "|": "a text of several lines",
+    ">": "a text of several lines",
+    "%": "a directive",
+    "@": "a reserved sign",
+    "`": "a reserved sign",
+    "{": "a mapping",
+    "[": "a list",
+    "}": "the end of a mapping",
+    "]": "the end of a list",
+    ",": "the end of a value",
+    "'": "a quoted text",
+    '"': "a quoted text",
+    "?": "a key",
+    "-": "an item of a list",
+}
+_QUOTE = "quote this expression"
+
+
+def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
+    """The diagnostic for a fault that stops the YAML parser."""
+    problem = error.problem or ""
+    line, column = _mark(error.problem_mark or error.context_mark)
+    opened = _mark(error.context_mark) if error.context_mark else (line, column)
+    tab = _tab(text, line) or _tab(text, opened[0])
+    if tab:
+        return tab
+    if "document start" in problem:
+        return text.diagnostic("HS010", "a second document begins here", text.span(line, column), "a file holds one model")
+    if "quoted scalar" in (error.context or ""):
+        return _quoted(text, problem, (line, column), opened)
+    if "block scalar" in (error.context or ""):
+        return _misread(text, *opened)
+    if "could not find expected ':'" in problem:
+        message = "this line is neither a key nor part of a value"
+        return text.diagnostic("HS004", message, text.span(*opened, 9999), "a key is followed by a colon and a space")
+    if "flow" in (error.context or ""):
+        return _in_brackets(text, (line, column), opened)
+    return _in_block(text, problem, line, column)
+
+
+def _mark(mark: yaml.Mark | None) -> tuple[int, int]:
+    return (mark.line + 1, mark.column + 1) if mark else (1, 1)
+
+
+def _tab(text: Text, line: int) -> Diagnostic | None:
+    content = text.lines[min(line, len(text.lines)) - 1]
+    blank = content[: len(content) - len(content.lstrip())]
+    if "\t" not in blank:
+        return None
+    span = text.span(line, blank.index("\t") + 1)
+    return text.diagnostic("HS005", "a tab stands where YAML wants spaces", span, "indent with spaces")
+
+
+def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
+    if "escape" in problem or "hexdecimal" in problem or "hexadecimal" in problem:
+        message = "the backslash here begins an escape that YAML does not know"
+        return text.diagnostic("HS004", message, text.span(*here), "use single quotes, where a backslash is itself")
+    return text.diagnostic("HS004", "the quote that opens here is never closed", text.span(*opened))
+
+
+def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
+    bracket = _character(text, *opened)
+    closing = {"{": "}", "[": "]"}.get(bracket, "}")
+    line, column = here
+    content = text.lines[line - 1] if line <= len(text.lines) else ""
+    if column > len(content) or (line != opened[0] and _character(text, line, column) == ":"):
+        message = f"the `{bracket}` that opens here is never closed"
+        return text.diagnostic("HS004", message, text.span(*opened), f"close it with `{closing}`")
+    found = _character(text, line, column)
+    message = f"YAML cannot read on at `{found}` inside `{bracket}` and `{closing}`"
+    return text.diagnostic("HS007", message, text.span(line, column), f"{_QUOTE} if `{found}` belongs to one")
+
+
+def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
+    content = text.lines[line - 1] if line <= len(text.lines) else ""
+    before = content[: column - 1]
+    if before.strip(" -") == "" and _character(text, line, column) not in "%@`*&!":
+        return _indentation(text, line, column)
+    if "mapping values" in problem:
+        if _KEY_AND_VALUE.match(before):
+            message = "a colon followed by a space cannot stand inside a value"
+            return text.diagnostic("HS007", message, text.span(line, column), f"{_QUOTE} or begin a new line")
+        return _indentation(text, line, len(content) - len(content.lstrip()) + 1)
+    return _misread(text, line, column)
+
+
+def _indentation(text: Text, line: int, column: int) -> Diagnostic:
+    content = text.lines[line - 1] if line <= len(text.lines) else ""
+    if content.lstrip().startswith("- "):
+        message = "a list item cannot stand here"
+    else:
+        message = "the indentation of this line fits no line above it"
+    hint = "entries of one mapping or list begin in the same column; a key that has a value has no lines under it"
+    return text.diagnostic("HS006", message, text.span(line, column, 9999), hint)
+
+
+def _misread(text: Text, line: int, column: int) -> Diagnostic:
+    content = text.lines[line - 1] if line <= len(text.lines) else ""
+    found = _VALUE.match(content)
+    start = found.start("value") if found else column - 1
+    first = content[start : start + 1]
+    if start >= column or first not in _MEANS:
+        start, first = column - 1, content[column - 1 : column]
+    if first not in _MEANS:
+        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column))
+    message = f"a value that begins with `{first}` is {_MEANS[first]} in YAML"
+    return text.diagnostic("HS007", message, text.span(line, start + 1, 9999), _QUOTE)
+
+
+def _character(text: Text, line: int, column: int) -> str:
+    return text.lines[line - 1][column - 1 : column] if line <= len(text.lines) else ""

@@ -1,0 +1,117 @@
+"""A model's bytes as text: decoded, capped, and free of characters that do not belong in it."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
+
+LARGEST_FILE = 1 << 20  # bytes
+_BREAK = re.compile("\r\n|\r|\n")
+_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+_OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text with its lines, which makes places in it and diagnostics about them."""
+
+    path: str
+    content: str
+    lines: list[str] = field(repr=False)
+
+    @classmethod
+    def of(cls, path: str, content: str) -> Text:
+        """A text split into its lines."""
+        return cls(path, content, _BREAK.split(content))
+
+    def span(self, line: int, column: int, length: int = 1) -> Span:
+        """The place at a 1-based line and column, kept inside the text and on one line."""
+        line = min(max(line, 1), len(self.lines))
+        width = len(self.lines[line - 1])
+        column = min(max(column, 1), width + 1)
+        return Span(self.path, line, column, max(1, min(length, width + 1 - column)))
+
+    def diagnostic(self, code: str, message: str, span: Span, hint: str | None = None) -> Diagnostic:
+        """A diagnostic about a place in this text, with the line it is on."""
+        return Diagnostic(code, message, span, hint, self.lines[span.line - 1])
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a file, as many as a model may have and one more.
+
+    Raises
+    ------
+    UsageError
+        When the file cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            return stream.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{os.fspath(path)}: {reason(error)}") from None
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Why a file could not be read, for a person."""
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    if isinstance(error, IsADirectoryError):
+        return "this is a folder, not a file"
+    if isinstance(error, PermissionError):
+        return "the file may not be read"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()
+    return "this cannot be the name of a file"
+
+
+def decode(path: str, data: bytes) -> Text:
+    """The text of a model.
+
+    Raises
+    ------
+    ModelError
+        When it is too large, not UTF-8, or has characters that no model may have.
+    """
+    if len(data) > LARGEST_FILE:
+        raise _refused(path, "HS003", "the file is larger than 1 MiB", "keep data in CSV files and name them in inputs")
+    if data.startswith(_OTHER_ENCODINGS):
+        raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
+    try:
+        content = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = Text.of(path, data[: error.start].decode("utf-8"))
+        span = Span(path, len(before.lines), len(before.lines[-1]) + 1)
+        message = f"the byte 0x{data[error.start]:02x} here is not UTF-8 text"
+        raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
+    text = Text.of(path, content)
+    wrong = [_forbidden(text, match) for match in _first_of_each(content)]
+    if wrong:
+        raise ModelError(wrong)
+    return text
+
+
+def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
+    return ModelError([Diagnostic(code, message, Span(path, 1, 1), hint)])
+
+
+def _first_of_each(content: str) -> list[re.Match[str]]:
+    first: dict[str, re.Match[str]] = {}
+    for match in _FORBIDDEN.finditer(content):
+        first.setdefault(match.group(), match)
+    return list(first.values())
+
+
+def _forbidden(text: Text, match: re.Match[str]) -> Diagnostic:
+    before = _BREAK.split(text.content[: match.start()])
+    span = text.span(len(before), len(before[-1]) + 1)
+    if match.group() == "\ufeff" and match.start() == 0:
+        return text.diagnostic(
+            "HS002", "the file begins with a byte order mark", span, "save it as UTF-8 without a byte order mark"
+        )
+    return text.diagnostic(
+        "HS002", f"the invisible character U+{ord(match.group()):04X} is not allowed in a model", span, "remove it"
+    )
