@@ -80,9 +80,7 @@ def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> C
     literal = arithmetic.name == "float64"
 
     def replace(match: re.Match[str]) -> str:
-        value = arithmetic.constant(
-            Fraction(int(match[2]) * (-1 if match[1] else 1), int(match[3]))
-        )
+        value = arithmetic.constant(Fraction(int(match[2]) * (-1 if match[1] else 1), int(match[3])))
         if literal:
             return f"({value!r})" if match[1] else repr(value)
         namespace[match[0]] = value

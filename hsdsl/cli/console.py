@@ -50,7 +50,7 @@ def report_usage(error: UsageError, json: bool) -> None:
 
 
 @contextmanager
-def progress(until: Callable[[], float | None], quiet: bool) -> Iterator[Callable[[Recorder], None] | None]:
+def progress(quiet: bool) -> Iterator[Callable[[Recorder], None] | None]:
     """Show how far a run is, on a terminal, once it takes longer than a moment. Yields the run's ``watch``."""
     if quiet or not sys.stderr.isatty():
         yield None
@@ -61,9 +61,9 @@ def progress(until: Callable[[], float | None], quiet: bool) -> Iterator[Callabl
     def show() -> None:
         wait = FIRST_SIGN
         while not done.wait(wait):
-            wait, end = INTERVAL, until()
-            if watched and end:
-                _bar(float(watched[0].now) / end, len(watched[0].transitions))
+            wait = INTERVAL
+            for recorder in watched:
+                _bar(float(recorder.now / recorder.until) if recorder.until else 1.0, len(recorder.transitions))
 
     thread = threading.Thread(target=show, daemon=True)
     thread.start()

@@ -90,10 +90,10 @@ def _simulate(
     from hsdsl.model import load, split_overrides
 
     model = load(path)
-    names = _names(outputs, model.known_columns)
+    names = _names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)
     asked |= {"parameters": parameters, "initial": initial, "settings": settings}
-    with progress(lambda: model.until, quiet or json) as watch:
+    with progress(quiet or json) as watch:
         execution = model.simulate(**asked, watch=watch)
     found = model.estimate(execution, **asked) if estimate else None
     if out is not None:

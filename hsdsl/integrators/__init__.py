@@ -8,9 +8,7 @@ from hsdsl.integrators.ralston import RALSTON
 from hsdsl.integrators.rk4 import RK4
 from hsdsl.integrators.tableau import ButcherTableau
 
-INTEGRATORS: dict[str, ButcherTableau] = {
-    table.name: table for table in (EULER, MIDPOINT, HEUN, RALSTON, RK4, DOPRI5)
-}
+INTEGRATORS: dict[str, ButcherTableau] = {table.name: table for table in (EULER, MIDPOINT, HEUN, RALSTON, RK4, DOPRI5)}
 AUTO = DOPRI5.name  # what `method: auto` means while there is one adaptive method
 
 __all__ = ["AUTO", "INTEGRATORS", "ButcherTableau"]

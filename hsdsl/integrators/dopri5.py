@@ -16,7 +16,10 @@ _D = fractions(
 
 
 def _dense() -> tuple[Vector, ...]:
-    """Powers of s in x + s (dx + (1-s) (p + s (q + (1-s) r))), dx = h sum b k, p = h k_1 - dx, q = dx - h k_7 - p, r = h sum d k."""
+    """Powers of s in x + s (dx + (1-s) (p + s (q + (1-s) r))).
+
+    Here dx = h sum b k, p = h k_1 - dx, q = dx - h k_7 - p and r = h sum d k.
+    """
     rows: list[Vector] = []
     for i, (b, d) in enumerate(zip(_B, _D, strict=True)):
         first, last = Fraction(i == 0), Fraction(i == 6)

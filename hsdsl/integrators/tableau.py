@@ -114,10 +114,11 @@ class ButcherTableau:
     def elementary_weights(self, tree: Tree) -> Vector:
         """Evaluate the product over subtrees of sum_k a_ik g_k, for each stage i."""
         below = [self.elementary_weights(subtree) for subtree in tree]
-        return tuple(
-            prod((sum((a * g for a, g in zip(row, g_sub, strict=False)), Fraction(0)) for g_sub in below), start=Fraction(1))
-            for row in self.a
-        )
+
+        def weighted(row: Vector, values: Vector) -> Fraction:
+            return sum((a * g for a, g in zip(row, values, strict=False)), Fraction(0))
+
+        return tuple(prod((weighted(row, values) for values in below), start=Fraction(1)) for row in self.a)
 
 
 @cache

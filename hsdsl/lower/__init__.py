@@ -82,9 +82,7 @@ def _number(system: HybridSystem) -> Names:
 
 def _sampled(given: SampledInput) -> lowered.SampledInput:
     exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
-    return lowered.SampledInput(
-        given.name, given.hold, given.times if exact else None, given.values if exact else None
-    )
+    return lowered.SampledInput(given.name, given.hold, given.times if exact else None, given.values if exact else None)
 
 
 def _constants(system: HybridSystem, names: Names):

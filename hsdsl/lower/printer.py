@@ -25,7 +25,26 @@ _NAMES = {
     "Min": "min",
     "Max": "max",
     "Heaviside": "heaviside",
-    **{name: name for name in "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log".split()},
+    **{
+        name: name
+        for name in [
+            "sin",
+            "cos",
+            "tan",
+            "asin",
+            "acos",
+            "atan",
+            "atan2",
+            "sinh",
+            "cosh",
+            "tanh",
+            "asinh",
+            "acosh",
+            "atanh",
+            "exp",
+            "log",
+        ]
+    },
 }
 
 

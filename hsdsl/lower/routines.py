@@ -1,5 +1,5 @@
 # pyright: basic
-"""Named tuples of expressions -> the text of routines, through SymPy's `lambdify` with common subexpressions taken out."""
+"""Expressions -> the text of routines, through SymPy's `lambdify` with common subexpressions taken out."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.lower import lower
+from hsdsl.model.estimate import Estimate, compare, finer_settings
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
@@ -145,6 +146,39 @@ class Model:
         except ValueError as error:
             raise UsageError(str(error)) from error
         return replace(execution, title=self.system.title, seconds={**self._seconds, **execution.seconds})
+
+    def estimate(self, execution: Execution, **asked: Any) -> Estimate:
+        """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
+        finer = finer_settings(execution)
+        asked |= {"step": None, "tolerance": None, "watch": None, **finer, "method": execution.method}
+        return compare(execution, self.simulate(**asked), finer)
+
+    def plot(
+        self, execution: Execution, path: str | os.PathLike[str], parameters: Mapping[str, Any] | None = None
+    ) -> None:
+        """Draw an execution of this model, with the levels of its guards; see `hsdsl.plot`.
+
+        Parameters
+        ----------
+        execution : Execution
+            What to draw.
+        path : path
+            A name ending in .png, .svg or .html.
+        parameters : mapping, optional
+            The overrides the execution was run with: guards' levels depend on them.
+        """
+        from hsdsl.model.guards import guard_lines
+        from hsdsl.plot import plot
+
+        values = with_parameters(self._values(FLOAT64), parameters or {})
+        plot(execution, path, guards=guard_lines(values), units=self.system.units)
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of all states and outputs."""
+        states = dict.fromkeys(name for mode in self.system.modes for name in mode.states)
+        initial = dict.fromkeys(name for name, _ in self.system.initial.values)
+        return list(dict.fromkeys((*states, *initial, *self.system.outputs)))
 
     def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
         """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.requests`)."""

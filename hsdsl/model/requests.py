@@ -19,7 +19,12 @@ from hsdsl.simulate import SCHEMES
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
 SCHEMES_TO_COME = ("located",)
 FILE = "the file"
-DEFAULTS: dict[str, Any] = {"scheme": "relaxed", "method": "auto", "relaxation": Fraction("1e-6"), "max_transitions": 10**6}
+DEFAULTS: dict[str, Any] = {
+    "scheme": "relaxed",
+    "method": "auto",
+    "relaxation": Fraction("1e-6"),
+    "max_transitions": 10**6,
+}
 DEFAULT_TOLERANCE = Fraction("1e-9")
 
 
@@ -86,9 +91,7 @@ def _scheme(asked: Asked) -> str:
             f"scheme '{asked.value}' ({asked.place}) is part of the language but not built yet; it is not imitated",
             "use scheme 'relaxed'",
         )
-    raise UsageError(
-        f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES])
-    )
+    raise UsageError(f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES]))
 
 
 def _method(asked: Asked, size_asked: Asked, size: str) -> ButcherTableau:

@@ -49,9 +49,7 @@ class Values:
         if isinstance(value, str):
             known = self.program.parameters[: len(self.parameters)]
             expression = parameter_expression(self.system, value, where, allowed=known)
-            routine = compile_routines(
-                lower_expressions(self.system, {"value": expression}), arithmetic, where
-            )()[0]
+            routine = compile_routines(lower_expressions(self.system, {"value": expression}), arithmetic, where)()[0]
             missing = len(self.program.parameters) - len(self.parameters)
             return routine(*self.parameters, *(arithmetic.zero,) * missing)[0]
         if isinstance(value, bool) or value is None:
@@ -103,9 +101,7 @@ def _check_bounds(values: Values) -> None:
                     raise UsageError(f"parameter {name} = {show(value)} is beyond its {kind} {show(bound)}")
 
 
-def initial_state(
-    values: Values, overrides: Mapping[str, Any]
-) -> tuple[int, tuple[str, ...], tuple[Number, ...]]:
+def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...], tuple[Number, ...]]:
     """Return the initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
     program = values.program
     names = [mode.name for mode in program.modes]

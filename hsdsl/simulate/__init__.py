@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from hsdsl.arithmetic import Number
@@ -52,7 +53,8 @@ def simulate(
     An interrupt (Ctrl-C) ends the run with what was computed.
     """
     timeline = make_timeline(program, kernel, parameters, settings.until)
-    recorder = Recorder(kernel.arithmetic, _DEGREE[settings.method.interpolant], len(program.outputs))
+    degree = _DEGREE[settings.method.interpolant]
+    recorder = Recorder(kernel.arithmetic, settings.until, degree, len(program.outputs))
     run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
     if watch is not None:
         watch(recorder)
@@ -91,11 +93,20 @@ def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
         transitions=tuple(recorder.transitions),
         final=final,
         verdict=verdict(recorder),
+        output_function=partial(output_values, run),
         output_names=program.outputs,
         seconds={"simulate": seconds},
         digits=run.arithmetic.digits,
         **columns,
     )
+
+
+def output_values(run: Run, mode: str, t: Number, x: State) -> State:
+    """Outputs at a state of a run, the input taken on the segment that starts at or holds t."""
+    index = [m.name for m in run.program.modes].index(mode)
+    if len(run.program.modes[index].states) != len(x):
+        return (run.arithmetic.functions["nan"],) * len(run.program.outputs)
+    return run.kernel.bind(index, run.timeline.at(t).data).outputs(t, *x)
 
 
 def described(settings: Settings) -> dict[str, Any]:

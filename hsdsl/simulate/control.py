@@ -57,6 +57,4 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     if settings.step is not None:
         return Control(settings.step, None, settings.method.order, settings.step, None)
     largest = settings.until * LARGEST_SHARE
-    return Control(
-        largest / 100, settings.tolerance, settings.method.order, largest, arithmetic.functions["pow"]
-    )
+    return Control(largest / 100, settings.tolerance, settings.method.order, largest, arithmetic.functions["pow"])

@@ -41,18 +41,14 @@ class OpenArc:
 
 @dataclass
 class Recorder:
-    """All arcs and transitions so far. ``keep_pieces`` is false where the interpolant is the straight line."""
+    """All arcs and transitions so far, of a run that should last to ``until``."""
 
     arithmetic: Arithmetic
+    until: Number
     degree: int  # of the pieces; 0 for straight lines
     output_count: int
     arcs: list[OpenArc] = field(default_factory=list[OpenArc])
     transitions: list[Transition] = field(default_factory=list[Transition])
-
-    @property
-    def jump(self) -> int:
-        """Transitions made so far."""
-        return sum(1 for t in self.transitions[-1:]) and self.transitions[-1].index + 1
 
     @property
     def now(self) -> Number:

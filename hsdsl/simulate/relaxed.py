@@ -7,30 +7,33 @@ is located on the flow: only the step's own interpolant is asked where it crosse
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators.stepper import Polynomial, State
+from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
 from hsdsl.simulate.run import Here, Run, choose, reset, show
 from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-NOT_FINITE = Obstacle("not finite")
+NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
 
 
 @dataclass(frozen=True)
 class Landing:
-    """A step that ended in a strip: where it left the domain, when the step ended, and what it was computed from."""
+    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers that was found from."""
 
     crossing: Crossing
     alternatives: tuple[str, ...]
     t1: Number
-    piece: Polynomial
     scale: State
+
+
+Found = Sequence[Crossing] | Obstacle  # no crossing: the step ended inside the domain
 
 
 def relaxed(run: Run, here: Here | Stop) -> Stop:
@@ -48,56 +51,60 @@ def relaxed(run: Run, here: Here | Stop) -> Stop:
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
     """Step inside the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
-    control, epsilon, isfinite = run.control, run.settings.relaxation, run.arithmetic.isfinite
-    field, surfaces, append = here.kernel.flow, here.kernel.surfaces, here.arc.append
-    method = run.stepper(len(here.x))
-    step, piece, curved = method.step, method.piece, run.recorder.degree > 0
-    t, x, limit = here.t, here.x, here.segment.end
+    control, append, method = run.control, here.arc.append, run.stepper(len(here.x))
+    piece, curved = method.piece, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
+    t, x, limit = here.t, here.x, here.segment.end
     try:
-        slope = field(t, *x)
+        slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, (x,))
     while t < limit:
         h, halvings, ratio = control.h, 0, None
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
-            try:
-                z, stages = step(field, t, h, x, slope)
-                values = surfaces(t1, *z)
-                if not isfinite(sum(z) + sum(values)):
-                    found, end = NOT_FINITE, slope
-                elif not values or max(values) <= 0:
-                    found, end = (), field(t1, *z)
-                else:
-                    trial = Trial(t, h, t1, x, slope, z, stages, field, method)
-                    found, end = here.surfaces.judge(trial, values, epsilon), trial.end or slope
-                if not isfinite(sum(end)):
-                    found = NOT_FINITE
-            except DOMAIN_ERRORS:
-                found = NOT_FINITE
-            if not isinstance(found, Obstacle):
-                if control.tolerance is None:
-                    break
+            found, z, stages, end = attempt(run, here, method, t, h, t1, x, slope)
+            if control.tolerance is not None and not isinstance(found, Obstacle):
                 ratio = control.ratio(method.error(h, stages, end), x, z)
-                if ratio <= 1:
-                    break
-                found = Obstacle("error")
-            if found.kind == "error" and halvings == 0:
+                if ratio > 1:
+                    found = TOO_WRONG
+            if not isinstance(found, Obstacle):
+                break
+            if found is TOO_WRONG and halvings == 0:
                 control.reject(h, ratio)
                 h = control.h
             else:
                 h, halvings = h / 2, halvings + 1
-            if halvings > most_halvings or not t + h > t and found.kind == "error":
+            if halvings > most_halvings or (found is TOO_WRONG and not t + h > t):
                 return stuck(run, here.moved(t, x), found, slope)
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found:
-            chosen, alternatives = choose(here.mode.edges, found, run.tie(t))
-            return Landing(chosen, alternatives, t1, trial.piece, sizes(x, z))
+            return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z))
         append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
         t, x, slope = t1, z, end
     return here.moved(t, x)
+
+
+def attempt(
+    run: Run, here: Here, method: Stepper, t: Number, h: Number, t1: Number, x: State, slope: State
+) -> tuple[Found, State, Stages, State]:
+    """Try one step: where it ended, its end z, the stages, and the flow at z."""
+    isfinite, kernel = run.arithmetic.isfinite, here.kernel
+    try:
+        z, stages = method.step(kernel.flow, t, h, x, slope)
+        values = kernel.surfaces(t1, *z)
+        if not isfinite(sum(z) + sum(values)):
+            return NOT_FINITE, z, stages, slope
+        if not values or max(values) <= 0:
+            found, end = (), kernel.flow(t1, *z)
+        else:
+            trial = Trial(t, h, t1, x, slope, z, stages, kernel.flow, method)
+            found = here.surfaces.judge(trial, values, run.settings.relaxation)
+            end = trial.end or slope
+        return (found if isfinite(sum(end)) else NOT_FINITE), z, stages, end
+    except DOMAIN_ERRORS:
+        return NOT_FINITE, x, (), slope
 
 
 def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
@@ -105,7 +112,7 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
     crossing, epsilon, until = landing.crossing, run.settings.relaxation, run.settings.until
     t, q, depth = crossing.time, crossing.state, crossing.depth
     if crossing.theta > 0:
-        here.arc.append(t, q, shortened(landing.piece, crossing.theta))
+        here.arc.append(t, q, crossing.piece)
     if stop := run.limit_reached(t):
         return stop
     resumed = landing.t1 + (epsilon - depth)
@@ -142,7 +149,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
         run.recorder.strip(here.arc, [(t, run.arithmetic.zero)], x)
         run.record(here, chosen, None, None, alternatives)
         name = here.mode.edges[chosen.edge].name
-        return Stop("until", t, f"reached t = {show(t)} on the guard of {name}, at the edge of its strip, mode unchanged")
+        return Stop("until", t, f"reached t = {show(t)} inside the strip of {name} (on its guard), mode unchanged")
     return Stop("until", t, f"reached t = {show(t)}")
 
 
@@ -166,7 +173,7 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
     t, x = here.t, here.x
     if obstacle.kind in ("wall", "deep", "flat", "inward") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
-        return Landing(chosen, alternatives, t, (), sizes(x, x))
+        return Landing(chosen, alternatives, t, sizes(x, x))
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
     if obstacle.kind == "not finite":
@@ -178,15 +185,6 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
         "flat": "the gradient of a guard's surface vanishes on it",
     }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
-
-
-def shortened(piece: Polynomial, theta: Number) -> Polynomial:
-    """Return the part of an interpolant before theta, over [0, 1] again."""
-    power, parts = theta, []
-    for c in piece:
-        parts.append(tuple(a * power for a in c))
-        power = power * theta
-    return tuple(parts)
 
 
 def sizes(x: State, z: State) -> State:

@@ -148,5 +148,3 @@ def reset(here: Here, crossing: Crossing, scale: State, run: Run) -> tuple[State
 def show(x: Any) -> str:
     """Write a number for a person."""
     return f"{float(x):.10g}"
-
-

@@ -25,13 +25,17 @@ ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a trial step crossed a guard: share ``theta`` of the step, time and state there, and the depth reached."""
+    """Where a trial step crossed a guard: share ``theta`` of the step, time and state there, and the depth reached.
+
+    ``piece`` is the interpolant from the step's start to the crossing, empty where the crossing is the start.
+    """
 
     edge: int
     theta: Number
     time: Number
     state: State
     depth: Number
+    piece: Polynomial = ()
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,15 @@ def at(x: State, piece: Polynomial, theta: Number) -> State:
     for coefficients in reversed(piece[:-1]):
         value = tuple((c + v) * theta for c, v in zip(coefficients, value, strict=True))
     return tuple(a + v for a, v in zip(x, value, strict=True))
+
+
+def shortened(piece: Polynomial, theta: Number) -> Polynomial:
+    """Return the part of an interpolant before theta, over [0, 1] again."""
+    power, parts = theta, []
+    for c in piece:
+        parts.append(tuple(a * power for a in c))
+        power = power * theta
+    return tuple(parts)
 
 
 def roundoff(unit: Number, magnitude: Number, gradient: Vector, x: State, scale: State) -> Number:
@@ -139,9 +152,7 @@ class Surfaces:
                 crossings.append(found)
         return crossings
 
-    def _too_deep(
-        self, trial: Trial, values: Vector, noise: list[Number], k: int, epsilon: Number
-    ) -> Obstacle | None:
+    def _too_deep(self, trial: Trial, values: Vector, noise: list[Number], k: int, epsilon: Number) -> Obstacle | None:
         norm = self.norm(trial.t1, trial.z, k)
         if not norm > 0:
             return Obstacle("flat", k)
@@ -151,13 +162,15 @@ class Surfaces:
         self, trial: Trial, values: Vector, noise: list[Number], k: int, epsilon: Number
     ) -> Crossing | Obstacle | None:
         """Find the last up-crossing of surface k on the interpolant; None where the surface is transparent there."""
-        found = self._on(trial, trial.piece, noise[k], k)
+        piece = trial.piece
+        found = self._on(trial, piece, noise[k], k)
         if found is None:
             return None
         norm = self.norm(trial.t1, trial.z, k)
         inward = self._inward(trial, found, noise[k], k)
         if inward and inward <= epsilon * norm:
-            found = self._on(trial, trial.cubic(), noise[k], k) or found
+            piece = trial.cubic()
+            found = self._on(trial, piece, noise[k], k) or found
             inward = self._inward(trial, found, noise[k], k)
         if inward:
             return Obstacle("inward", k)
@@ -166,7 +179,7 @@ class Surfaces:
             return None
         if obstacle := self._too_deep(trial, values, noise, k, epsilon):
             return obstacle
-        return Crossing(k, theta, time, q, min(epsilon, values[k] / norm))
+        return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
 
     def _inward(self, trial: Trial, found: tuple[Number, Number, State], noise: Number, k: int) -> Number:
         """How far the flow at q would take r back inside over this step; 0 when not beyond round-off."""
@@ -174,9 +187,7 @@ class Surfaces:
         back = -self.kernel.rates(time, *q)[k] * trial.h
         return back if back > noise else self.arithmetic.zero
 
-    def _on(
-        self, trial: Trial, piece: Polynomial, noise: Number, k: int
-    ) -> tuple[Number, Number, State] | None:
+    def _on(self, trial: Trial, piece: Polynomial, noise: Number, k: int) -> tuple[Number, Number, State] | None:
         """Return (theta, time, state) of the last up-crossing on ``piece``; None if r was beyond all along."""
 
         def value(theta: Number) -> Number:
@@ -193,7 +204,7 @@ class Surfaces:
 
 
 def last_up_crossing(value: Callable[[Number], Number], small: Number, arithmetic: Arithmetic) -> Number | None:
-    """Find the last s in [0, 1] where ``value`` rises through zero, knowing value(1) > 0; None if it is positive all along.
+    """Find the last s in [0, 1] where ``value`` rises through zero, knowing value(1) > 0; None if it never does.
 
     The interval is scanned backwards in `SCAN` pieces, then the bracket is closed by the Illinois variant of regula
     falsi until |value| <= ``small`` or the bracket is a few units wide.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from hsdsl.arithmetic import Number
 from hsdsl.kernel import Kernel
@@ -71,7 +72,7 @@ def _samples(
         times, values = both[: len(both) // 2], both[len(both) // 2 :]
     if not all(map(kernel.arithmetic.isfinite, (*times, *values))):
         raise ValueError(f"input {given.name} has a sample that is not finite")
-    if any(not a < b for a, b in zip(times, times[1:], strict=False)):
+    if any(not a < b for a, b in pairwise(times)):
         raise ValueError(f"the sample times of input {given.name} do not increase")
     return times, values
 
@@ -79,7 +80,7 @@ def _samples(
 def _line(
     given: SampledInput, times: tuple[Number, ...], values: tuple[Number, ...], t: Number
 ) -> tuple[Number, Number, Number]:
-    """Return (a, b, c) of the segment that starts at or before t; constant before the first and after the last sample."""
+    """Return (a, b, c) of the segment from t on; constant before the first and after the last sample."""
     k = bisect_right(times, t) - 1
     still = values[0] * 0
     if k < 0:
@@ -87,5 +88,3 @@ def _line(
     if given.hold == "zero" or k + 1 == len(times):
         return values[k], still, times[k]
     return values[k], (values[k + 1] - values[k]) / (times[k + 1] - times[k]), times[k]
-
-

@@ -1,0 +1,33 @@
+# pyright: basic
+"""Guards that are levels of one state (``x >= x_max``): where a plot draws a dotted line."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from hsdsl.backends.python import compile_routines
+from hsdsl.lower import lower_expressions
+from hsdsl.model.values import Values
+from hsdsl.plot import GuardLine
+
+
+def guard_lines(values: Values) -> list[GuardLine]:
+    """Return the level of every guard and wall that compares one state with parameters."""
+    system = values.system
+    parameters = {sp.Symbol(p.name, real=True) for p in system.parameters}
+    found = []
+    for mode in system.modes:
+        states = {sp.Symbol(name, real=True): name for name in mode.states}
+        labelled = [(edge.surface, edge.name) for edge in mode.edges] + [(wall, wall.text) for wall in mode.walls]
+        for surface, label in labelled:
+            for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
+                if side in states and level.free_symbols <= parameters:
+                    found.append((mode.name, states[side], level, label))
+    if not found:
+        return []
+    routines = lower_expressions(system, {f"level_{k}": level for k, (_, _, level, _) in enumerate(found)})
+    levels = compile_routines(routines, values.kernel.arithmetic, "levels")()
+    return [
+        GuardLine(mode, state, float(level(*values.parameters)[0]), label)
+        for (mode, state, _, label), level in zip(found, levels, strict=True)
+    ]
