@@ -1,0 +1,97 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""A picture of a run: states over time with mode bands, jumps not joined, stop levels; a phase plot for two states."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.plot.guards import GuardLine
+from hsdsl.store.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["GuardLine", "plot"]
+
+FORMATS = (".png", ".svg", ".html")
+
+# Everything that a person's own matplotlib settings could change is reset; the salt makes the SVG's ids repeatable.
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "hsdsl",
+    "svg.fonttype": "path",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "axes.labelcolor": "#222222",
+    "text.color": "#222222",
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "agg.path.chunksize": 20_000,
+}
+
+
+def plot(
+    execution: Execution,
+    path: str | os.PathLike[str],
+    *,
+    guards: Sequence[GuardLine] = (),
+    units: Mapping[str, str] | None = None,
+    title: str | None = None,
+) -> None:
+    """Draw a run.
+
+    Parameters
+    ----------
+    path : path
+        ``.png``, ``.svg``, or ``.html`` (one self-contained page with the picture and the summary).
+    guards : sequence of GuardLine
+        Levels at which transitions fire, drawn as dotted lines where their mode is occupied.
+    units : mapping, optional
+        Units of states and outputs, and of time under the name ``t``, for the labels of the axes.
+    title : str, optional
+        What stands above instead of the model's title (or its path, where it has none).
+
+    Raises
+    ------
+    UsageError
+        For an unknown suffix, or a file that cannot be written.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
+        raise UsageError(f"{target} should end in .png, .svg or .html: the suffix says what to draw")
+    import matplotlib.style
+
+    from hsdsl.plot.figure import draw
+
+    with matplotlib.style.context(["default", STYLE]), warnings.catch_warnings(), replacing(target) as file:
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a script the font lacks is no reason to alarm
+        figure = draw(execution, guards=guards, units=units or {}, title=title)
+        if suffix == ".html":
+            from hsdsl.plot.page import page
+
+            picture = BytesIO()
+            _print(figure, picture, "svg")
+            file.write(page(execution, picture.getvalue().decode(), title).encode())
+        else:
+            _print(figure, file, suffix[1:])
+
+
+def _print(figure: Figure, file: BinaryIO, kind: str) -> None:
+    said = ("Date", "Creator", "Format", "Type") if kind == "svg" else ("Software",)
+    stable = dict.fromkeys(said)  # nothing but the run: the same run gives the same file
+    figure.savefig(file, format=kind, dpi=150, metadata=stable)

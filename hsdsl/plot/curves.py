@@ -1,0 +1,160 @@
+"""A run as curves to draw: dense enough to look smooth, thin enough to draw, broken where the run jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.execution import Execution, Samples
+from hsdsl.execution.sampling import evaluate
+
+Array = npt.NDArray[Any]
+
+POINTS = 4000  # that a curve should have at least, where its pieces are not straight
+CELLS = 3000  # of the picture's width and height: two points in one cell look like one
+BANDS = 400  # with more changes of mode than this, time is cut into BINS and a bin may be of several modes
+BINS = 1500
+SEVERAL = "several modes"
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The points of a run.
+
+    Attributes
+    ----------
+    samples : Samples
+        The n points, in float64.
+    begins : array of bool, shape (n,)
+        Whether the point is the first of its arc.
+    jumps : array of int
+        The points that a transition led to; the one before each is what it came from.
+    bands : list of (mode, begin, end)
+        When which mode was occupied, without those occupied for no time; :data:`SEVERAL` where they are too many to
+        tell apart.
+    """
+
+    samples: Samples
+    begins: Array
+    jumps: Array
+    bands: list[tuple[str, float, float]]
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The first and the last time."""
+        return float(self.samples.time[0]), float(self.samples.time[-1])
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The modes of the bands, in the order of their first."""
+        return tuple(dict.fromkeys(mode for mode, _, _ in self.bands))
+
+    def column(self, name: str) -> Array:
+        """Return a state or output, not-a-number where there is nothing to draw."""
+        values = self.samples[name]
+        return np.where(np.isfinite(values), values, np.nan)
+
+
+def curves(execution: Execution) -> Curves:
+    """Make the curves of a run."""
+    run = _in_float64(execution)
+    rows, times = _points(run)
+    samples = evaluate(run, rows, times)
+    first = np.array([arc.first for arc in run.arcs])
+    begins = np.zeros(len(rows), dtype=bool)
+    begins[np.searchsorted(rows, first)] = True
+    jumps = np.flatnonzero(np.diff(samples.jump)) + 1
+    return Curves(samples, begins, jumps, _bands(run))
+
+
+def _in_float64(execution: Execution) -> Execution:
+    if execution.digits is None:
+        return execution
+    columns = ("times", "values", "outputs", "depth", "coefficients")
+    return replace(execution, digits=None, **{name: getattr(execution, name).astype(float) for name in columns})
+
+
+def _points(run: Execution) -> tuple[Array, Array]:
+    """Divide each piece that is not a straight line evenly, the longer ones into more parts."""
+    n = len(run.times)
+    duration = np.diff(run.times, append=run.times[-1])
+    parts = np.ones(n, dtype=int)
+    if run.coefficients.shape[1] > 1 or run.output_function is not None:
+        share = np.maximum(duration / max(float(duration.sum()), np.finfo(float).tiny), 1 / n)
+        parts = np.where(duration > 0, np.clip(np.ceil(POINTS * share), 1, 64), 1).astype(int)
+    for arc in run.arcs:
+        parts[arc.last] = 1
+        if arc.kind == "strip":
+            parts[arc.first : arc.last] = 1
+    rows = np.repeat(np.arange(n), parts)
+    within = np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return rows, run.times[rows] + duration[rows] * (within / parts[rows])
+
+
+def _bands(run: Execution) -> list[tuple[str, float, float]]:
+    bands = _merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
+    if len(bands) <= BANDS:
+        return bands
+    edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
+    earliest = np.searchsorted([end for _, _, end in bands], edges[:-1], side="right")
+    latest = np.searchsorted([begin for _, begin, _ in bands], edges[1:], side="left") - 1
+    pairs = zip(earliest.tolist(), latest.tolist(), strict=True)
+    modes = [bands[i][0] if i == k else SEVERAL for i, k in pairs]
+    return _merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
+
+
+def _merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+    merged: list[tuple[str, float, float]] = []
+    for mode, begin, end in bands:
+        if begin == end:
+            continue
+        if merged and merged[-1][0] == mode:
+            begin = merged.pop()[1]
+        merged.append((mode, begin, end))
+    return merged
+
+
+def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, float]) -> tuple[Array, Array]:
+    """Make a line to draw: not-a-number where it jumps, and no two points in a row that look like one.
+
+    Parameters
+    ----------
+    begins : array of bool
+        Where an arc begins; there the line is broken if the point differs from the one before.
+    limits : x0, x1, y0, y1
+        Of the picture.
+    """
+    x0, x1, y0, y1 = limits
+    with np.errstate(invalid="ignore", over="ignore"):
+        cells = np.stack([(x - x0) / (x1 - x0) * CELLS, (y - y0) / (y1 - y0) * CELLS])
+        cells = np.round(np.clip(np.nan_to_num(cells, nan=-9e9), -9e9, 9e9))
+    moved = np.any(np.diff(cells, axis=1) != 0, axis=0)
+    broken = begins[1:] & ((x[1:] != x[:-1]) | (y[1:] != y[:-1])) & moved
+    keep = np.ones(len(x), dtype=bool)
+    keep[1:-1] = moved[:-1] | broken[1:]  # the last point before a break must stay
+    where = np.flatnonzero(np.concatenate([[False], broken])[keep])
+    return np.insert(x[keep], where, np.nan), np.insert(y[keep], where, np.nan)
+
+
+def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
+    """Choose the lower and upper end of an axis.
+
+    A range of round-off (relative to 1 + |x|, as local errors are) is shown as constant. Where the run ended badly
+    its last values may be anything, and the last thirtieth of the time is not looked at.
+    """
+    if ends_badly and len(time) > 1:
+        before = time <= time[0] + 0.97 * (time[-1] - time[0])
+        values = values[before] if np.isfinite(values[before]).any() else values
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    size = max(abs(low), abs(high))
+    if high - low <= 1e-12 * (1 + size):
+        room = 0.1 * size if size > 1e-12 else 1.0
+        return low - room, high + room
+    room = high / 16 - low / 16
+    return low - room, high + room
