@@ -99,10 +99,10 @@ def _bands(run: Execution) -> list[tuple[str, float, float]]:
     if len(bands) <= BANDS:
         return bands
     edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
-    earliest = np.searchsorted([end for _, _, end in bands], edges[:-1], side="right")
-    latest = np.searchsorted([begin for _, begin, _ in bands], edges[1:], side="left") - 1
-    pairs = zip(earliest.tolist(), latest.tolist(), strict=True)
-    modes = [bands[i][0] if i == k else SEVERAL for i, k in pairs]
+    begins, ends = np.array([band[1] for band in bands]), np.array([band[2] for band in bands])
+    earliest: list[int] = np.searchsorted(ends, edges[:-1], side="right").tolist()
+    latest: list[int] = (np.searchsorted(begins, edges[1:], side="left") - 1).tolist()
+    modes = [bands[i][0] if i == k else SEVERAL for i, k in zip(earliest, latest, strict=True)]
     return _merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
 
 

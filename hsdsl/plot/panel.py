@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -89,10 +89,11 @@ def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array) -> None:
         return
     few = len(jumps) <= BOTH_SIDES
     size = 4.0 if len(jumps) <= 20 else 3.0 if few else 1.8
-    style: dict[str, Any] = {"linestyle": "", "marker": "o", "color": INK, "markersize": size, "clip_on": True}
     if few:
-        axis.plot(x[jumps - 1], y[jumps - 1], **style | {"markerfacecolor": "white", "markeredgewidth": 0.9})
-    axis.plot(x[jumps], y[jumps], **style | {"markeredgewidth": 0.0})
+        axis.plot(
+            x[jumps - 1], y[jumps - 1], "o", color=INK, markersize=size, markerfacecolor="white", markeredgewidth=0.9
+        )
+    axis.plot(x[jumps], y[jumps], "o", color=INK, markersize=size, markeredgewidth=0.0)
 
 
 def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[float, float]:
