@@ -75,25 +75,9 @@ def _float_constant(value: Fraction) -> float:
         return math.inf if value > 0 else -math.inf
 
 
-_MATH = [
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "sinh",
-    "cosh",
-    "tanh",
-    "asinh",
-    "acosh",
-    "atanh",
-    "exp",
-    "log",
-    "sqrt",
-    "pow",
-]
+_TRIGONOMETRIC = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2")
+_HYPERBOLIC = ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
+_MATH = (*_TRIGONOMETRIC, *_HYPERBOLIC, "exp", "log", "sqrt", "pow")
 
 FLOAT64 = Arithmetic(
     name="float64",

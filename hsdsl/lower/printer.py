@@ -1,4 +1,5 @@
-# pyright: basic
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """SymPy expressions as the text of generated Python: fixed order of operations, exact constants, mangled names.
 
 Every number but an integer exponent becomes ``q_N_D`` (the fraction N/D), so each number type supplies its own value.
@@ -25,26 +26,8 @@ _NAMES = {
     "Min": "min",
     "Max": "max",
     "Heaviside": "heaviside",
-    **{
-        name: name
-        for name in [
-            "sin",
-            "cos",
-            "tan",
-            "asin",
-            "acos",
-            "atan",
-            "atan2",
-            "sinh",
-            "cosh",
-            "tanh",
-            "asinh",
-            "acosh",
-            "atanh",
-            "exp",
-            "log",
-        ]
-    },
+    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log")},
+    **{name: name for name in ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")},
 }
 
 

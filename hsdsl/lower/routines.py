@@ -1,4 +1,5 @@
-# pyright: basic
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """Expressions -> the text of routines, through SymPy's `lambdify` with common subexpressions taken out."""
 
 from __future__ import annotations

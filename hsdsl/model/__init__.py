@@ -243,7 +243,9 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
     UsageError
         A text is not of that form.
     """
-    parameters, initial, settings = sorted_into = ({}, {}, {})  # type: tuple[dict[str, str], dict[str, str], dict[str, str]]
+    parameters: dict[str, str] = {}
+    initial: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for pair in pairs:
         name, equals, value = (part.strip() for part in pair.partition("="))
         if not (name and equals and value):
@@ -258,7 +260,7 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
         else:
             hint = did_you_mean(group, ("initial", "experiment"))
             raise UsageError(f"--set reaches NAME, initial.NAME and experiment.NAME, not '{name}'", hint)
-    return sorted_into
+    return parameters, initial, settings
 
 
 def _arithmetic(precision: int | None) -> Arithmetic:

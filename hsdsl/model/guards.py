@@ -1,4 +1,5 @@
-# pyright: basic
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """Guards that are levels of one state (``x >= x_max``): where a plot draws a dotted line."""
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ def guard_lines(values: Values) -> list[GuardLine]:
     """Return the level of every guard and wall that compares one state with parameters."""
     system = values.system
     parameters = {sp.Symbol(p.name, real=True) for p in system.parameters}
-    found = []
+    found: list[tuple[str, str, sp.Expr, str]] = []
     for mode in system.modes:
         states = {sp.Symbol(name, real=True): name for name in mode.states}
         labelled = [(edge.surface, edge.name) for edge in mode.edges] + [(wall, wall.text) for wall in mode.walls]
         for surface, label in labelled:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
-                if side in states and level.free_symbols <= parameters:
+                if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters:
                     found.append((mode.name, states[side], level, label))
     if not found:
         return []

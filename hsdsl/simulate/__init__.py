@@ -18,6 +18,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Execution, Point, Stop, Verdict
 from hsdsl.integrators.stepper import State
@@ -64,8 +66,15 @@ def simulate(
         here = enter(run, mode, states, zero, x, tuple(zero for _ in x))
         stop = SCHEMES[settings.scheme](run, here)
     except KeyboardInterrupt:
+        if not recorder.arcs:
+            raise
         stop = Stop("interrupted", recorder.now, f"interrupted at t = {show(recorder.now)}; what was computed is kept")
     return _execution(run, stop, time.perf_counter() - began)
+
+
+def _native(value: Any) -> Number:
+    """Return a column's number as Python's own (NumPy has its own float)."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
@@ -73,14 +82,13 @@ def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
     columns = recorder.columns()
     last, width = columns["arcs"][-1], len(columns["arcs"][-1].states)
     row = last.last
-    native = float if run.arithmetic.name == "float64" else (lambda v: v)
     final = Point(
-        time=native(columns["times"][row]),
+        time=_native(columns["times"][row]),
         mode=last.mode,
         jump=last.jump,
         kind=last.kind,
-        state={s: native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)},
-        outputs={name: native(v) for name, v in zip(program.outputs, columns["outputs"][row], strict=True)},
+        state={s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)},
+        outputs={name: _native(v) for name, v in zip(program.outputs, columns["outputs"][row], strict=True)},
     )
     return Execution(
         model=program.path,

@@ -25,7 +25,7 @@ NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
 
 @dataclass(frozen=True)
 class Landing:
-    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers that was found from."""
+    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that."""
 
     crossing: Crossing
     alternatives: tuple[str, ...]
@@ -50,7 +50,7 @@ def relaxed(run: Run, here: Here | Stop) -> Stop:
 
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
-    """Step inside the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
+    """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
     control, append, method = run.control, here.arc.append, run.stepper(len(here.x))
     piece, curved = method.piece, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
@@ -64,7 +64,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             found, z, stages, end = attempt(run, here, method, t, h, t1, x, slope)
-            if control.tolerance is not None and not isinstance(found, Obstacle):
+            if method.error and control.tolerance is not None and end is not None and not isinstance(found, Obstacle):
                 ratio = control.ratio(method.error(h, stages, end), x, z)
                 if ratio > 1:
                     found = TOO_WRONG
@@ -79,7 +79,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
                 return stuck(run, here.moved(t, x), found, slope)
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
-        if found:
+        if found or end is None:
             return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z))
         append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
         t, x, slope = t1, z, end
@@ -88,23 +88,25 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
 
 def attempt(
     run: Run, here: Here, method: Stepper, t: Number, h: Number, t1: Number, x: State, slope: State
-) -> tuple[Found, State, Stages, State]:
-    """Try one step: where it ended, its end z, the stages, and the flow at z."""
+) -> tuple[Found, State, Stages, State | None]:
+    """Try one step: where it ended, its end z, the stages, and the flow at z if it has a value there."""
     isfinite, kernel = run.arithmetic.isfinite, here.kernel
     try:
         z, stages = method.step(kernel.flow, t, h, x, slope)
         values = kernel.surfaces(t1, *z)
         if not isfinite(sum(z) + sum(values)):
-            return NOT_FINITE, z, stages, slope
+            return NOT_FINITE, z, stages, None
         if not values or max(values) <= 0:
             found, end = (), kernel.flow(t1, *z)
         else:
             trial = Trial(t, h, t1, x, slope, z, stages, kernel.flow, method)
             found = here.surfaces.judge(trial, values, run.settings.relaxation)
-            end = trial.end or slope
-        return (found if isfinite(sum(end)) else NOT_FINITE), z, stages, end
+            end = trial.end
+        if end is None:  # beyond a guard the flow need not have a value, inside it must
+            return found or NOT_FINITE, z, stages, None
+        return found if isfinite(sum(end)) else NOT_FINITE, z, stages, end
     except DOMAIN_ERRORS:
-        return NOT_FINITE, x, (), slope
+        return NOT_FINITE, x, (), None
 
 
 def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:

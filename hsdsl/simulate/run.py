@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,7 +120,9 @@ class Run:
         )
 
 
-def choose(edges: tuple[EdgeProgram, ...], crossings: list[Crossing], tie: Number) -> tuple[Crossing, tuple[str, ...]]:
+def choose(
+    edges: tuple[EdgeProgram, ...], crossings: Sequence[Crossing], tie: Number
+) -> tuple[Crossing, tuple[str, ...]]:
     """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
 
     Returns the chosen crossing and the names of those tied with it.

@@ -90,7 +90,8 @@ def at(x: State, piece: Polynomial, theta: Number) -> State:
 
 def shortened(piece: Polynomial, theta: Number) -> Polynomial:
     """Return the part of an interpolant before theta, over [0, 1] again."""
-    power, parts = theta, []
+    power = theta
+    parts: list[State] = []
     for c in piece:
         parts.append(tuple(a * power for a in c))
         power = power * theta

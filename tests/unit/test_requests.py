@@ -1,0 +1,72 @@
+"""What a run is asked from file, --set and options: the later wins, and step and tolerance exclude each other."""
+
+from __future__ import annotations
+
+import pytest
+
+from hsdsl.errors import UsageError
+from hsdsl.model import split_overrides
+from hsdsl.model.requests import FILE, Source, resolve
+
+# (file, --set, call) -> (method, size, its value)
+ACCEPTED = {
+    "nothing": (({}, {}, {}), ("dopri5", "tolerance", 1e-9)),
+    "file": (({"method": "midpoint", "step": 1}, {}, {}), ("midpoint", "step", 1)),
+    "a later step removes a tolerance": (({"tolerance": 1}, {"step": 2}, {}), ("dopri5", "step", 2)),
+    "a later tolerance removes a step": (
+        ({"method": "dopri5", "step": 1}, {}, {"tolerance": 2}),
+        ("dopri5", "tolerance", 2),
+    ),
+    "a fixed method of the file gives way": (
+        ({"method": "rk4", "step": 1}, {}, {"tolerance": 2}),
+        ("dopri5", "tolerance", 2),
+    ),
+    "and to --set": (({"method": "rk4", "step": 1}, {"tolerance": 2}, {}), ("dopri5", "tolerance", 2)),
+    "and back again": (({"method": "rk4", "step": 1}, {"tolerance": 2}, {"step": 3}), ("rk4", "step", 3)),
+    "call over --set over file": (({"step": 1}, {"step": 2}, {"step": 3}), ("dopri5", "step", 3)),
+    "--set over file": (({"step": 1, "method": "euler"}, {"method": "heun"}, {}), ("heun", "step", 1)),
+    "auto": (({"step": 1, "method": "euler"}, {}, {"method": "auto"}), ("dopri5", "step", 1)),
+    "none is not given": (({"step": 1, "method": "euler"}, {}, {"step": None}), ("euler", "step", 1)),
+}
+REFUSED = {
+    "both in the file": (({"step": 1, "tolerance": 1}, {}, {}), "both step and tolerance"),
+    "both in --set": (({}, {"step": 1, "tolerance": 1}, {}), "both step and tolerance"),
+    "both in the call": (({}, {}, {"step": 1, "tolerance": 1}), "both step and tolerance"),
+    "explicit method cannot serve the file": (({"tolerance": 1}, {}, {"method": "rk4"}), "cannot keep a tolerance"),
+    "explicit method cannot serve the default": (({}, {"method": "rk4"}, {}), "cannot keep a tolerance"),
+    "explicit method, later tolerance": (({}, {"method": "rk4"}, {"tolerance": 1}), "cannot keep a tolerance"),
+    "file against itself": (({"method": "rk4", "tolerance": 1}, {}, {}), "cannot keep a tolerance"),
+    "unknown method": (({}, {}, {"method": "rk5"}), "no method 'rk5'"),
+    "unknown scheme": (({}, {}, {"scheme": "relax"}), "no scheme 'relax'"),
+    "scheme to come": (({}, {}, {"scheme": "located"}), "not built yet"),
+    "unknown setting": (({}, {"stepp": 1}, {}), "no setting 'stepp'"),
+}
+
+
+def ask(places):
+    return resolve([Source(place, values) for place, values in zip((FILE, "--set", "the call"), places, strict=True)])
+
+
+@pytest.mark.parametrize("case", ACCEPTED)
+def test_precedence(case):
+    places, (method, size, value) = ACCEPTED[case]
+    request = ask(places)
+    assert (request.method.name, request.size, float(request.values[request.size].value)) == (method, size, value)
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refusals(case):
+    places, words = REFUSED[case]
+    with pytest.raises(UsageError, match=words):
+        ask(places)
+
+
+def test_overrides_are_sorted_and_the_last_counts():
+    pairs = ["c=1", "initial.v = 2*c", "experiment.step=1e-3", "initial.mode=free", "c=0.5"]
+    assert split_overrides(pairs) == ({"c": "0.5"}, {"v": "2*c", "mode": "free"}, {"step": "1e-3"})
+
+
+@pytest.mark.parametrize("pair", ["c", "=1", "c=", "model.c=1", ""])
+def test_malformed_overrides(pair):
+    with pytest.raises(UsageError):
+        split_overrides([pair])
