@@ -44,6 +44,7 @@ def _same_arrays(a: Any, b: Any) -> bool:
     left, right = cast("np.ndarray[Any, Any]", a), cast("np.ndarray[Any, Any]", b)
     if left.shape != right.shape or (left.dtype == object) != (right.dtype == object):
         return False
-    equal = np.asarray(left == right, dtype=bool)
-    nan = np.asarray(left != left, dtype=bool) & np.asarray(right != right, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        equal = np.asarray(left == right, dtype=bool)
+        nan = np.asarray(left != left, dtype=bool) & np.asarray(right != right, dtype=bool)
     return bool(np.all(equal | nan))

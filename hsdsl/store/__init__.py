@@ -43,7 +43,9 @@ def save(
     rows = execution.rows() if samples is None else at_samples(execution, samples)
     table = select(rows, columns)
     beside = target.with_name(target.name + ".json")
-    with replacing(target) as file, replacing(beside) as description:
+    with replacing(target) as file:
         _TABLES[suffix](table, file)
-        write_sidecar(execution, table, target.name, description)
+        file.flush()  # a full disk shows now, before the sidecar takes its place
+        with replacing(beside) as description:
+            write_sidecar(execution, table, target.name, description)
     return target, beside
