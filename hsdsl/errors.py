@@ -53,7 +53,7 @@ class ModelError(Exception):
 
 
 class UsageError(Exception):
-    """The request is wrong, or a file cannot be read (exit code 2). The message is one sentence for a person."""
+    """The request is wrong, or a file cannot be read (exit code 2). The message is a sentence for a person."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -62,8 +62,9 @@ class UsageError(Exception):
 
 @dataclass
 class Findings:
-    """The diagnostics of one reading, gathered so that all are reported and not the first alone."""
+    """The diagnostics of reading one file, gathered so that all are reported and not the first alone."""
 
+    path: str = ""
     diagnostics: list[Diagnostic] = field(default_factory=list[Diagnostic])
 
     def add(self, diagnostic: Diagnostic) -> None:
@@ -72,7 +73,7 @@ class Findings:
             self.diagnostics.append(diagnostic)
 
     def raise_if_any(self) -> None:
-        """Raise everything found so far, in source order.
+        """Raise everything found so far, in source order, other files last.
 
         Raises
         ------
@@ -80,12 +81,11 @@ class Findings:
             When there is at least one diagnostic.
         """
         if self.diagnostics:
-            raise ModelError(sorted(self.diagnostics, key=_source_order))
+            raise ModelError(sorted(self.diagnostics, key=self._source_order))
 
-
-def _source_order(diagnostic: Diagnostic) -> tuple[int, int]:
-    span = diagnostic.span
-    return (span.line, span.column) if span else (0, 0)
+    def _source_order(self, diagnostic: Diagnostic) -> tuple[bool, str, int, int]:
+        span = diagnostic.span
+        return (span.path != self.path, span.path, span.line, span.column) if span else (False, "", 0, 0)
 
 
 # One line a code: what the code is about. The codes are stable; a retired one is never used again.
@@ -102,7 +102,7 @@ CODES: dict[str, str] = {
     "HS009": "a tag, which models do not use",
     "HS010": "more than one document in the file",
     "HS011": "the file is empty",
-    "HS012": "an alias without its anchor, or inside it",
+    "HS012": "an alias inside its own anchor",
     "HS013": "a key that is not a plain word",
     # expressions
     "HS101": "a character that expressions do not have",
@@ -148,7 +148,8 @@ CODES: dict[str, str] = {
     "HS312": "a data file with wrong content",
     "HS313": "a unit for something that does not exist",
     "HS314": "a reference to something that does not exist",
-    "HS315": "a transition or a domain in a mode that has no states",
+    "HS315": "a transition or a domain in a mode that has no states of its own",
+    "HS316": "two units for one name",
     "HS320": "both a step and a tolerance",
     "HS321": "a setting outside its range",
 }

@@ -146,8 +146,10 @@ class _Builder:
         terms = [-v.expr if minus else v.expr for v, (minus, _) in zip(values, tree.terms, strict=True)]
         if bounds.sum_bits(terms) > bounds.MOST_BITS:
             raise self.too_long(tree)
-        numbers = [v.number if v.number is None or not minus else -v.number
-                   for v, (minus, _) in zip(values, tree.terms, strict=True)]
+        numbers = [
+            v.number if v.number is None or not minus else -v.number
+            for v, (minus, _) in zip(values, tree.terms, strict=True)
+        ]
         return self.value(tree, sp.Add(*terms), numeric.total(numbers), values)
 
     def product(self, tree: Product) -> Value:
@@ -157,7 +159,8 @@ class _Builder:
             raise self.too_long(tree)
         for value, (divided, factor) in zip(values, tree.factors, strict=True):
             if divided and value.expr.is_zero and value.expr.is_number:
-                message = f"`{self.said(factor)}` is 0, and nothing can be divided by it"
+                text = self.said(factor)
+                message = "nothing can be divided by 0" + (f", and `{text}` is 0" if text != "0" else "")
                 raise ExpressionError("HS118", message, factor.start, factor.end)
         divided = [d for d, _ in tree.factors]
         factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]

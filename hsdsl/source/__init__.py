@@ -1,10 +1,11 @@
-"""YAML files as nodes with a line and a column, read by the core rules of YAML 1.2 and capped before anything recurses."""
+"""YAML files as nodes with a line and a column: the core rules of YAML 1.2, capped before anything recurses."""
 
 from hsdsl.source.compose import compose
-from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence
+from hsdsl.source.nodes import ABSENT, Key, Mapping, Node, Place, Scalar, Sequence, absent
 from hsdsl.source.text import Text, decode, read_bytes, reason
 
 __all__ = [
+    "ABSENT",
     "Key",
     "Mapping",
     "Node",
@@ -12,6 +13,7 @@ __all__ = [
     "Scalar",
     "Sequence",
     "Text",
+    "absent",
     "compose",
     "decode",
     "read_bytes",

@@ -42,7 +42,9 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
     if tab:
         return tab
     if "document start" in problem:
-        return text.diagnostic("HS010", "a second document begins here", text.span(line, column), "a file holds one model")
+        return text.diagnostic(
+            "HS010", "a second document begins here", text.span(line, column), "a file holds one model"
+        )
     if "quoted scalar" in (error.context or ""):
         return _quoted(text, problem, (line, column), opened)
     if "block scalar" in (error.context or ""):

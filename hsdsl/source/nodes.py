@@ -112,3 +112,9 @@ class Mapping:
 
 
 Node = Scalar | Sequence | Mapping
+ABSENT = "\0"  # the value of a scalar that stands for one already reported; no file can contain it
+
+
+def absent(place: Place) -> Scalar:
+    """A scalar in the place of something already reported, which nothing more is to be said about."""
+    return Scalar(ABSENT, False, place)

@@ -1,0 +1,138 @@
+# pyright: basic
+"""Documents to mathematics: names resolved, everything substituted, every error found."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hsdsl.elaborate.definitions import define_lets, define_parameters
+from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
+from hsdsl.elaborate.inputs import define_inputs
+from hsdsl.elaborate.modes import elaborate_modes
+from hsdsl.elaborate.outputs import elaborate_outputs
+from hsdsl.elaborate.reader import Reader, understood
+from hsdsl.elaborate.reference import elaborate_reference
+from hsdsl.elaborate.units import elaborate_units
+from hsdsl.elaborate.world import World
+from hsdsl.errors import Findings, ModelError, UsageError
+from hsdsl.expression.scope import Refusal, Scope, Value, symbol
+from hsdsl.expression.stack import deep_stack
+from hsdsl.expression.syntax import ExpressionError
+from hsdsl.schema import read
+from hsdsl.source import compose, decode, read_bytes
+from hsdsl.system import HybridSystem
+
+__all__ = ["elaborate", "parameter_expression"]
+
+
+def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
+    """The hybrid system that a model file describes.
+
+    Parameters
+    ----------
+    path : path
+        The model file.
+    text : bytes, optional
+        Its content, where it is not to be read from ``path``.
+
+    Returns
+    -------
+    HybridSystem
+        (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7, as SymPy expressions.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; all that were found are carried, in source order.
+    UsageError
+        The file cannot be read.
+    """
+    shown_path = os.fspath(path)
+    data = read_bytes(path) if text is None else text
+    findings = Findings(shown_path)
+    source = decode(shown_path, data)
+    document = read(compose(source, findings), findings)
+    world = World.of(document, Reader(findings), Path(path).parent, shown_path)
+    with deep_stack():
+        parts = _parts(world)
+    findings.raise_if_any()
+    digest = hashlib.sha256(b"".join((data, *world.files))).hexdigest()
+    title, about = world.text(document.title), world.text(document.source)
+    try:
+        return HybridSystem(path=shown_path, digest=digest, title=title, source=about, **parts)
+    except ValueError as error:  # a check at birth that no diagnostic foresaw
+        raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
+
+
+def _parts(world: World) -> dict[str, Any]:
+    """Everything of a system, in the order in which its parts build upon each other."""
+    parameters = define_parameters(world)
+    inputs = define_inputs(world)
+    define_lets(world)
+    outputs = elaborate_outputs(world)
+    modes = elaborate_modes(world, outputs)
+    initial = elaborate_initial(world)
+    experiment = elaborate_experiment(world)
+    units = elaborate_units(world)
+    reference = elaborate_reference(world, modes)
+    return dict(
+        parameters=parameters,
+        inputs=inputs,
+        modes=modes,
+        outputs=tuple(world.document.outputs),
+        output_texts=tuple(scalar.value for scalar in world.document.outputs.values()),
+        units=units,
+        initial=initial,
+        experiment=experiment,
+        reference=reference,
+    )
+
+
+def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:
+    """An expression of a model's parameters that is not in its file: the VALUE of ``--set NAME=VALUE``.
+
+    Parameters
+    ----------
+    system : HybridSystem
+        The model.
+    text : str
+        The expression; a plain number is one.
+    where : str
+        What it is for, which begins the sentence of an error: ``"--set c"``.
+    allowed : sequence of str, optional
+        The parameters it may use; all of them unless given.
+
+    Returns
+    -------
+    sympy.Expr
+
+    Raises
+    ------
+    UsageError
+        It is not an expression, or uses something else.
+    """
+    usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
+    scope = Scope(_override_values(system, usable), place=where)
+    try:
+        with deep_stack():
+            return understood(text, scope).expr
+    except ExpressionError as error:
+        raise UsageError(f"{where}: {error.message}", error.hint) from None
+
+
+def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Value | Refusal | None]:
+    states = [name for mode in system.modes for name in mode.states]
+    others = {"t": "the time", **dict.fromkeys(states, "a state")}
+    others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
+    values: dict[str, Value | Refusal | None] = {
+        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
+    }
+    for parameter in system.parameters:
+        name = parameter.name
+        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
+        values[name] = Value(symbol(name)) if name in usable else late
+    return values

@@ -1,0 +1,101 @@
+# pyright: basic
+"""Where a run starts, and what the file asks of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hsdsl.elaborate.definitions import parameter_scope
+from hsdsl.elaborate.edges import known_mode
+from hsdsl.elaborate.world import World
+from hsdsl.errors import STEP_AND_TOLERANCE
+from hsdsl.expression.scope import Scope, Value
+from hsdsl.names import did_you_mean, shown
+from hsdsl.source import Key, Scalar
+from hsdsl.system import Experiment, Initial
+
+_POSITIVE = ("step", "tolerance", "relaxation")
+
+
+def elaborate_initial(world: World) -> Initial:
+    """The initial mode and the values of its states."""
+    document = world.document.initial
+    scope = parameter_scope(world, "an initial value is an expression of parameters")
+    given: dict[Key, Scalar] = document.__pydantic_extra__
+    values = {str(key): world.reader.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
+    mode = known_mode(world, document.mode)
+    if mode is not None:
+        _check_states(world, mode, given)
+    return Initial(mode or "", tuple((name, v.expr) for name, v in values.items() if v is not None))
+
+
+def _check_states(world: World, mode: str, given: dict[Key, Scalar]) -> None:
+    document = world.document.modes[mode]  # pyright: ignore[reportArgumentType]
+    if document.flow is None:
+        return  # entered with whatever is given, or reported
+    states = world.states[mode]
+    for key in given:
+        if key not in states:
+            message = f"the mode '{mode}' has no state '{shown(key)}'"
+            world.reader.add(key.place, "HS308", message, did_you_mean(key, [s for s in states if s not in given]))
+    lacking = [f"'{s}'" for s in states if s not in given]
+    if lacking:
+        noun = "state" if len(lacking) == 1 else "states"
+        message = f"the {noun} {', '.join(lacking)} of the mode '{mode}' has no initial value"
+        if len(lacking) > 1:
+            message = message.replace(" has no ", " have no ")
+        world.reader.add(world.document.initial.mode.place, "HS308", message)
+
+
+def elaborate_experiment(world: World) -> Experiment:
+    """The settings of the file, as expressions of parameters."""
+    document = world.document.experiment
+    scope = parameter_scope(world, "a setting is an expression of parameters")
+    if document.step is not None and document.tolerance is not None:
+        message = "a run has either a `step` or a `tolerance`, not both"
+        last = max((document.step, document.tolerance), key=lambda scalar: scalar.place.start)
+        world.reader.add(last.place, STEP_AND_TOLERANCE, message, "keep the one that the method works with")
+    until = _setting(world, scope, "until", document.until)
+    numbers = {key: _setting(world, scope, key, getattr(document, key)) for key in (*_POSITIVE, "max_transitions")}
+    return Experiment(
+        until=until,
+        scheme=world.text(document.scheme),
+        method=world.text(document.method),
+        samples=_samples(world, scope, document.samples),
+        **numbers,
+    )
+
+
+def _setting(world: World, scope: Scope, key: str, scalar: Scalar | None) -> Any:
+    if scalar is None:
+        return None
+    value = world.reader.number(scalar, scope, finite_now=True)
+    if value is None:
+        return None
+    wanted = None
+    if value.constant:
+        wanted = _wanted(key, value)
+    if wanted:
+        world.reader.add(scalar.place, "HS321", f"`{key}` must be {wanted}, not {shown(scalar.value, 40)}")
+    return value.expr
+
+
+def _wanted(key: str, value: Value) -> str | None:
+    """What a constant setting must be, where it is not."""
+    whole = value.number == int(value.number)
+    if key in _POSITIVE and not value.number > 0:
+        return "positive"
+    if key == "until" and value.number < 0:
+        return "0 or a later time"
+    if key == "max_transitions" and (value.number < 0 or not whole):
+        return "a whole number"
+    if key == "samples" and (value.number < 2 or not whole):
+        return "a list of times, or a whole number of at least 2"
+    return None
+
+
+def _samples(world: World, scope: Scope, given: Scalar | list[Scalar] | None) -> Any:
+    if not isinstance(given, list):
+        return _setting(world, scope, "samples", given)
+    values = [world.reader.number(scalar, scope, finite_now=True) for scalar in given]
+    return tuple(v.expr for v in values if v is not None)

@@ -1,0 +1,63 @@
+# pyright: basic
+"""Inputs: expressions of time, which are substituted, and samples, which stay symbols."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from hsdsl.elaborate.samples import read_samples
+from hsdsl.elaborate.world import World
+from hsdsl.expression.scope import Scope, Value, symbol
+from hsdsl.schema import InputFile, InputSamples
+from hsdsl.source import Key, Scalar
+from hsdsl.system import SampledInput
+
+
+def define_inputs(world: World) -> tuple[SampledInput, ...]:
+    """The sampled inputs; what the name of every input means goes to ``world.values``."""
+    timed = world.scope(("time", "parameters"), "an input is an expression of t and parameters")
+    constant = world.scope(("parameters",), "samples are numbers or expressions of parameters")
+    found: list[SampledInput] = []
+    for name, entry in world.document.inputs.items():
+        if isinstance(entry, Scalar):
+            world.values[name] = world.reader.number(entry, timed)
+            continue
+        world.values[name] = Value(symbol(name))
+        sampled = _file(world, name, entry) if isinstance(entry, InputFile) else _inline(world, name, entry, constant)
+        if sampled is not None:
+            found.append(sampled)
+    return tuple(found)
+
+
+def _file(world: World, name: Key, entry: InputFile) -> SampledInput | None:
+    samples = read_samples(world, name, entry.file)
+    if samples is None:
+        return None
+    return SampledInput(name, entry.hold, *samples, unit=world.text(world.document.units.get(name)))
+
+
+def _inline(world: World, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
+    times = [world.reader.number(scalar, scope, finite_now=True) for scalar in entry.times]
+    values = [world.reader.number(scalar, scope, finite_now=True) for scalar in entry.values]
+    if len(times) != len(values):
+        message = f"the input '{name}' has {len(times)} times and {len(values)} values"
+        world.reader.add(name.place, "HS310", message, "give one value for each time")
+        return None
+    if not times:
+        world.reader.add(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
+        return None
+    if any(part is None for part in (*times, *values)):
+        return None
+    for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
+        if before.constant and after.constant and not before.number < after.number:
+            message = f"the times of the input '{name}' do not increase here"
+            world.reader.add(scalar.place, "HS310", message, "give each time once, the earliest first")
+    unit = world.text(world.document.units.get(name))
+    return SampledInput(name, entry.hold, tuple(map(_exact, times)), tuple(map(_exact, values)), unit)
+
+
+def _exact(value: Value) -> Any:
+    """An exact number where there is one."""
+    return Fraction(int(value.expr.p), int(value.expr.q)) if value.expr.is_Rational else value.expr

@@ -1,0 +1,72 @@
+# pyright: basic
+"""Modes: their flow, walls and edges."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+
+from hsdsl.elaborate.edges import elaborate_edges, surface
+from hsdsl.elaborate.outputs import outputs_of
+from hsdsl.elaborate.world import KINDS, World, later
+from hsdsl.expression.scope import Refusal, Scope, Value
+from hsdsl.schema import Mode as ModeDocument
+from hsdsl.source import Key
+from hsdsl.system import Mode
+
+
+def elaborate_modes(world: World, outputs: dict[str, Value | None]) -> tuple[Mode, ...]:
+    """Every mode, in file order. Where something is reported the modes are not complete, and no system is made."""
+    if not world.document.modes:
+        return ()
+    found = []
+    for name, document in world.document.modes.items():
+        mode = _mode(world, name, document, outputs)
+        if mode is not None:
+            found.append(mode)
+    return tuple(found)
+
+
+def _mode(world: World, name: Key, document: ModeDocument, outputs: dict[str, Value | None]) -> Mode | None:
+    if document.flow is None and not document.final:
+        message = f"the mode '{name}' has no `flow`"
+        world.reader.add(name.place, "HS304", message, "write `flow: {}` for a mode without states, or `final: true`")
+        return None
+    if world.without_states(document) and (document.transitions or document.domain):
+        message = f"the final mode '{name}' has no states of its own, and so neither a domain nor transitions"
+        world.reader.add(name.place, "HS315", message, "give it a `flow`, or leave them out")
+        return None
+    scope = mode_scope(world, name, document)
+    flow = [world.reader.number(scalar, scope) for scalar in (document.flow or {}).values()]
+    walls = [surface(world.reader, scalar, scope, "domain") for scalar in document.domain]
+    edges = elaborate_edges(world, name, document, scope)
+    if any(part is None for part in (*flow, *walls, *edges)):
+        return None
+    states = world.states[name]
+    return Mode(
+        name=str(name),
+        states=states,
+        flow=tuple(value.expr for value in flow),
+        flow_texts=tuple(scalar.value for scalar in (document.flow or {}).values()),
+        walls=tuple(walls),
+        edges=tuple(edges),
+        outputs=outputs_of(outputs, frozenset(states)),
+        final=document.final,
+    )
+
+
+def mode_scope(world: World, name: Key, document: ModeDocument) -> Scope:
+    """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
+    states = frozenset(world.states[name])
+    place = f"the mode '{name}'"
+    own: dict[str, Value | Refusal | None] = {}
+    base = ChainMap(own, world.values)  # pyright: ignore[reportArgumentType]
+    names = [str(key) for key in document.let]
+    for position, (key, scalar) in enumerate(document.let.items()):
+        kind = world.names.get(key)
+        if kind not in (None, "let"):
+            message = f"'{key}' is a `let` name of {place}, and also {KINDS[kind]}"
+            world.reader.add(key.place, "HS301", message, "give one of them another name")
+        waiting = later(names, position, "`let` names")
+        scope = Scope(ChainMap(waiting, own, world.values), states, place)  # pyright: ignore[reportArgumentType]
+        own[str(key)] = world.reader.number(scalar, scope)
+    return Scope(base, states, place)

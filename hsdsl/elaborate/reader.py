@@ -1,0 +1,107 @@
+# pyright: basic
+"""Scalars to values: parsed, looked up, translated, with every fault at its place in the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.errors import Findings
+from hsdsl.expression import ExpressionError, Wanted, numeric, parse, symbolic
+from hsdsl.expression.scope import Scope, Value
+from hsdsl.expression.symbolic import Inequality
+from hsdsl.expression.syntax import Tree
+from hsdsl.names import shown
+from hsdsl.source import ABSENT, Place, Scalar
+
+_NOT_FINITE = (".inf", "+.inf", "-.inf", ".nan", "inf", "+inf", "-inf", "infinity", "-infinity", "nan")
+
+
+def understood(text: str, scope: Scope) -> Value:
+    """The value of an expression that is in no file.
+
+    Raises
+    ------
+    ExpressionError
+        At its first fault.
+    """
+    tree = _tree(text, "number", scope)
+    faults = scope.faults(tree)
+    if faults:
+        raise faults[0]
+    return symbolic.number(tree, scope, text)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Reads expressions; what is wrong with them goes to ``findings``, and the answer is then None."""
+
+    findings: Findings
+
+    def add(self, place: Place, code: str, message: str, hint: str | None = None) -> None:
+        """Report a fault at a place."""
+        self.findings.add(place.diagnostic(code, message, hint))
+
+    def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
+        """The value of an expression; with ``finite_now`` it must have one with the file's own parameters."""
+        try:
+            tree = self._resolved(scalar, scope, "number")
+            value = symbolic.number(tree, scope, scalar.value) if tree else None
+        except ExpressionError as error:
+            self._report(scalar, error)
+            return None
+        if value and finite_now and value.number is not None and not numeric.finite(value.number):
+            message = f"`{shown(scalar.value, 40)}` has no finite real value with the parameters of this file"
+            self.add(scalar.place, "HS118", message)
+            return None
+        return value
+
+    def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
+        """The SymPy Boolean of a condition."""
+        try:
+            tree = self._resolved(scalar, scope, "condition")
+            return symbolic.condition(tree, scope, scalar.value) if tree else None
+        except ExpressionError as error:
+            self._report(scalar, error)
+            return None
+
+    def inequality(self, scalar: Scalar, scope: Scope, key: str) -> Inequality | None:
+        """The two sides of one inequality."""
+        try:
+            tree = self._resolved(scalar, scope, "inequality", key)
+            return symbolic.inequality(tree, scope, scalar.value, key) if tree else None
+        except ExpressionError as error:
+            self._report(scalar, error)
+            return None
+
+    def _resolved(self, scalar: Scalar, scope: Scope, wanted: Wanted, key: str = "") -> Tree | None:
+        """The tree of an expression all of whose names can be used; None where one's definition is broken."""
+        if scalar.value == ABSENT:
+            return None
+        text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
+        tree = _tree(text, wanted, scope)
+        if wanted == "inequality":
+            symbolic.refuse_all_but_one_inequality(tree, key)
+        faults = scope.faults(tree)
+        for fault in faults:
+            self._report(scalar, fault)
+        return None if faults or scope.broken(tree) else tree
+
+    def _report(self, scalar: Scalar, error: ExpressionError) -> None:
+        hint = error.hint
+        if error.code == "HS103" and scalar.plain and _cut_by_comment(scalar.place):
+            hint = "YAML begins a comment at ` #`: quote this expression"
+        span = scalar.span(error.start, error.end)
+        self.findings.add(scalar.place.text.diagnostic(error.code, error.message, span, hint))
+
+
+def _tree(text: str, wanted: Wanted, scope: Scope) -> Tree:
+    word = text.strip().lower()
+    if word in _NOT_FINITE and word.lstrip("+-") not in scope.values:
+        raise ExpressionError("HS118", f"`{text.strip()}` is not a finite number", 0, len(text))
+    return parse(text, wanted)
+
+
+def _cut_by_comment(place: Place) -> bool:
+    line = place.text.lines[place.end[1]]
+    return line[place.end[2] :].lstrip().startswith("#")

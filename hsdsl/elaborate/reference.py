@@ -1,0 +1,107 @@
+# pyright: basic
+"""What is known exactly: checked against the model, and kept as plain data with numbers as text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hsdsl.elaborate.definitions import parameter_scope
+from hsdsl.elaborate.edges import known_mode
+from hsdsl.elaborate.world import World
+from hsdsl.expression.scope import Scope
+from hsdsl.names import did_you_mean, shown
+from hsdsl.schema import Experiment, Reference
+from hsdsl.source import ABSENT, Key, Place, Scalar
+from hsdsl.system import Mode
+
+_WORDS = ("initial.mode", "experiment.scheme", "experiment.method")
+
+
+def elaborate_reference(world: World, modes: tuple[Mode, ...]) -> tuple[dict[str, Any], ...]:
+    """The references, with the keys of the file.
+
+    Each is ``{"set": {..}, "source": .., "trust": .., "transitions": [..], "states": [..]}`` with what the file gives;
+    a transition is always ``{"time": .., "edge": .., "before": {..}, "after": {..}}``. Numbers are the texts of
+    expressions of parameters.
+    """
+    checker = _Checker(world, modes)
+    return tuple(checker.reference(document) for document in world.document.reference)
+
+
+class _Checker:
+    """References against one model."""
+
+    def __init__(self, world: World, modes: tuple[Mode, ...]) -> None:
+        self.world = world
+        self.scope: Scope = parameter_scope(world, "a reference has numbers or expressions of parameters")
+        self.columns = [*world.all_states(), *map(str, world.document.outputs)]
+        self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
+        self.complete = len(modes) == len(world.document.modes)
+
+    def reference(self, document: Reference) -> dict[str, Any]:
+        """One reference."""
+        made: dict[str, Any] = {"set": self.settings(document.settings)}
+        if self.world.text(document.source) is not None:
+            made["source"] = self.world.text(document.source)
+        if document.trust is not None:
+            made["trust"] = self.number(document.trust)
+        made["transitions"] = [self.transition(event) for event in document.transitions]
+        made["states"] = [self.state(state) for state in document.states]
+        return {key: value for key, value in made.items() if value not in ({}, [])}
+
+    def settings(self, given: dict[Key, Scalar]) -> dict[str, str]:
+        """What differs from the file."""
+        for key, scalar in given.items():
+            group, dot, rest = key.partition(".")
+            if key == "initial.mode":
+                known_mode(self.world, scalar)
+            elif key not in _WORDS:
+                self.number(scalar)
+            if not dot:
+                self.known(group, key.place, "parameter", [n for n in self.world.document.parameters])
+            elif group == "initial":
+                self.known(rest, key.place, "state", ["mode", *self.world.all_states()])
+            elif group == "experiment":
+                self.known(rest, key.place, "setting", list(Experiment.model_fields))
+            else:
+                self.known(group, key.place, "group", ["initial", "experiment"])
+        return {str(key): scalar.value for key, scalar in given.items()}
+
+    def transition(self, event: Any) -> dict[str, Any]:
+        """A transition, also where its time alone is given."""
+        if isinstance(event, Scalar):
+            return {"time": self.number(event)}
+        made: dict[str, Any] = {"time": self.number(event.time)}
+        if event.edge is not None and event.edge.value != ABSENT:
+            if self.complete:
+                self.known(event.edge.value, event.edge.place, "transition", self.edges)
+            made["edge"] = event.edge.value
+        for side in ("before", "after"):
+            if getattr(event, side):
+                made[side] = self.columns_of(getattr(event, side))
+        return made
+
+    def state(self, state: Any) -> dict[str, Any]:
+        """A state at a time."""
+        made: dict[str, Any] = {"time": self.number(state.time)}
+        if state.mode is not None:
+            known_mode(self.world, state.mode)
+            made["mode"] = state.mode.value
+        return {**made, **self.columns_of(state.__pydantic_extra__)}
+
+    def columns_of(self, given: dict[Key, Scalar]) -> dict[str, str]:
+        """Values of states and outputs."""
+        for key in given:
+            self.known(key, key.place, "state or output", self.columns)
+        return {str(key): self.number(scalar) for key, scalar in given.items()}
+
+    def number(self, scalar: Scalar) -> str:
+        """The text of an expression of parameters."""
+        self.world.reader.number(scalar, self.scope)
+        return scalar.value
+
+    def known(self, name: str, place: Place, kind: str, names: list[str]) -> None:
+        """Report a name that nothing has."""
+        if name not in names:
+            message = f"there is no {kind} '{shown(name)}'"
+            self.world.reader.add(place, "HS314", message, did_you_mean(name, names))

@@ -1,0 +1,136 @@
+"""Samples of an input from a CSV file: exact numbers, and the row and column of what is wrong."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+from hsdsl.elaborate.world import World
+from hsdsl.errors import Diagnostic, Span
+from hsdsl.names import did_you_mean, shown
+from hsdsl.source import ABSENT, Key, Scalar, reason
+
+LARGEST_FILE = 64 << 20  # bytes
+_MOST_FAULTS = 10  # of one file: a wrong column would bury everything else
+_NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE][+-]?[0-9]{1,3})?")
+
+Samples = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+
+
+def read_samples(world: World, name: Key, file: Scalar) -> Samples | None:
+    """Times and values of the column ``name``; None where the file has faults, which are reported."""
+    if file.value == ABSENT:
+        return None
+    path = _inside(world, file)
+    data = None if path is None else _bytes(world, file, path)
+    if path is None or data is None:
+        return None
+    world.files.append(data)
+    try:
+        lines = data.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        world.reader.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
+        return None
+    table = _Table(str(path), lines)
+    samples = table.samples(name)
+    for diagnostic in table.faults:
+        world.reader.findings.add(diagnostic)
+    return None if table.faults else samples
+
+
+def _inside(world: World, file: Scalar) -> Path | None:
+    """The file's path, if it stays in the model's folder."""
+    given = Path(file.value)
+    folder = world.folder.resolve()
+    try:
+        inside = not given.is_absolute() and (folder / given).resolve().is_relative_to(folder)
+    except (OSError, ValueError, RuntimeError):
+        inside = False
+    if inside:
+        return world.folder / given
+    message = f"the file '{shown(file.value)}' is not in the folder of the model"
+    world.reader.add(file.place, "HS311", message, "put it there and write its path from that folder")
+    return None
+
+
+def _bytes(world: World, file: Scalar, path: Path) -> bytes | None:
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        message = f"the file '{shown(file.value)}' cannot be read: {reason(error)}"
+        world.reader.add(file.place, "HS311", message, "its path is taken from the folder of the model")
+        return None
+    if len(data) > LARGEST_FILE:
+        world.reader.add(file.place, "HS311", f"the file '{shown(file.value)}' is larger than 64 MiB")
+        return None
+    return data
+
+
+class _Table:
+    """A comma-separated table, and what is wrong with it."""
+
+    def __init__(self, path: str, lines: list[str]) -> None:
+        self.path = path
+        self.lines = lines
+        self.faults: list[Diagnostic] = []
+
+    def samples(self, name: str) -> Samples | None:
+        """The columns ``time`` and ``name``."""
+        columns = [cell.strip().strip('"') for cell in self.lines[0].split(",")] if self.lines else []
+        if "time" not in columns or name not in columns:
+            there = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
+            message = f"the header must be `time,{name}`, and has {there}"
+            self.fault(1, 1, len(self.lines[0]) if self.lines else 1, message, did_you_mean(name, columns))
+            return None
+        wanted = (columns.index("time"), columns.index(name))
+        times: list[Fraction] = []
+        values: list[Fraction] = []
+        for number, line in enumerate(self.lines[1:], start=2):
+            if line.strip() and len(self.faults) < _MOST_FAULTS:
+                self.row(number, line, len(columns), wanted, times, values)
+        if not times and not self.faults:
+            self.fault(1, 1, len(self.lines[0]), "the file has no rows below its header")
+        return tuple(times), tuple(values)
+
+    def row(
+        self,
+        number: int,
+        line: str,
+        width: int,
+        wanted: tuple[int, int],
+        times: list[Fraction],
+        values: list[Fraction],
+    ) -> None:
+        """One sample."""
+        cells = line.split(",")
+        if len(cells) != width:
+            self.fault(number, 1, len(line), f"this row has {len(cells)} columns and the header {width}")
+            return
+        time, value = (self.cell(number, cells, column) for column in wanted)
+        if time is None or value is None:
+            return
+        if times and time <= times[-1]:
+            start = len(",".join(cells[: wanted[0]])) + (1 if wanted[0] else 0)
+            self.fault(number, start + 1, len(cells[wanted[0]]), "the times do not increase here")
+            return
+        times.append(time)
+        values.append(value)
+
+    def cell(self, number: int, cells: list[str], column: int) -> Fraction | None:
+        """One number, exactly."""
+        text = cells[column].strip().strip('"').strip()
+        if _NUMBER.fullmatch(text):
+            value = Fraction(text)
+            if abs(value) < 2**1024:
+                return value
+        start = sum(len(cell) + 1 for cell in cells[:column])
+        message = f"'{shown(text, 40)}' in column {column + 1} is not a finite number"
+        self.fault(number, start + 1, max(1, len(cells[column])), message)
+        return None
+
+    def fault(self, line: int, column: int, length: int, message: str, hint: str | None = None) -> None:
+        """Report something at a place of the table."""
+        text = self.lines[line - 1] if line <= len(self.lines) else ""
+        self.faults.append(Diagnostic("HS312", message, Span(self.path, line, column, max(1, length)), hint, text))

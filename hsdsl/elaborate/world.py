@@ -1,0 +1,104 @@
+# pyright: basic
+"""What is known of a model while it is elaborated: its document, and what each of its names means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hsdsl.elaborate.reader import Reader
+from hsdsl.expression.scope import Refusal, Scope, Value, state
+from hsdsl.schema import Mode, Model
+from hsdsl.source import ABSENT, Key, Scalar
+from hsdsl.system import TIME
+
+KINDS = {"parameters": "a parameter", "inputs": "an input", "states": "a state", "let": "a `let` name"}
+Values = dict[str, Value | Refusal | None]
+
+
+@dataclass
+class World:
+    """A document with its names.
+
+    Attributes
+    ----------
+    names : dict of str to str
+        Every name that is not of one mode alone, and which of :data:`KINDS` it is.
+    values : dict
+        What each of those names that is defined so far means; ``t`` is there from the start.
+    states : dict
+        The states of each mode in file order; empty for a final mode without a flow.
+    files : list of bytes
+        The data files that were read.
+    """
+
+    document: Model
+    reader: Reader
+    folder: Path
+    path: str
+    names: dict[str, str] = field(default_factory=dict)
+    values: Values = field(default_factory=dict)
+    states: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    files: list[bytes] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, document: Model, reader: Reader, folder: Path, path: str) -> World:
+        """A document with its names gathered and their clashes reported."""
+        world = cls(document, reader, folder, path)
+        for key in document.parameters:
+            world._claim(key, "parameters")
+        for key in document.inputs:
+            world._claim(key, "inputs")
+        for name, mode in document.modes.items():
+            world.states[name] = tuple(map(str, mode.flow or ()))
+            for key in mode.flow or ():
+                world._claim(key, "states")
+        for key in document.let:
+            world._claim(key, "let")
+        world.values["t"] = Value(TIME)
+        for name, kind in world.names.items():
+            if kind == "states":
+                world.values[name] = state(name)
+        return world
+
+    def _claim(self, key: Key, kind: str) -> None:
+        taken = self.names.setdefault(key, kind)
+        if taken != kind:
+            message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
+            self.reader.add(key.place, "HS301", message, "give one of them another name")
+
+    def scope(self, usable: tuple[str, ...], sentence: str, values: Values | None = None) -> Scope:
+        """A scope with names of some kinds; the others are refused with a sentence."""
+        found: Values = {"t": self.values["t"] if "time" in usable else _refused("t", "the time", sentence)}
+        for name, kind in self.names.items():
+            if kind in usable:
+                if name in self.values:
+                    found[name] = self.values[name]
+            else:
+                found[name] = _refused(name, KINDS[kind], sentence)
+        return Scope({**found, **(values or {})})
+
+    def text(self, scalar: Scalar | None) -> str | None:
+        """The text of a scalar that may be missing."""
+        return None if scalar is None or scalar.value == ABSENT else scalar.value
+
+    def all_states(self) -> tuple[str, ...]:
+        """Every state of every mode, once."""
+        return tuple(name for name, kind in self.names.items() if kind == "states")
+
+    def without_states(self, mode: Mode) -> bool:
+        """Whether a mode has the states it is entered with, and none of its own."""
+        return mode.final and mode.flow is None
+
+
+def _refused(name: str, kind: str, sentence: str) -> Refusal:
+    return Refusal("HS117", f"'{name}' is {kind}; {sentence}")
+
+
+def later(names: list[str], position: int, kind: str) -> Values:
+    """Refusals for the name at a position, and for those after it, of definitions that may use earlier ones only."""
+    own = names[position]
+    refused: Values = {own: Refusal("HS302", f"'{own}' is defined by itself")}
+    for name in names[position + 1 :]:
+        refused[name] = Refusal("HS302", f"'{name}' is defined below; {kind} use earlier ones only", "move it up")
+    return refused
