@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy.typing as npt
 
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.same import same
-from hsdsl.execution.sampling import Samples, Side, evaluate, find
+from hsdsl.execution.sampling import ArcTable, Samples, Side, evaluate, find
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
@@ -96,7 +97,12 @@ class Execution:
         """The first and the last time."""
         return self.times[0], self.times[-1]
 
-    @property
+    @cached_property
+    def arc_table(self) -> ArcTable:
+        """The arcs as columns."""
+        return ArcTable(self.arcs)
+
+    @cached_property
     def states(self) -> tuple[str, ...]:
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))

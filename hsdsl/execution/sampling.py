@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hsdsl.errors import UsageError
+from hsdsl.execution.parts import Arc
 
 if TYPE_CHECKING:
     from hsdsl.execution.run import Execution
@@ -91,6 +92,19 @@ class Samples:
         return pandas.DataFrame({label: values for label, values, _ in self.columns()})
 
 
+class ArcTable:
+    """The arcs as columns: each distinct tuple of states is one layout."""
+
+    def __init__(self, arcs: Sequence[Arc]) -> None:
+        self.first = np.array([arc.first for arc in arcs])
+        self.mode = np.array([arc.mode for arc in arcs])
+        self.jump = np.array([arc.jump for arc in arcs])
+        self.kind = np.array([arc.kind for arc in arcs])
+        self.layouts = list(dict.fromkeys(arc.states for arc in arcs))
+        number = {layout: i for i, layout in enumerate(self.layouts)}
+        self.layout = np.array([number[arc.states] for arc in arcs])
+
+
 def optional(library: str, what: str) -> Any:
     """Import a library of the ``table`` extra, or say how to get it."""
     try:
@@ -151,7 +165,7 @@ def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
     times : array, shape (n,)
         Of the execution's number type, not before the row's time; equal to it for an arc's last row.
     """
-    at = _ArcTable(execution)
+    at = execution.arc_table
     arcs = np.searchsorted(at.first, rows, side="right") - 1
     inner = np.asarray(times > execution.times[rows], dtype=bool)
     follower = np.minimum(rows + 1, len(execution.times) - 1)
@@ -177,20 +191,6 @@ def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
     )
 
 
-class _ArcTable:
-    """The arcs as columns: each distinct tuple of states is one layout."""
-
-    def __init__(self, execution: Execution) -> None:
-        arcs = execution.arcs
-        self.first = np.array([arc.first for arc in arcs])
-        self.mode = np.array([arc.mode for arc in arcs])
-        self.jump = np.array([arc.jump for arc in arcs])
-        self.kind = np.array([arc.kind for arc in arcs])
-        self.layouts = list(dict.fromkeys(arc.states for arc in arcs))
-        number = {layout: i for i, layout in enumerate(self.layouts)}
-        self.layout = np.array([number[arc.states] for arc in arcs])
-
-
 def _states(execution: Execution, rows: Array, follower: Array, fraction: Array, moving: Array) -> Array:
     values = execution.values[rows]
     k, s = rows[moving], fraction[moving][:, None]
@@ -213,7 +213,7 @@ def _outputs(
     inner: Array,
     times: Array,
     values: Array,
-    at: _ArcTable,
+    at: ArcTable,
     arcs: Array,
 ) -> Array:
     outputs = execution.outputs[rows]
@@ -231,7 +231,7 @@ def _outputs(
     return outputs
 
 
-def _by_name(states: Sequence[str], values: Array, at: _ArcTable, arcs: Array) -> tuple[Array, Array]:
+def _by_name(states: Sequence[str], values: Array, at: ArcTable, arcs: Array) -> tuple[Array, Array]:
     columns = np.full((len(values), len(states)), float("nan"), dtype=values.dtype)
     present = np.zeros(columns.shape, dtype=bool)
     for number, layout in enumerate(at.layouts):

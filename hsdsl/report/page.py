@@ -33,8 +33,8 @@ def _transitions(execution: Execution, limit: int) -> str:
     head, tail = words.shortened(len(transitions), limit)
     instants = words.times([transitions[i].time for i in (*head, *tail)])
     rows = [_row(transitions[i], time) for i, time in zip((*head, *tail), instants, strict=True)]
-    if tail:
-        left_out = len(transitions) - len(rows)
+    left_out = len(transitions) - len(rows)
+    if left_out:
         rows.insert(len(head), f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
     names = ("#", "time", "delay", "edge", "from &rarr; to", "state")
     header = "".join(f"<th>{name}</th>" for name in names)

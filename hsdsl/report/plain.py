@@ -85,7 +85,7 @@ def dumps(value: Any, width: int = WIDTH) -> str:
     needs. A list or object that fits on a line of ``width`` characters is written on one.
     """
     ready = plain(value)
-    return "".join(_written(ready, decimals.bits(_leaves(ready)), "", width))
+    return "".join(_written(ready, decimals.bits(_leaves(ready)), "", width, width))
 
 
 def _leaves(value: Any) -> Iterator[Any]:
@@ -98,11 +98,11 @@ def _leaves(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _written(value: Any, precision: int, indent: str, width: int) -> Iterator[str]:
+def _written(value: Any, precision: int, indent: str, width: int, room: int) -> Iterator[str]:
     if not isinstance(value, (dict, list)):
         yield _leaf(value, precision)
         return
-    short = _one_line(value, precision, width - len(indent))
+    short = _one_line(value, precision, room)
     if short is not None:
         yield short
         return
@@ -111,7 +111,7 @@ def _written(value: Any, precision: int, indent: str, width: int) -> Iterator[st
     separator = opening + "\n"
     for key, item in _items(value):
         yield separator + inner + key
-        yield from _written(item, precision, inner, width)
+        yield from _written(item, precision, inner, width, width - len(inner + key) - len(","))
         separator = ",\n"
     yield f"\n{indent}{closing}"
 
@@ -143,4 +143,6 @@ def _one_line(value: Any, precision: int, room: int) -> str | None:
 
 
 def _leaf(value: Any, precision: int) -> str:
-    return decimals.text(value, precision) if decimals.is_multiprecision(value) else json.dumps(value)
+    if isinstance(value, float) or decimals.is_multiprecision(value):
+        return decimals.text(value, precision)
+    return json.dumps(value)

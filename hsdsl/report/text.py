@@ -69,7 +69,7 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
     notes = ["state", *("; ".join(filter(None, (words.changes(t), words.remarks(t)))) for t in shown)]
     for i, (line, note) in enumerate(zip(_aligned(table), notes, strict=True)):
         yield from _row(line, note, columns)
-        if tail and i == len(head):
+        if i == len(head) and len(shown) < len(transitions):
             yield f"   ... {len(transitions) - len(shown)} more ..."
 
 

@@ -200,7 +200,7 @@ BROKEN = {
     "arcs must cover the rows": lambda run: {"arcs": run.arcs[:-1]},
     "arcs must follow each other": lambda run: {"arcs": (run.arcs[0], replace(run.arcs[1], first=3))},
     "time must not run backwards": lambda run: {"times": run.times[::-1]},
-    "an arc must begin at the time": lambda run: {"times": run.times + [0, 0, 0.25, 0.5]},
+    "an arc must begin at the time": lambda run: {"times": run.times + np.array([0, 0, 0.25, 0.5])},
 }
 
 

@@ -318,7 +318,7 @@ def test_a_failure_leaves_what_was_there(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setitem(store._TABLES, ".csv", full)
-    with pytest.raises(UsageError, match="cannot write .*run.csv: No space left on device"):
+    with pytest.raises(UsageError, match=r"cannot write .*run\.csv: No space left on device"):
         run.save(tmp_path / "run.csv")
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -333,7 +333,7 @@ def test_an_interruption_leaves_nothing_behind(error, tmp_path):
 
 def test_a_sidecar_that_cannot_be_written_spoils_the_table_too(tmp_path):
     (tmp_path / "run.csv.json").mkdir()
-    with pytest.raises(UsageError, match="run.csv.json: it is a folder"):
+    with pytest.raises(UsageError, match=r"run\.csv\.json: it is a folder"):
         hand_made.jumping_input().save(tmp_path / "run.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv.json"]
 

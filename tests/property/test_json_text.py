@@ -1,0 +1,25 @@
+"""JSON text keeps every value."""
+
+from __future__ import annotations
+
+import json
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hsdsl import report
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+LEAVES = st.none() | st.booleans() | st.integers() | FINITE | st.text()
+VALUES = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=30)
+
+
+@given(VALUES, st.integers(10, 120))
+def test_what_is_read_back_is_what_was_written(value, width):
+    assert json.loads(report.dumps(value, width)) == value
+
+
+@given(VALUES)
+def test_the_text_is_the_standard_library_s_up_to_white_space(value):
+    assert json.loads(report.dumps(value)) == json.loads(json.dumps(value))
+    assert report.dumps(value, width=10**9) == json.dumps(value)

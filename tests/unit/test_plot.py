@@ -1,0 +1,255 @@
+"""Pictures of runs: what is drawn, where it is broken, and the files it ends in."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import hand_made
+import numpy as np
+import pytest
+
+from hsdsl import decimals
+from hsdsl.errors import UsageError
+from hsdsl.execution import Stop
+from hsdsl.plot import GuardLine, plot
+from hsdsl.plot.colours import colours
+from hsdsl.plot.curves import CELLS, SEVERAL, curves, limits, line
+from hsdsl.plot.figure import draw
+
+FIFTY = decimals.context_of(50)
+FLOOR = GuardLine("fly", "h", 0.0, "h <= 0")
+
+
+def _figure(run, **options):
+    return draw(run, **{"guards": (), "units": {}, "title": None} | options)
+
+
+def _curve(axis):
+    """Take the panel's main line: the longest of those without markers."""
+    plain = [drawn for drawn in axis.get_lines() if drawn.get_marker() == "None"]
+    return max(plain, key=lambda drawn: len(drawn.get_xdata()))
+
+
+def test_a_big_step_is_drawn_as_the_curve_it_is():
+    run = hand_made.bouncing_ball(bounces=0, pieces=1)  # one step for the whole flight
+    x, y = _curve(_figure(run).axes[0]).get_data()
+    middles = (x[1:] + x[:-1]) / 2
+    assert np.max(np.abs((y[1:] + y[:-1]) / 2 - (2 - middles**2 / 2))) < 2e-4
+
+
+def test_jumps_are_not_joined():
+    run = hand_made.bouncing_ball(bounces=2, wait=0.125)
+    figure = _figure(run)
+    h, v, energy = (_curve(axis).get_ydata() for axis in figure.axes[:3])
+    assert [np.isnan(values).sum() for values in (h, v, energy)] == [0, 2, 2]  # the height does not jump
+    before, after = v[np.flatnonzero(np.isnan(v)) - 1], v[np.flatnonzero(np.isnan(v)) + 1]
+    assert (before.tolist(), after.tolist()) == ([-2.0, -1.0], [1.0, 0.5])
+
+
+def test_a_state_is_drawn_only_where_the_mode_has_it():
+    draft = hand_made.Draft()
+    draft.arc("a", ("x",), 0, [(0.0, [0.0], [], 0.0, []), (1.0, [1.0], [], 0.0, [])])
+    draft.arc("b", ("y",), 1, [(1.0, [5.0], [], 0.0, []), (2.0, [6.0], [], 0.0, [])])
+    draft.arc("a", ("x",), 2, [(2.0, [1.0], [], 0.0, []), (3.0, [0.0], [], 0.0, [])])
+    x, y = _curve(_figure(draft.make()).axes[0]).get_data()
+    drawn = x[~np.isnan(y)]
+    assert drawn.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert np.isnan(y[np.flatnonzero(x == 1.0)[0] + 1])  # nothing between 1 and 2
+
+
+def test_an_input_s_jump_breaks_the_output_but_not_the_state():
+    figure = _figure(hand_made.jumping_input())
+    assert [np.isnan(_curve(axis).get_ydata()).sum() for axis in figure.axes] == [0, 1]
+
+
+def test_two_states_have_a_phase_plot_and_three_have_not():
+    assert len(_figure(hand_made.bouncing_ball()).axes) == 2 + 1 + 1
+    assert len(_figure(hand_made.modes_of_different_size()).axes) == 4 + 1
+
+
+def test_bands_are_the_modes_over_time():
+    assert curves(hand_made.thermostat(2)).bands == [("on", 0.0, 1.0), ("off", 1.0, 2.0), ("on", 2.0, 3.0)]
+    assert curves(hand_made.modes_of_different_size()).bands == [("a", 0.0, 3.0)]
+
+
+def test_bands_too_narrow_to_see_are_of_several_modes():
+    data = curves(hand_made.thermostat(10_000))
+    assert data.bands == [(SEVERAL, 0.0, 10_001.0)]
+    slow_then_fast = hand_made.thermostat(1000)
+    stretched = replace(slow_then_fast, times=np.where(slow_then_fast.times >= 1, slow_then_fast.times + 2000, 0))
+    bands = curves(stretched).bands
+    assert bands[0][0] == "on"
+    assert bands[0][2] == pytest.approx(2001, abs=3)
+
+
+def test_every_mode_has_a_colour_of_its_own():
+    modes = [f"mode{i}" for i in range(14)]
+    assert len(set(colours(modes).values())) == 14
+
+
+def test_names_of_modes_stand_above_their_bands_or_in_a_legend():
+    few = _figure(hand_made.thermostat(2))
+    assert {"on", "off"} <= {text.get_text() for text in few.axes[0].texts}
+    assert few.legends == []
+    many = _figure(hand_made.thermostat(50))
+    assert [text.get_text() for text in many.legends[0].get_texts()] == ["on", "off"]
+
+
+def test_stop_levels_are_dotted_lines_where_their_mode_is():
+    guards = [
+        GuardLine("on", "T", 1.0, "T >= 1"),
+        GuardLine("never", "T", 0.5, "no"),
+        GuardLine("on", "T", 99.0, "far"),
+    ]
+    axis = _figure(hand_made.thermostat(2), guards=guards).axes[0]
+    dotted = [drawn for drawn in axis.collections if hasattr(drawn, "get_segments")]
+    segments = [segment.tolist() for drawn in dotted for segment in drawn.get_segments()]
+    assert segments == [[[0.0, 1.0], [1.0, 1.0]], [[2.0, 1.0], [3.0, 1.0]]]
+    assert "T >= 1" in {text.get_text() for text in axis.texts}
+    assert axis.get_ylim()[1] < 2  # a level far away does not squash the curve
+
+
+@pytest.mark.parametrize(("transitions", "markers"), [(4, 2), (60, 2), (61, 1), (400, 1), (401, 0)])
+def test_markers_are_thinned_out(transitions, markers):
+    axis = _figure(hand_made.thermostat(transitions)).axes[0]
+    marked = [drawn for drawn in axis.get_lines() if drawn.get_marker() == "o"]
+    assert [len(drawn.get_xdata()) for drawn in marked] == [transitions] * markers
+
+
+@pytest.mark.parametrize("states", [1, 2, 7, 17])
+def test_the_figure_grows_with_its_panels(states):
+    draft = hand_made.Draft()
+    names = tuple(f"x{i}" for i in range(states))
+    draft.arc("m", names, 0, [(0.0, [0.0] * states, [], 0.0, []), (1.0, [1.0] * states, [], 0.0, [])])
+    figure = _figure(draft.make())
+    assert len(figure.axes) == states + (states == 2)
+    figure.draw_without_rendering()
+    inches = [axis.get_position().height * figure.get_figheight() for axis in figure.axes]
+    assert min(inches) > 0.9
+
+
+def test_units_and_title_stand_where_they_are_looked_for():
+    figure = _figure(hand_made.bouncing_ball(), units={"h": "m", "t": "s"}, title="a $b$ title")
+    assert figure.axes[0].get_ylabel() == "h [m]"
+    assert figure.axes[1].get_ylabel() == "v"
+    assert figure.axes[2].get_xlabel() == "time t [s]"
+    assert figure.get_suptitle() == "a $b$ title"
+
+
+def test_a_bad_end_is_said_and_does_not_squash_what_came_before():
+    figure = _figure(hand_made.blow_up())
+    assert figure.axes[0].get_ylim()[1] < 100
+    assert "stopped: not_finite at t = 1." in figure.axes[0].get_title(loc="left")
+
+
+@pytest.mark.parametrize(
+    ("values", "low", "high"),
+    [
+        ([3.0, 3.0], 2.7, 3.3),
+        ([0.0, 0.0], -1.0, 1.0),
+        ([-1e-17, 1e-17], -1.0, 1.0),
+        ([0.0, 16.0], -1.0, 17.0),
+        ([np.nan, np.inf], -1.0, 1.0),
+        ([1e-15, 1.0, np.nan, -np.inf], 1e-15 - 1 / 16, 1 + 1 / 16),
+        ([-1.7e308, 1.7e308], -1.7e308 * 1.125, 1.7e308 * 1.125),
+    ],
+)
+def test_limits(values, low, high):
+    values = np.array(values)
+    assert limits(values, np.linspace(0, 1, len(values)), False) == pytest.approx((low, high))
+
+
+def test_a_thinned_line_is_the_line_to_within_a_cell():
+    rng = np.random.default_rng(1)
+    x = np.sort(rng.random(50_000))
+    y = np.sin(9 * x)
+    begins = np.zeros(len(x), dtype=bool)
+    begins[::1000] = True
+    thin_x, thin_y = line(x, y, begins, (0.0, 1.0, -1.0, 1.0))
+    drawn = ~np.isnan(thin_x)
+    assert drawn.sum() < len(x) / 2
+    assert np.max(np.abs(np.interp(x, thin_x[drawn], thin_y[drawn]) - y)) < 2 * 2 / CELLS
+    assert thin_x[0] == x[0]
+    assert thin_x[-1] == x[-1]
+
+
+RUNS = {
+    "strips": lambda: hand_made.bouncing_ball(wait=0.1),
+    "modes": hand_made.modes_of_different_size,
+    "input": hand_made.jumping_input,
+    "bad end": hand_made.blow_up,
+    "fifty digits": lambda: hand_made.bouncing_ball(convert=FIFTY.mpf, digits=50),
+    "many": lambda: hand_made.thermostat(3000),
+    "hostile names": lambda: hand_made.thermostat(3, heats="<script>$\\frac{", cools="名前 & $x"),
+}
+
+
+@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_every_run_can_be_drawn(run, suffix, tmp_path):
+    path = tmp_path / f"run{suffix}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plot(RUNS[run](), path, guards=[FLOOR])
+    assert path.read_bytes().startswith({".png": b"\x89PNG", ".svg": b"<?xml"}[suffix])
+    assert path.stat().st_size < 1_000_000
+    if suffix == ".svg":
+        ElementTree.parse(path)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".html"])
+def test_the_same_run_gives_the_same_file(suffix, tmp_path):
+    paths = [tmp_path / f"{name}{suffix}" for name in ("one", "two")]
+    for path in paths:
+        plot(hand_made.bouncing_ball(wait=0.1), path, guards=[FLOOR])
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_page_stands_alone(tmp_path):
+    run = replace(hand_made.bouncing_ball(), title="Ball & <floor>")
+    plot(run, tmp_path / "run.html")
+    page = (tmp_path / "run.html").read_text(encoding="utf-8")
+    names_of_xml = page.replace("http://www.w3.org/2000/svg", "").replace("http://www.w3.org/1999/xlink", "")
+    assert "http" not in names_of_xml
+    assert "<script" not in page
+    assert "<title>Ball &amp; &lt;floor&gt;</title>" in page
+    assert "v: -2 -&gt; 1" in page
+
+
+def test_an_unknown_suffix_is_refused(tmp_path):
+    with pytest.raises(UsageError, match=r"should end in .png, .svg or .html"):
+        plot(hand_made.jumping_input(), tmp_path / "run.pdf")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_that_cannot_be_written_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="there is no folder"):
+        plot(hand_made.jumping_input(), tmp_path / "no" / "run.png")
+
+
+def test_a_run_of_one_instant_can_be_drawn(tmp_path):
+    draft = hand_made.Draft()
+    draft.arc("only", ("x",), 0, [(0.0, [3.0], [], 0.0, [])])
+    run = replace(draft.make("final"), stop=Stop("left_domain", 0.0, "It started outside."))
+    plot(run, tmp_path / "run.svg")
+
+
+def test_nobody_s_matplotlib_is_disturbed(tmp_path):
+    code = (
+        "import sys, matplotlib, hand_made\n"
+        "before = matplotlib.rcParams.copy()\n"
+        "from hsdsl.plot import plot\n"
+        f"plot(hand_made.jumping_input(), {str(tmp_path / 'run.png')!r})\n"
+        "assert matplotlib.rcParams.copy() == before\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})
+
+
+def test_importing_the_plot_costs_no_matplotlib():
+    code = "import sys, hsdsl.plot, hsdsl.report, hsdsl.store\nassert 'matplotlib' not in sys.modules\n"
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})
