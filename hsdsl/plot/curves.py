@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,8 @@ class Curves:
     jumps : array of int
         The points that a transition led to; the one before each is what it came from.
     bands : list of (mode, begin, end)
-        When which mode was occupied, without those occupied for no time; :data:`SEVERAL` where they are too many to
-        tell apart.
+        When which mode was occupied, without times too short to see; :data:`SEVERAL` where they are too many to tell
+        apart.
     """
 
     samples: Samples
@@ -97,13 +98,23 @@ def _points(run: Execution) -> tuple[Array, Array]:
 def _bands(run: Execution) -> list[tuple[str, float, float]]:
     bands = _merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
     if len(bands) <= BANDS:
-        return bands
+        return _visible(bands)
     edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
     begins, ends = np.array([band[1] for band in bands]), np.array([band[2] for band in bands])
     earliest: list[int] = np.searchsorted(ends, edges[:-1], side="right").tolist()
     latest: list[int] = (np.searchsorted(begins, edges[1:], side="left") - 1).tolist()
     modes = [bands[i][0] if i == k else SEVERAL for i, k in zip(earliest, latest, strict=True)]
     return _merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
+
+
+def _visible(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+    """Leave out the bands narrower than a cell; the band before one covers it."""
+    if not bands:
+        return bands
+    start, end = bands[0][1], bands[-1][2]
+    wide = [band for band in bands if band[2] - band[1] >= (end - start) / CELLS]
+    begins = [start, *(band[1] for band in wide[1:]), end]
+    return _merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
 
 
 def _merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:

@@ -40,8 +40,7 @@ def draw_panel(
         axis.plot(time, values, "o", color=INK, markersize=4)
     if ends_badly:
         axis.axvline(data.span[1], color=ALARM, linewidth=1.2)
-    for guard in guards:
-        _draw_guard(axis, data, guard, (low, high))
+    _draw_guards(axis, data, guards, (low, high))
     if not np.isfinite(values).any():
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
     axis.set_ylabel(label(name, units), parse_math=False)
@@ -109,15 +108,22 @@ def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[flo
     return low, high
 
 
-def _draw_guard(axis: Axes, data: Curves, guard: GuardLine, ends: tuple[float, float]) -> None:
+def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float]) -> None:
+    """Draw each level where its mode is occupied, and label it at the end; labels that would collide become one."""
     low, high = ends
-    if not (low < guard.value < high and data.bands):
-        return
-    spans = [(begin, end) for mode, begin, end in data.bands if mode in (guard.mode, SEVERAL)]
-    begins, stops = [begin for begin, _ in spans], [end for _, end in spans]
-    axis.hlines([guard.value] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
-    above = guard.value > (low + high) / 2
-    axis.annotate(
-        guard.label, (stops[-1], guard.value), xytext=(-3, 4 if above else -4), textcoords="offset points",
-        ha="right", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
-    )  # fmt: skip
+    near = 0.15 * (data.span[1] - data.span[0]), 0.04 * (high - low)
+    labels: dict[tuple[float, float], list[str]] = {}
+    for guard in guards:
+        spans = [(begin, end) for mode, begin, end in data.bands if mode in (guard.mode, SEVERAL)]
+        if not spans or not low < guard.value < high:
+            continue
+        begins, stops = [begin for begin, _ in spans], [end for _, end in spans]
+        axis.hlines([guard.value] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
+        close = (at for at in labels if abs(at[0] - stops[-1]) < near[0] and abs(at[1] - guard.value) < near[1])
+        labels.setdefault(next(close, (stops[-1], guard.value)), []).append(guard.label)
+    for (end, level), texts in labels.items():
+        above = level > (low + high) / 2
+        axis.annotate(
+            ", ".join(dict.fromkeys(texts)), (end, level), xytext=(-3, 4 if above else -4), textcoords="offset points",
+            ha="right", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
+        )  # fmt: skip

@@ -43,7 +43,11 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
 
 
 def _wrapped(text: str, columns: int, first: str = "", rest: str = "") -> list[str]:
-    return textwrap.wrap(text, columns, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
+    """Break into lines, but never around an equals sign or an arrow."""
+    for sign in ("=", "->"):
+        text = text.replace(f" {sign} ", f"\xa0{sign}\xa0")
+    lines = textwrap.wrap(text, columns, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
+    return [line.replace("\xa0", " ") for line in lines]
 
 
 def _labelled(label: str, text: str, columns: int) -> list[str]:

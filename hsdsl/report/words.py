@@ -76,7 +76,9 @@ def delay(transition: Transition) -> str:
 
 def stop(execution: Execution) -> str:
     """Say why and when the run ended."""
-    return f"{execution.stop.reason} at t = {number(execution.stop.time, 10)}. {execution.stop.message}"
+    reason, message = execution.stop.reason, execution.stop.message
+    when = "" if "t = " in message else f" at t = {number(execution.stop.time, 10)}"
+    return f"{reason}{when}: {message}"
 
 
 def values(named: Mapping[str, Any]) -> str:

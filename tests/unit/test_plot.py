@@ -86,6 +86,22 @@ def test_bands_too_narrow_to_see_are_of_several_modes():
     assert bands[0][2] == pytest.approx(2001, abs=3)
 
 
+def test_a_mode_occupied_too_shortly_to_see_has_no_band():
+    run = hand_made.thermostat(4)
+    times = np.where(run.times >= 2, run.times - 1 + 1e-7, run.times)  # the second arc takes 1e-7
+    assert curves(replace(run, times=times)).bands == [
+        ("on", 0.0, 2 + 1e-7),
+        ("off", 2 + 1e-7, 3 + 1e-7),
+        ("on", 3 + 1e-7, 4 + 1e-7),
+    ]
+
+
+def test_labels_of_one_level_become_one():
+    guards = [GuardLine("on", "T", 1.0, "a"), GuardLine("off", "T", 1.0, "b"), GuardLine("off", "T", 0.0, "c")]
+    axis = _figure(hand_made.thermostat(30), guards=guards).axes[0]
+    assert [text.get_text() for text in axis.texts] == ["a, b", "c"]
+
+
 def test_every_mode_has_a_colour_of_its_own():
     modes = [f"mode{i}" for i in range(14)]
     assert len(set(colours(modes).values())) == 14
@@ -143,7 +159,7 @@ def test_units_and_title_stand_where_they_are_looked_for():
 def test_a_bad_end_is_said_and_does_not_squash_what_came_before():
     figure = _figure(hand_made.blow_up())
     assert figure.axes[0].get_ylim()[1] < 100
-    assert "stopped: not_finite at t = 1." in figure.axes[0].get_title(loc="left")
+    assert "stopped: not_finite at t = 1: x**2" in figure.axes[0].get_title(loc="left")
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def test_summary_to_the_letter():
         "0  2.000000000  1.25e-01  bounce  fly -> fly  v: -2 -> 1",
         "1  4.125000000  1.25e-01  bounce  fly -> fly  v: -1 -> 0.5",
         "",
-        "stop      until at t = 5.25. The run reached its end.",
+        "stop      until at t = 5.25: The run reached its end.",
         "final     mode fly after 2 transitions",
         "          h = 0, v = -0.5",
         "          energy = 0.125",
