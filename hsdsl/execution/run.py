@@ -88,9 +88,9 @@ class Execution:
 
     def _repr_html_(self) -> str:
         """Show a short summary in Jupyter."""
-        from hsdsl import report
+        from hsdsl.report import html
 
-        return report.html(self, limit=12)
+        return html(self, limit=12)
 
     @property
     def time_span(self) -> tuple[Any, Any]:
@@ -189,9 +189,9 @@ class Execution:
         UsageError
             For an unknown suffix or column, a file that cannot be written, or a missing library.
         """
-        from hsdsl import store
+        from hsdsl.store import save
 
-        return store.save(self, path, samples=samples, columns=columns)
+        return save(self, path, samples=samples, columns=columns)
 
 
 def _changes(execution: Execution) -> Array:

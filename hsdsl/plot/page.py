@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
-from hsdsl import report
 from hsdsl.execution import Execution
-from hsdsl.report import words
+from hsdsl.report import html, words
 
 CSS = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 75rem; margin: 2rem auto; padding: 0 1rem }
@@ -23,5 +22,5 @@ def page(execution: Execution, svg: str, title: str | None) -> str:
     picture = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{name}"', 1)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{name}</title>\n'
-        f"<style>{CSS}</style>\n</head>\n<body>\n{picture}\n{report.html(execution)}\n</body>\n</html>\n"
+        f"<style>{CSS}</style>\n</head>\n<body>\n{picture}\n{html(execution)}\n</body>\n</html>\n"
     )

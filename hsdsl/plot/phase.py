@@ -11,7 +11,7 @@ import numpy as np
 
 from hsdsl.execution import Execution
 from hsdsl.plot.colours import INK, colours, curve
-from hsdsl.plot.curves import Curves, limits, line
+from hsdsl.plot.curves import SEVERAL, Array, Curves, limits, line
 from hsdsl.plot.guards import GuardLine
 from hsdsl.plot.panel import label, mark_jumps, with_guards
 
@@ -34,12 +34,10 @@ def draw_phase(
     x0, x1 = with_guards(limits(x, time, ends_badly), levels[first])
     y0, y1 = with_guards(limits(y, time, ends_badly), levels[second])
     axis.set(xlim=(x0, x1), ylim=(y0, y1))
-    several = len(data.modes) > 1
-    for mode, colour in colours(data.modes).items():
-        here = data.samples.mode == mode
+    for colour, here in _parts(data):
         at = np.where(here, x, np.nan), np.where(here, y, np.nan)
         drawn = line(*at, data.begins, (x0, x1, y0, y1))
-        axis.plot(*drawn, color=curve(colour) if several else INK, linewidth=1.1, rasterized=len(drawn[0]) > 60_000)
+        axis.plot(*drawn, color=colour, linewidth=1.1, rasterized=len(drawn[0]) > 60_000)
     mark_jumps(axis, x, y, data.jumps)
     axis.plot(x[:1], y[:1], marker="D", color=INK, markersize=4.5, linestyle="")
     axis.annotate("start", (x[0], y[0]), xytext=(5, 4), textcoords="offset points", fontsize=7.5, color="#444444")
@@ -50,3 +48,10 @@ def draw_phase(
     axis.set_xlabel(label(first, units), parse_math=False)
     axis.set_ylabel(label(second, units), parse_math=False)
     axis.set_box_aspect(1)
+
+
+def _parts(data: Curves) -> list[tuple[str, Array]]:
+    """Divide the points by mode, each with its colour; all in one where there are no colours to tell modes by."""
+    if len(data.modes) < 2 or SEVERAL in data.modes:
+        return [(INK, np.ones(len(data.samples), dtype=bool))]
+    return [(curve(colour), data.samples.mode == mode) for mode, colour in colours(data.modes).items()]

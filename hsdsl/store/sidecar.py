@@ -6,8 +6,8 @@ import platform
 from importlib import metadata
 from typing import Any, BinaryIO
 
-from hsdsl import report
 from hsdsl.execution import Execution, Samples
+from hsdsl.report import as_json, dumps
 
 LIBRARIES = ("hsdsl", "numpy", "mpmath", "sympy")
 
@@ -25,7 +25,7 @@ def versions() -> dict[str, str]:
 
 def describe(execution: Execution, table: Samples, name: str) -> dict[str, Any]:
     """Return the sidecar's object: that of `run --json`, with the model's hash, versions and the table's shape."""
-    run = report.as_json(execution)
+    run = as_json(execution)
     return {
         "model": run.pop("model"),
         "sha256": execution.digest,
@@ -39,4 +39,4 @@ def describe(execution: Execution, table: Samples, name: str) -> dict[str, Any]:
 
 def write_sidecar(execution: Execution, table: Samples, name: str, file: BinaryIO) -> None:
     """Write the sidecar of the table called ``name``."""
-    file.write((report.dumps(describe(execution, table, name)) + "\n").encode())
+    file.write((dumps(describe(execution, table, name)) + "\n").encode())

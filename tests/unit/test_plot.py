@@ -71,6 +71,17 @@ def test_two_states_have_a_phase_plot_and_three_have_not():
     assert len(_figure(hand_made.modes_of_different_size()).axes) == 4 + 1
 
 
+@pytest.mark.parametrize("switches", [2, 3000])
+def test_a_phase_plot_shows_all_of_the_run(switches):
+    run = hand_made.thermostat(switches)
+    arcs = tuple(replace(arc, states=("T", "twice")) for arc in run.arcs)
+    values = run.values * [1.0, 2.0]
+    axis = _figure(replace(run, values=values, arcs=arcs, coefficients=np.zeros((len(values), 0, 2)))).axes[-1]
+    drawn = np.concatenate([line.get_xydata() for line in axis.get_lines() if line.get_marker() == "None"])
+    assert np.nanmin(drawn, axis=0).tolist() == [0.0, 0.0]
+    assert np.nanmax(drawn, axis=0).tolist() == [1.0, 2.0]
+
+
 def test_bands_are_the_modes_over_time():
     assert curves(hand_made.thermostat(2)).bands == [("on", 0.0, 1.0), ("off", 1.0, 2.0), ("on", 2.0, 3.0)]
     assert curves(hand_made.modes_of_different_size()).bands == [("a", 0.0, 3.0)]
