@@ -17,6 +17,7 @@ import typer.main
 from hsdsl import cli, errors, integrators, schema
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.integrators import ButcherTableau
+from hsdsl.model import requests
 
 REFERENCE = Path(__file__).parent / "reference"
 NOTE = "<!-- Written by docs/generate.py: edit the code it reads, not this page. -->\n\n"
@@ -30,6 +31,14 @@ An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers,
 parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
 
 ## Model
+
+"""
+
+DEFAULTS = """## Defaults of `experiment`
+
+A call or an option counts before `--set`, `--set` before the file, the file before these. `step` and `tolerance`
+exclude each other: the stronger one removes the other, and a method that only the file names and that cannot
+serve gives way to `auto`.
 
 """
 
@@ -55,10 +64,18 @@ A code keeps its meaning for ever; a retired one is not used again.
 
 INTEGRATORS = """# Integrators
 
-The values of `method` and `--method`; `auto` means `{auto}`. A method with fixed steps takes `step`, an
-adaptive one `tolerance`.
+The values of `method` and `--method`; `auto` means `{auto}`. A method with an embedded error
+estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`.
 
 """
+
+SCALARS = {
+    frozenset({"number", "string"}): "expression",
+    frozenset({"string", "number", "boolean"}): "text",
+    frozenset({"string"}): "text",
+    frozenset({"boolean", "string"}): "condition",
+    frozenset({"boolean"}): "`true` or `false`",
+}
 
 INTERPOLANTS = {
     "secant": "the straight line between its ends",
@@ -82,6 +99,7 @@ def language() -> str:
         parts.append(f"## {name}\n\n")
         parts.append(f"{node['description']}\n\n" if "description" in node else "")
         parts.append(keys_of(node) if "properties" in node else f"Value: {value_of(node)}.\n\n")
+    parts.append(DEFAULTS + table(("key", "default"), defaults()))
     parts.append("## Functions and constants\n\n" + table(("name", "arguments"), callables()))
     return "".join(parts)
 
@@ -93,6 +111,8 @@ def keys_of(node: Mapping[str, Any]) -> str:
         (f"`{key}`", value_of(value), "yes" if key in required else "", value.get("description", ""))
         for key, value in node["properties"].items()
     ]
+    if isinstance(node.get("additionalProperties"), dict):
+        rows.append(("any name", value_of(node["additionalProperties"]), "", ""))
     return table(("key", "value", "required", "meaning"), rows)
 
 
@@ -107,12 +127,25 @@ def value_of(node: Mapping[str, Any]) -> str:
         if union in node:
             words = (value_of(part) for part in node[union] if part != {"type": "null"})
             return " or ".join(dict.fromkeys(words))
-    kind = node.get("type", "anything")
-    if kind == "array":
+    return typed(node)
+
+
+def typed(node: Mapping[str, Any]) -> str:
+    """Say in words what a node with a `type` admits; an empty value is legal wherever a list or a map is."""
+    given = node.get("type", "anything")
+    kinds = {given} if isinstance(given, str) else set(given) - {"null"}
+    if kinds == {"array"}:
         return f"list of {value_of(node.get('items', {}))}"
-    if kind == "object" and isinstance(node.get("additionalProperties"), dict):
+    if kinds == {"object"} and isinstance(node.get("additionalProperties"), dict):
         return f"map from name to {value_of(node['additionalProperties'])}"
-    return " or ".join(kind) if isinstance(kind, list) else kind
+    return SCALARS.get(frozenset(kinds)) or " or ".join(sorted(kinds))
+
+
+def defaults() -> Iterator[tuple[str, str]]:
+    """List what an experiment is when nothing is said."""
+    for key, value in (requests.DEFAULTS | {"tolerance": requests.DEFAULT_TOLERANCE}).items():
+        text = value if isinstance(value, str) else f"{float(value):g}".replace("e-0", "e-").replace("e+0", "e")
+        yield f"`{key}`", f"`{text}`"
 
 
 def callables() -> Iterator[tuple[str, str]]:
@@ -163,9 +196,7 @@ def integrator_page() -> str:
     for name, method in methods.items():
         between = INTERPOLANTS[method.interpolant].format(order=method.dense_order)
         error = f"; embedded method of order {method.order - 1}" if method.adaptive else ""
-        parts.append(
-            f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.\n\n"
-        )
+        parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.\n\n")
         parts.append(f"Source: {method.source}.\n\n{tableau(method)}")
     return "".join(parts)
 
@@ -182,9 +213,7 @@ def tableau(method: ButcherTableau) -> str:
     if method.dense is not None:
         text += "Dense output: each stage's weight as a polynomial in s = (t - t_k)/h.\n\n"
         powers = [f"s^{m + 1}" for m in range(len(method.dense[0]))]
-        text += table(
-            ["stage", *powers], [weights(k, row) for k, row in zip(stages, method.dense, strict=True)]
-        )
+        text += table(["stage", *powers], [weights(k, row) for k, row in zip(stages, method.dense, strict=True)])
     return text
 
 
@@ -208,10 +237,13 @@ def render(name: str) -> str:
 
 def stale() -> list[str]:
     """Name the pages that differ from what the code says."""
-    files = {name: REFERENCE / name for name in PAGES}
-    return [
-        n for n, file in files.items() if not file.is_file() or file.read_text(encoding="utf-8") != render(n)
-    ]
+    return [name for name in PAGES if written(name) != render(name)]
+
+
+def written(name: str) -> str | None:
+    """Read a page as it is, None where there is none."""
+    file = REFERENCE / name
+    return file.read_text(encoding="utf-8") if file.is_file() else None
 
 
 def main() -> int:

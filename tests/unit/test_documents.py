@@ -44,9 +44,7 @@ def commands(text: str) -> Iterator[tuple[str, str]]:
 def run(arguments: list[str], folder: Path) -> tuple[int, str]:
     environment = os.environ | {"COLUMNS": "120", "NO_COLOR": "1", "TERM": "dumb"}
     environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
-    done = subprocess.run(
-        arguments, cwd=folder, env=environment, stdout=PIPE, stderr=STDOUT, text=True, check=False
-    )
+    done = subprocess.run(arguments, cwd=folder, env=environment, stdout=PIPE, stderr=STDOUT, text=True, check=False)
     return done.returncode, done.stdout
 
 
