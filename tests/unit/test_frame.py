@@ -9,6 +9,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -106,6 +107,16 @@ def test_no_text_is_evaluated(path):
 def test_every_model_has_a_title_and_says_what_is_known_of_it(path):
     system = hsdsl.load(path).system
     assert system.title and system.reference
+
+
+def test_architecture_page_has_the_layers_that_are_checked():
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = re.search(r"^```text\n(__main__.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    assert table is not None
+    assert [line.split("  ")[0] for line in table[1].splitlines()] == contracts[0]["layers"]
 
 
 def readme_command(mark: str) -> str:
