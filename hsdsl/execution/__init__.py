@@ -25,7 +25,8 @@ Numbers are float64, or objects (mpmath) for a run at higher precision.
 
 from hsdsl.execution.parts import REASONS, Arc, Kind, Point, Stop, Transition, Verdict
 from hsdsl.execution.run import Execution, OutputFunction
-from hsdsl.execution.sampling import HYBRID_TIME, Array, Samples, Side
+from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
+from hsdsl.execution.sampling import Side
 
 __all__ = [
     "HYBRID_TIME",

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.same import same
-from hsdsl.execution.sampling import ArcTable, Samples, Side, evaluate, find
+from hsdsl.execution.samples import Samples
+from hsdsl.execution.sampling import ArcTable, Side, evaluate, find
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
@@ -30,9 +31,9 @@ class Execution:
     Attributes
     ----------
     output_function : callable or None
-        ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only:
-        between rows this function gives them from the state there; without it (an execution read from a file)
-        they are interpolated linearly between the two rows.
+        ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only: between rows
+        this function gives them from the state there (not-a-number where they have no value); without it (an
+        execution read from a file) they are interpolated linearly between the two rows.
     """
 
     model: str

@@ -2,94 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from hsdsl.errors import UsageError
+from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution.parts import Arc
+from hsdsl.execution.samples import Array, Samples
 
 if TYPE_CHECKING:
     from hsdsl.execution.run import Execution
 
-Array = npt.NDArray[Any]
 Side = Literal["right", "left"]
-
-# The first three columns of every table; a state or output of such a name is labelled `state.j`, `output.j`.
-HYBRID_TIME = ("time", "mode", "j")
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Values of an execution at n points of hybrid time, by column.
-
-    Attributes
-    ----------
-    time, mode, jump, kind : array, shape (n,)
-        Time, name of the mode, transitions made so far, and ``flow`` or ``strip``.
-    states, outputs : tuple of str
-        Names, in the order in which the execution first has them.
-    state_columns, output_columns : array, shape (n, number of names)
-        Values, NaN where the mode lacks the state (or a state that the output needs).
-    present : array of bool, shape (n, number of states)
-        Whether the mode has the state, so that a state that *is* NaN can be told from one that is not there.
-
-    ``samples["x"]`` is the column of a state or output, shape (n,); ``len(samples)`` is n.
-    """
-
-    time: Array
-    mode: Array
-    jump: Array
-    kind: Array
-    states: tuple[str, ...]
-    outputs: tuple[str, ...]
-    state_columns: Array
-    output_columns: Array
-    present: Array
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def __getitem__(self, name: str) -> Array:
-        if name in self.states:
-            return self.state_columns[:, self.states.index(name)]
-        if name in self.outputs:
-            return self.output_columns[:, self.outputs.index(name)]
-        raise KeyError(f"no state or output is called {name}; there are {', '.join(self.names) or 'none'}")
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All states, then all outputs."""
-        return self.states + self.outputs
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """What heads the columns of a table: ``time``, ``mode``, ``j``, states, outputs."""
-        states = [f"state.{name}" if name in HYBRID_TIME else name for name in self.states]
-        outputs = [f"output.{name}" if name in HYBRID_TIME else name for name in self.outputs]
-        return (*HYBRID_TIME, *states, *outputs)
-
-    def columns(self) -> Iterator[tuple[str, Array, Array | None]]:
-        """Give each column of the table: label, values (n,), and where it has a value (None: everywhere)."""
-        values = [self.time, self.mode, self.jump, *self.state_columns.T, *self.output_columns.T]
-        computed = [column == column for column in self.output_columns.T]
-        present = [None, None, None, *self.present.T, *computed]
-        yield from zip(self.labels, values, present, strict=True)
-
-    def to_pandas(self) -> Any:
-        """Make a pandas DataFrame of the table's columns.
-
-        Raises
-        ------
-        UsageError
-            When pandas is not installed.
-        """
-        pandas = optional("pandas", "a DataFrame")
-        return pandas.DataFrame({label: values for label, values, _ in self.columns()})
 
 
 class ArcTable:
@@ -105,20 +31,30 @@ class ArcTable:
         self.layout = np.array([number[arc.states] for arc in arcs])
 
 
-def optional(library: str, what: str) -> Any:
-    """Import a library of the ``table`` extra, or say how to get it."""
-    try:
-        return import_module(library)
-    except ImportError:
-        message = f"{what} needs {library}, which is not installed: pip install 'hsdsl[table]'"
-        raise UsageError(message) from None
+def within(execution: Execution, times: Any) -> tuple[Array, Array]:
+    """Take times into the execution's number type, and say which of them are within the run.
+
+    A time outside the run by no more than the tie tolerance, 1e-12 max(1, |t|), counts as its end.
+    """
+    asked = _as_times(execution, times)
+    start, end = execution.time_span
+    slack = 1e-12 * max(1.0, abs(float(start)), abs(float(end)))
+    inside = np.asarray((asked >= start - slack) & (asked <= end + slack), dtype=bool)
+    return asked, inside
+
+
+def _as_times(execution: Execution, times: Any) -> Array:
+    if execution.times.dtype != object:
+        return np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+    plain = np.atleast_1d(np.asarray(times, dtype=object)).ravel()
+    convert = execution.times[0].context.convert  # a float is exact there, and keeps its binary value
+    return np.array([convert(t) for t in plain], dtype=object)
 
 
 def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     """Find the row that begins the piece each time lies in (the row itself where the time is a row's).
 
-    Of several rows at one time ``right`` takes the last and ``left`` the first. A time outside the run by no
-    more than the tie tolerance, 1e-12 max(1, |t|), counts as the run's end.
+    Of several rows at one time ``right`` takes the last and ``left`` the first.
 
     Returns
     -------
@@ -127,14 +63,12 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     Raises
     ------
     ValueError
-        For a time outside the run, or a ``side`` that is neither.
+        For a time that is not :func:`within` the run, or a ``side`` that is neither.
     """
     if side not in ("right", "left"):
         raise ValueError(f"side is 'right' or 'left', not {side!r}")
-    asked = _as_times(execution, times)
+    asked, inside = within(execution, times)
     start, end = execution.time_span
-    slack = 1e-12 * max(1.0, abs(float(start)), abs(float(end)))
-    inside = np.asarray((asked >= start - slack) & (asked <= end + slack), dtype=bool)
     if not inside.all():
         first = asked[int(np.argmin(inside))]
         raise ValueError(
@@ -147,12 +81,26 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     return np.where(np.asarray(execution.times[rows] == asked, dtype=bool), rows, rows - 1), asked
 
 
-def _as_times(execution: Execution, times: Any) -> Array:
-    if execution.times.dtype != object:
-        return np.atleast_1d(np.asarray(times, dtype=float)).ravel()
-    plain = np.atleast_1d(np.asarray(times, dtype=object)).ravel()
-    convert = execution.times[0].context.convert  # a float is exact there, and keeps its binary value
-    return np.array([convert(t) for t in plain], dtype=object)
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where n times lie: arc, row, the row after it, and how far between them (0 at the row itself)."""
+
+    time: Array
+    arc: Array
+    row: Array
+    follower: Array
+    fraction: Array
+    between: Array
+
+
+def _places(execution: Execution, rows: Array, times: Array) -> _Places:
+    between = np.asarray(times > execution.times[rows], dtype=bool)
+    follower = np.minimum(rows + 1, len(execution.times) - 1)
+    fraction = np.zeros_like(times)
+    begin = execution.times[rows[between]]
+    fraction[between] = (times[between] - begin) / (execution.times[follower[between]] - begin)
+    arcs = np.searchsorted(execution.arc_table.first, rows, side="right") - 1
+    return _Places(times, arcs, rows, follower, fraction, between)
 
 
 def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
@@ -165,38 +113,32 @@ def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
     times : array, shape (n,)
         Of the execution's number type, not before the row's time; equal to it for an arc's last row.
     """
-    at = execution.arc_table
-    arcs = np.searchsorted(at.first, rows, side="right") - 1
-    inner = np.asarray(times > execution.times[rows], dtype=bool)
-    follower = np.minimum(rows + 1, len(execution.times) - 1)
-    fraction = np.zeros_like(times)
-    begin = execution.times[rows[inner]]
-    fraction[inner] = (times[inner] - begin) / (execution.times[follower[inner]] - begin)
-    moving = inner & (at.kind[arcs] == "flow")
+    at, table = _places(execution, rows, times), execution.arc_table
     with np.errstate(invalid="ignore", over="ignore"):
-        values = _states(execution, rows, follower, fraction, moving)
-        outputs = _outputs(execution, rows, follower, fraction, inner, times, values, at, arcs)
-    states = execution.states
-    columns, present = _by_name(states, values, at, arcs)
+        values = _states(execution, at)
+        outputs = _outputs(execution, at, values)
+    columns, present = _by_name(execution, at, values)
     return Samples(
-        times,
-        at.mode[arcs],
-        at.jump[arcs],
-        at.kind[arcs],
-        states,
-        execution.output_names,
-        columns,
-        outputs,
-        present,
+        time=times,
+        mode=table.mode[at.arc],
+        jump=table.jump[at.arc],
+        kind=table.kind[at.arc],
+        states=execution.states,
+        outputs=execution.output_names,
+        state_columns=columns,
+        output_columns=outputs,
+        present=present,
     )
 
 
-def _states(execution: Execution, rows: Array, follower: Array, fraction: Array, moving: Array) -> Array:
-    values = execution.values[rows]
-    k, s = rows[moving], fraction[moving][:, None]
+def _states(execution: Execution, at: _Places) -> Array:
+    """Return the states in the order of each arc; on a strip the state waits."""
+    values = execution.values[at.row]
+    moving = at.between & (execution.arc_table.kind[at.arc] == "flow")
+    k, s = at.row[moving], at.fraction[moving][:, None]
     degree = execution.coefficients.shape[1]
     if degree == 0:
-        values[moving] += s * (execution.values[follower[moving]] - execution.values[k])
+        values[moving] += s * (execution.values[at.follower[moving]] - execution.values[k])
         return values
     increment = execution.coefficients[k, degree - 1]
     for m in range(degree - 2, -1, -1):
@@ -205,38 +147,32 @@ def _states(execution: Execution, rows: Array, follower: Array, fraction: Array,
     return values
 
 
-def _outputs(
-    execution: Execution,
-    rows: Array,
-    follower: Array,
-    fraction: Array,
-    inner: Array,
-    times: Array,
-    values: Array,
-    at: ArcTable,
-    arcs: Array,
-) -> Array:
-    outputs = execution.outputs[rows]
+def _outputs(execution: Execution, at: _Places, values: Array) -> Array:
+    outputs = execution.outputs[at.row]
     if not execution.output_names:
         return outputs
     if execution.output_function is None:
-        k = rows[inner]
-        change = execution.outputs[follower[inner]] - execution.outputs[k]
-        outputs[inner] += fraction[inner][:, None] * change
+        change = execution.outputs[at.follower[at.between]] - execution.outputs[at.row[at.between]]
+        outputs[at.between] += at.fraction[at.between][:, None] * change
         return outputs
-    for i in np.flatnonzero(inner):
-        width = len(at.layouts[at.layout[arcs[i]]])
-        state = tuple(values[i, :width].tolist())
-        outputs[i] = execution.output_function(str(at.mode[arcs[i]]), times[i], state)
+    for i in np.flatnonzero(at.between):
+        arc = execution.arcs[int(at.arc[i])]
+        state = tuple(values[i, : len(arc.states)].tolist())
+        try:
+            outputs[i] = execution.output_function(arc.mode, at.time[i], state)
+        except DOMAIN_ERRORS:
+            outputs[i] = float("nan")
     return outputs
 
 
-def _by_name(states: Sequence[str], values: Array, at: ArcTable, arcs: Array) -> tuple[Array, Array]:
-    columns = np.full((len(values), len(states)), float("nan"), dtype=values.dtype)
+def _by_name(execution: Execution, at: _Places, values: Array) -> tuple[Array, Array]:
+    """Sort the states into one column a name, and say where a mode has them."""
+    names, table = execution.states, execution.arc_table
+    columns = np.full((len(values), len(names)), float("nan"), dtype=values.dtype)
     present = np.zeros(columns.shape, dtype=bool)
-    for number, layout in enumerate(at.layouts):
-        here = at.layout[arcs] == number
+    for number, layout in enumerate(table.layouts):
+        here = table.layout[at.arc] == number
         for i, name in enumerate(layout):
-            columns[here, states.index(name)] = values[here, i]
-            present[here, states.index(name)] = True
+            columns[here, names.index(name)] = values[here, i]
+            present[here, names.index(name)] = True
     return columns, present

@@ -14,7 +14,8 @@ import numpy as np
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Execution, Samples
-from hsdsl.execution.sampling import evaluate, find, optional
+from hsdsl.execution.samples import optional
+from hsdsl.execution.sampling import evaluate, find, within
 
 
 def at_samples(execution: Execution, samples: Any) -> Samples:
@@ -22,10 +23,8 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
 
     Samples outside the run are left out: a run may stop before the last one.
     """
-    start, end = (float(t) for t in execution.time_span)
-    slack = 1e-12 * max(1.0, abs(start), abs(end))
-    asked = [t for t in np.atleast_1d(np.asarray(samples)).ravel() if start - slack <= t <= end + slack]
-    rows, times = find(execution, asked, "right")
+    asked, inside = within(execution, samples)
+    rows, times = find(execution, asked[inside], "right")
     ends = [
         row
         for before, after in zip(execution.arcs, execution.arcs[1:], strict=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 
@@ -86,6 +87,14 @@ def test_outputs_between_rows_come_from_the_function_and_without_one_from_the_li
     assert replace(line, output_function=energy)(0.5)["energy"] == 2.0
     assert calls == [("fly", 0.5, (1.875, -0.5))]
     assert replace(line, output_function=energy)(2.0, "left")["energy"] == 4.0  # recorded: the function is not asked
+
+
+def test_an_output_without_a_value_is_not_a_number():
+    def root(mode, t, state):
+        return (math.sqrt(state[1]),)
+
+    ball = replace(hand_made.bouncing_ball(), output_function=root)
+    assert math.isnan(ball(0.5)["energy"])
 
 
 def test_samples_are_points_in_any_order():
