@@ -6,6 +6,7 @@ import difflib
 import unicodedata
 from collections.abc import Iterable
 
+LOOKALIKES = "·²³"  # Unicode lets some of them stand in names; in mathematics they are operators
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
 
@@ -17,7 +18,7 @@ def normalised(name: str) -> str:
 
 def is_identifier(name: str) -> bool:
     """Whether a text has the form of a name: letters, digits and underscores, no digit first."""
-    return normalised(name).isidentifier()
+    return normalised(name).isidentifier() and not any(sign in name for sign in LOOKALIKES)
 
 
 def closest(name: str, candidates: Iterable[str]) -> str | None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from hsdsl.elaborate.reader import Reader
+from hsdsl.elaborate.reader import Reader, all_of
 from hsdsl.elaborate.world import World
 from hsdsl.expression.scope import Scope, symbol
 from hsdsl.names import did_you_mean, shown
@@ -41,7 +41,7 @@ def _names(world: World, source: Key, transitions: list[Transition]) -> list[str
     given: set[str] = set()
     for transition in transitions:
         name = world.text(transition.name)
-        if name in given:
+        if name in given and transition.name is not None:
             message = f"the mode '{source}' has a transition '{shown(name)}' already"
             world.reader.add(transition.name.place, "HS307", message, "give it another name")
         elif name is not None:
@@ -62,19 +62,15 @@ def _edge(world: World, source: str, name: str, transition: Transition, scope: S
     reader = world.reader
     crossed = surface(reader, transition.when, scope, "when")
     condition = None if transition.condition is None else reader.condition(transition.condition, scope)
-    resets = {str(key): reader.number(scalar, scope) for key, scalar in transition.reset.items()}
+    values = all_of([reader.number(scalar, scope) for scalar in transition.reset.values()])
     target = known_mode(world, transition.to)
     if target is None:
         return None
     states = _target_states(world, source, target)
     complete = _check_reset(world, source, target, states, transition)
-    if (
-        crossed is None
-        or not complete
-        or None in resets.values()
-        or (transition.condition is not None and condition is None)
-    ):
+    if crossed is None or values is None or not complete or (transition.condition and condition is None):
         return None
+    resets = dict(zip(map(str, transition.reset), values, strict=True))
     texts = {str(key): scalar.value for key, scalar in transition.reset.items()}
     return Edge(
         name=name,

@@ -7,6 +7,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from hsdsl.elaborate.reader import all_of
 from hsdsl.elaborate.samples import read_samples
 from hsdsl.elaborate.world import World
 from hsdsl.expression.scope import Scope, Value, symbol
@@ -39,16 +40,16 @@ def _file(world: World, name: Key, entry: InputFile) -> SampledInput | None:
 
 
 def _inline(world: World, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
-    times = [world.reader.number(scalar, scope, finite_now=True) for scalar in entry.times]
-    values = [world.reader.number(scalar, scope, finite_now=True) for scalar in entry.values]
-    if len(times) != len(values):
-        message = f"the input '{name}' has {len(times)} times and {len(values)} values"
+    times = all_of([world.reader.number(scalar, scope, finite_now=True) for scalar in entry.times])
+    values = all_of([world.reader.number(scalar, scope, finite_now=True) for scalar in entry.values])
+    if len(entry.times) != len(entry.values):
+        message = f"the input '{name}' has {len(entry.times)} times and {len(entry.values)} values"
         world.reader.add(name.place, "HS310", message, "give one value for each time")
         return None
-    if not times:
+    if not entry.times:
         world.reader.add(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
         return None
-    if any(part is None for part in (*times, *values)):
+    if times is None or values is None:
         return None
     for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
         if before.constant and after.constant and not before.number < after.number:

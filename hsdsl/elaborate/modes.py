@@ -7,6 +7,7 @@ from collections import ChainMap
 
 from hsdsl.elaborate.edges import elaborate_edges, surface
 from hsdsl.elaborate.outputs import outputs_of
+from hsdsl.elaborate.reader import all_of
 from hsdsl.elaborate.world import KINDS, World, later
 from hsdsl.expression.scope import Refusal, Scope, Value
 from hsdsl.schema import Mode as ModeDocument
@@ -16,14 +17,8 @@ from hsdsl.system import Mode
 
 def elaborate_modes(world: World, outputs: dict[str, Value | None]) -> tuple[Mode, ...]:
     """Every mode, in file order. Where something is reported the modes are not complete, and no system is made."""
-    if not world.document.modes:
-        return ()
-    found = []
-    for name, document in world.document.modes.items():
-        mode = _mode(world, name, document, outputs)
-        if mode is not None:
-            found.append(mode)
-    return tuple(found)
+    modes = [_mode(world, name, document, outputs) for name, document in world.document.modes.items()]
+    return tuple(mode for mode in modes if mode is not None)
 
 
 def _mode(world: World, name: Key, document: ModeDocument, outputs: dict[str, Value | None]) -> Mode | None:
@@ -36,10 +31,10 @@ def _mode(world: World, name: Key, document: ModeDocument, outputs: dict[str, Va
         world.reader.add(name.place, "HS315", message, "give it a `flow`, or leave them out")
         return None
     scope = mode_scope(world, name, document)
-    flow = [world.reader.number(scalar, scope) for scalar in (document.flow or {}).values()]
-    walls = [surface(world.reader, scalar, scope, "domain") for scalar in document.domain]
-    edges = elaborate_edges(world, name, document, scope)
-    if any(part is None for part in (*flow, *walls, *edges)):
+    flow = all_of([world.reader.number(scalar, scope) for scalar in (document.flow or {}).values()])
+    walls = all_of([surface(world.reader, scalar, scope, "domain") for scalar in document.domain])
+    edges = all_of(elaborate_edges(world, name, document, scope))
+    if flow is None or walls is None or edges is None:
         return None
     states = world.states[name]
     return Mode(

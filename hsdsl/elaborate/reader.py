@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from hsdsl.errors import Findings
 from hsdsl.expression import ExpressionError, Wanted, numeric, parse, symbolic
+from hsdsl.expression.inequality import Inequality, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
-from hsdsl.expression.symbolic import Inequality
 from hsdsl.expression.syntax import Tree
 from hsdsl.names import shown
 from hsdsl.source import ABSENT, Place, Scalar
+
+T = TypeVar("T")
 
 _NOT_FINITE = (".inf", "+.inf", "-.inf", ".nan", "inf", "+inf", "-inf", "infinity", "-infinity", "nan")
 
@@ -30,6 +33,13 @@ def understood(text: str, scope: Scope) -> Value:
     if faults:
         raise faults[0]
     return symbolic.number(tree, scope, text)
+
+
+def all_of(parts: Iterable[T | None]) -> list[T] | None:
+    """The parts, or None where one of them is broken and reported."""
+    found = list(parts)
+    whole = [part for part in found if part is not None]
+    return whole if len(whole) == len(found) else None
 
 
 @dataclass(frozen=True)
@@ -69,7 +79,7 @@ class Reader:
         """The two sides of one inequality."""
         try:
             tree = self._resolved(scalar, scope, "inequality", key)
-            return symbolic.inequality(tree, scope, scalar.value, key) if tree else None
+            return inequality(tree, scope, scalar.value, key) if tree else None
         except ExpressionError as error:
             self._report(scalar, error)
             return None
@@ -81,7 +91,7 @@ class Reader:
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, wanted, scope)
         if wanted == "inequality":
-            symbolic.refuse_all_but_one_inequality(tree, key)
+            the_comparison(tree, key)
         faults = scope.faults(tree)
         for fault in faults:
             self._report(scalar, fault)
@@ -89,7 +99,7 @@ class Reader:
 
     def _report(self, scalar: Scalar, error: ExpressionError) -> None:
         hint = error.hint
-        if error.code == "HS103" and scalar.plain and _cut_by_comment(scalar.place):
+        if scalar.plain and scalar.value.count("(") > scalar.value.count(")") and _cut_by_comment(scalar.place):
             hint = "YAML begins a comment at ` #`: quote this expression"
         span = scalar.span(error.start, error.end)
         self.findings.add(scalar.place.text.diagnostic(error.code, error.message, span, hint))

@@ -33,10 +33,14 @@ def _constant_part(exponent: Any) -> int:
 
 
 def sum_bits(terms: list[Any]) -> int:
-    """How long the common denominator of a sum can get."""
-    coefficients = [part.as_coeff_Mul()[0] for term in terms for part in sp.Add.make_args(term)]
-    denominators = {int(c.q) for c in coefficients if c.is_Rational}
-    return sum(q.bit_length() for q in denominators if q > 1)
+    """How long the common denominator of like terms of a sum can get."""
+    denominators: dict[Any, set[int]] = {}
+    for term in terms:
+        for part in sp.Add.make_args(term):
+            coefficient, rest = part.as_coeff_Mul()
+            if coefficient.is_Rational and coefficient.q != 1:
+                denominators.setdefault(rest, set()).add(int(coefficient.q))
+    return max((sum(q.bit_length() for q in group) for group in denominators.values()), default=0)
 
 
 def power_bits(base: Any, exponent: Any) -> int:

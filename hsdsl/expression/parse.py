@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
@@ -164,7 +164,7 @@ class _Parser:
         raise self.unexpected(token)
 
     @contextmanager
-    def deeper(self) -> Iterator[None]:
+    def deeper(self) -> Generator[None]:
         """One level of nesting, refused beyond the deepest."""
         self.depth += 1
         if self.depth > DEEPEST:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
@@ -33,21 +32,12 @@ from hsdsl.names import shown
 _RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
 _NOT_REAL = frozenset((sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I))
 # SymPy's own kinked functions, which it makes by itself, against those the rest of the house knows
-_KINKED = {
+_KINKED: dict[Any, Any] = {
     sp.Abs: functions.absolute,
     sp.sign: functions.sign,
     sp.floor: functions.floor,
-    sp.Heaviside: lambda x, *_: (1 + functions.sign(x)) / 2,
+    sp.Heaviside: lambda x, *_: (sp.S.One + functions.sign(x)) / 2,
 }
-
-
-@dataclass(frozen=True)
-class Inequality:
-    """``left operator right``."""
-
-    left: Value
-    operator: str
-    right: Value
 
 
 def number(tree: Tree, scope: Scope, text: str) -> Value:
@@ -72,35 +62,6 @@ def condition(tree: Tree, scope: Scope, text: str) -> Any:
     return _Builder(scope, text).condition(tree)
 
 
-def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
-    """The two sides of the one inequality that ``when`` and ``domain`` take.
-
-    Raises
-    ------
-    ExpressionError
-        As :func:`number`, and where there is no inequality or more than one.
-    """
-    refuse_all_but_one_inequality(tree, key)
-    assert isinstance(tree, Comparison)
-    builder = _Builder(scope, text)
-    left, right = map(builder.number, tree.operands)
-    return Inequality(left, tree.operators[0], right)
-
-
-def refuse_all_but_one_inequality(tree: Tree, key: str) -> None:
-    """Raise where a tree is not exactly one inequality."""
-    more = "put the rest under `if`" if key == "when" else "write each inequality as an item of its own"
-    if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operators) > 1):
-        raise ExpressionError("HS116", f"`{key}` takes one inequality", tree.start, tree.end, more)
-    if not isinstance(tree, Comparison):
-        message = f"`{key}` takes an inequality, and this is not one"
-        raise ExpressionError("HS116", message, tree.start, tree.end, "write it as left >= right")
-    if tree.operators[0] in ("==", "!="):
-        message = f"`{key}` takes an inequality, not `{tree.operators[0]}`"
-        hint = "write `>=` or `<=`, with the side on which the mode ends" if key == "when" else "write `>=` or `<=`"
-        raise ExpressionError("HS107", message, tree.start, tree.end, hint)
-
-
 class _Builder:
     """One expression in one scope."""
 
@@ -115,7 +76,7 @@ class _Builder:
             raise ExpressionError("HS114", message, tree.start, tree.end, "conditions stand under `if`")
         match tree:
             case Number():
-                expr = sp.Rational(tree.value.numerator, tree.value.denominator)
+                expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
                 return Value(expr, numeric.of_rational(expr), True)
             case Name():
                 return self.name(tree)
@@ -155,17 +116,20 @@ class _Builder:
     def product(self, tree: Product) -> Value:
         """Factors multiplied; the length of their exact numbers is measured first."""
         values = [self.number(factor) for _, factor in tree.factors]
-        if sum(bounds.bits(v.expr) for v in values) > bounds.MOST_BITS:
-            raise self.too_long(tree)
         for value, (divided, factor) in zip(values, tree.factors, strict=True):
             if divided and value.expr.is_zero and value.expr.is_number:
                 text = self.said(factor)
                 message = "nothing can be divided by 0" + (f", and `{text}` is 0" if text != "0" else "")
                 raise ExpressionError("HS118", message, factor.start, factor.end)
         divided = [d for d, _ in tree.factors]
-        factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
         numbers = [numeric.inverse(v.number) if d else v.number for v, d in zip(values, divided, strict=True)]
-        return self.value(tree, sp.Mul(*factors), numeric.product(numbers), values)
+        number = numeric.product(numbers)
+        if all(v.constant for v in values):
+            self.refuse_unless_finite(tree, number)
+        if sum(bounds.bits(v.expr) for v in values) > bounds.MOST_BITS:
+            raise self.too_long(tree)
+        factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
+        return self.value(tree, sp.Mul(*factors), number, values)
 
     def power(self, tree: Power) -> Value:
         """A power; what it would make SymPy compute is measured first."""

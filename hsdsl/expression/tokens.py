@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Literal
 
 from hsdsl.expression.syntax import ExpressionError, Wanted
-from hsdsl.names import normalised, shown
+from hsdsl.names import LOOKALIKES, normalised, shown
 
 LONGEST = 10_000  # characters
 LARGEST_INTEGER = 10**18
@@ -129,7 +129,7 @@ def _name(text: str, at: int) -> Token | None:
     if not text[at].isidentifier():
         return None
     end = at + 1
-    while end < len(text) and ("a" + text[end]).isidentifier() and text[end] not in "²³":
+    while end < len(text) and ("a" + text[end]).isidentifier() and text[end] not in LOOKALIKES:
         end += 1
     return Token("name", normalised(text[at:end]), at, end)
 

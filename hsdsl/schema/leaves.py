@@ -111,8 +111,9 @@ def _name(key: Any) -> Key:
         hint = "write a space after the colon" if ":" in key else "names have letters, digits and _, no digit first"
         raise refuse("HS205", message, hint)
     if key in RESERVED:
-        kind = {"t": "the time", "pi": "a constant"}.get(key, "a word" if key in WORDS else "a function")
-        raise refuse("HS205", f"'{key}' is {kind} of the language and cannot be a name", "choose another name")
+        kind = "a word of the language" if key in WORDS else "a function"
+        kind = {"t": "the time", "pi": "a constant"}.get(key, kind)
+        raise refuse("HS205", f"'{key}' is {kind} and cannot be a name", "choose another name")
     return key
 
 

@@ -6,6 +6,7 @@ from hsdsl.source import Key, Mapping, Node, Place, Scalar, Sequence, absent
 
 _Location = tuple[int | str, ...]
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",))
+_WITH_ITS_ENTRY = ("times", "values", "file")
 _NOT_WITHOUT = ("modes", "initial", "experiment")
 
 
@@ -31,6 +32,8 @@ def repair(root: Node, location: _Location, fault: str, meant: str | None) -> bo
     match fault:
         case "extra_forbidden":
             return _renamed(parent, str(location[-1]), meant) or _drop(root, location)
+        case "missing" if location[-1] in _WITH_ITS_ENTRY:
+            return _replaced(_descend(root, location[:-2]), location[-2], None)
         case "missing":
             return _filled(parent, str(location[-1]))
         case "HS206":

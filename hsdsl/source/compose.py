@@ -14,7 +14,7 @@ from hsdsl.errors import Diagnostic, Findings, ModelError, Span
 from hsdsl.names import normalised, shown
 from hsdsl.source.commas import rejoined_entries, rejoined_items
 from hsdsl.source.faults import explain
-from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence
+from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence, absent
 from hsdsl.source.text import Text
 
 DEEPEST = 64
@@ -97,6 +97,8 @@ class _Composer:
         return found
 
     def _scalar(self, event: Any) -> Scalar:
+        if event.tag is not None:
+            return absent(self._place(event))
         return Scalar(event.value, event.style is None or event.style == "", self._place(event))
 
     def _sequence(self, event: Any) -> tuple[Node, int, int]:

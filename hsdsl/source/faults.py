@@ -31,6 +31,7 @@ _MEANS = {
     "-": "an item of a list",
 }
 _QUOTE = "quote this expression"
+_COLON = "a key is followed by a colon and a space"
 
 
 def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
@@ -51,7 +52,7 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
         return _misread(text, *opened)
     if "could not find expected ':'" in problem:
         message = "this line is neither a key nor part of a value"
-        return text.diagnostic("HS004", message, text.span(*opened, 9999), "a key is followed by a colon and a space")
+        return text.diagnostic("HS004", message, text.span(*opened, 9999), _COLON)
     if "flow" in (error.context or ""):
         return _in_brackets(text, (line, column), opened)
     return _in_block(text, problem, line, column)
@@ -79,8 +80,10 @@ def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, 
 
 def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
     bracket = _character(text, *opened)
-    closing = {"{": "}", "[": "]"}.get(bracket, "}")
     line, column = here
+    closing = {"{": "}", "[": "]"}.get(bracket)
+    if closing is None:
+        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column))
     content = text.lines[line - 1] if line <= len(text.lines) else ""
     if column > len(content) or (line != opened[0] and _character(text, line, column) == ":"):
         message = f"the `{bracket}` that opens here is never closed"
@@ -99,8 +102,20 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
         if _KEY_AND_VALUE.match(before):
             message = "a colon followed by a space cannot stand inside a value"
             return text.diagnostic("HS007", message, text.span(line, column), f"{_QUOTE} or begin a new line")
-        return _indentation(text, line, len(content) - len(content.lstrip()) + 1)
+        return _without_colon(text, line) or _indentation(text, line, len(content) - len(content.lstrip()) + 1)
     return _misread(text, line, column)
+
+
+def _without_colon(text: Text, line: int) -> Diagnostic | None:
+    """The line above, where it was taken for the beginning of a text because no colon follows its key."""
+    above = line - 1
+    while above > 0 and not text.lines[above - 1].strip():
+        above -= 1
+    content = text.lines[above - 1] if above > 0 else ""
+    if not content.strip() or ":" in content or content.lstrip()[0] in "-#":
+        return None
+    span = text.span(above, len(content) - len(content.lstrip()) + 1, 9999)
+    return text.diagnostic("HS004", "this line is neither a key nor part of a value", span, _COLON)
 
 
 def _indentation(text: Text, line: int, column: int) -> Diagnostic:

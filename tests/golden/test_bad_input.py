@@ -1,0 +1,61 @@
+"""Bad models, each beside the text that is printed for it. Every code has at least one."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hsdsl.diagnose import as_json, render
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import CODES, ModelError
+
+FOLDER = Path(__file__).parent / "bad"
+CASES = sorted(FOLDER.glob("*.yaml"))
+
+
+@pytest.fixture(autouse=True)
+def in_folder(monkeypatch):
+    monkeypatch.chdir(FOLDER)
+
+
+def diagnostics(path):
+    with pytest.raises(ModelError) as raised:
+        elaborate(path.name)
+    return raised.value.diagnostics
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem)
+def test_says_what_is_expected(case):
+    said = "".join(render(d) + "\n" for d in diagnostics(case))
+    expected = case.with_suffix(".txt")
+    if os.environ.get("HSDSL_WRITE_GOLDEN"):
+        expected.write_text(said, encoding="utf-8")
+    assert said == expected.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem)
+def test_places_are_in_the_file_and_in_order(case):
+    found = diagnostics(case)
+    places = [(d.span.path, d.span.line, d.span.column) for d in found]
+    assert places == sorted(places, key=lambda p: (p[0] != case.name, *p))
+    for entry in as_json(found)["errors"]:
+        assert set(entry) == {"code", "path", "line", "column", "message", "hint"}
+        lines = Path(entry["path"]).read_bytes().decode("utf-8", "replace").splitlines() or [""]
+        assert 1 <= entry["line"] <= len(lines) + 1
+        assert entry["column"] <= len(lines[min(entry["line"], len(lines)) - 1]) + 1
+
+
+def test_every_code_has_a_case():
+    expected = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("*.txt"))
+    assert [code for code in CODES if f"error {code}:" not in expected] == []
+
+
+def test_nothing_is_left_over():
+    assert {path.stem for path in FOLDER.glob("*.txt")} == {path.stem for path in CASES}
+
+
+def test_no_jargon_of_the_libraries():
+    for path in FOLDER.glob("*.txt"):
+        said = path.read_text(encoding="utf-8").lower()
+        for word in ("pydantic", "sympy", "traceback", "input should", "token", "scalar", "zoo", "node"):
+            assert word not in said, path.name

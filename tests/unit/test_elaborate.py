@@ -1,0 +1,252 @@
+"""Documents to mathematics: what names mean, how edges are made, and what is said when something is wrong."""
+
+import hashlib
+import time
+from fractions import Fraction
+
+import pytest
+import sympy as sp
+
+from hsdsl.elaborate import elaborate, parameter_expression
+from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
+from hsdsl.system import TIME, HybridSystem
+
+X, V, A = (sp.Symbol(n, real=True) for n in "xva")
+HEAD = "hsdsl: 1\n"
+TAIL = "initial: {mode: A, x: 0, v: 1}\nexperiment: {until: 1}\n"
+
+
+def system(text: str, path="m.yaml") -> HybridSystem:
+    return elaborate(path, text=text.encode())
+
+
+def model(mode: str, rest: str = "", tail: str = TAIL) -> HybridSystem:
+    return system(f"{HEAD}modes:\n  A:\n    flow: {{x: v, v: -x}}\n{mode}{rest}{tail}")
+
+
+def codes(text: str) -> list[str]:
+    with pytest.raises(ModelError) as raised:
+        system(text)
+    return [d.code for d in raised.value.diagnostics]
+
+
+SIDES = [
+    ("x >= a", X - A, A - X),
+    ("x > a", X - A, A - X),
+    ("x <= a", A - X, X - A),
+    ("x < a", A - X, X - A),
+]
+
+
+@pytest.mark.parametrize(("text", "guard", "wall"), SIDES)
+def test_surfaces_are_negative_inside(text, guard, wall):
+    made = model(f"    domain: ['{text}']\n    transitions: [{{when: '{text}', to: A}}]\n", "parameters: {a: 1}\n")
+    (mode,) = made.modes
+    surface = mode.edges[0].surface
+    assert (surface.residual, surface.left, surface.right, surface.text) == (guard, X, A, text)
+    assert mode.walls[0].residual == wall
+
+
+def test_resets_see_names_and_keep_the_rest():
+    made = model("    transitions: [{when: x >= 1, to: A, reset: {v: -v/2}, if: v > 0, priority: 3}]\n")
+    edge = made.modes[0].edges[0]
+    assert edge.target_states == ("x", "v") and edge.reset == (X, -V / 2) and edge.reset_texts == ("x", "-v/2")
+    assert edge.condition == sp.Gt(V, 0) and edge.priority == 3
+
+
+def test_names_of_edges():
+    lines = ["{when: x >= 1, to: A}", "{when: x >= 2, to: B}", "{when: x >= 3, to: A}"]
+    lines += ["{when: x >= 4, to: A, name: 'A->A#3'}", "{when: x >= 5, to: A}", "{when: x >= 6, to: A, name: my edge!}"]
+    body = "    transitions:\n" + "".join(f"      - {line}\n" for line in lines) + "  B: {final: true}\n"
+    edges = model(body).modes[0].edges
+    assert [e.name for e in edges] == ["A->A", "A->B", "A->A#2", "A->A#3", "A->A#4", "my edge!"]
+    assert edges[1].target_states == ("x", "v") and edges[1].reset == (X, V)
+
+
+def test_lets_are_lexical_and_substituted():
+    rest = "parameters: {a: 2}\ninputs: {u: a*t}\nlet: {p: x + a, q: 2*p, r: 1}\noutputs: {o: q, w: u}\n"
+    made = model("    let: {p: 7, s: q + p}\n    domain: [s >= r]\n", rest)
+    mode = made.modes[0]
+    assert mode.walls[0].left == 2 * X + 2 * A + 7
+    assert mode.outputs == (2 * X + 2 * A, A * TIME)
+
+
+def test_a_let_may_not_be_captured():
+    made = model("    domain: [q >= 0]\n    let: {p: v}\n", "let: {p: x, q: p}\n")
+    assert made.modes[0].walls[0].left == X
+
+
+def test_outputs_are_none_where_a_state_is_missing():
+    made = model("  B:\n    flow: {y: 1}\n", "let: {p: x + v}\noutputs: {e: p, c: 3, t2: t**2, d: y}\n")
+    assert made.modes[0].outputs == (X + V, 3, TIME**2, None)
+    assert made.modes[1].outputs == (None, 3, TIME**2, sp.Symbol("y", real=True))
+
+
+def test_a_let_is_checked_in_the_modes_that_use_it():
+    assert model("  B:\n    flow: {y: 1}\n", "let: {p: x + v}\n").modes[1].flow == (1,)
+    lines = HEAD + "let: {p: x, q: p}\nmodes:\n  A: {flow: {x: q, v: 1}}\n  B: {flow: {y: q}}\n" + TAIL
+    assert codes(lines) == ["HS117"]
+
+
+@pytest.mark.parametrize(
+    "name", ["E", "I", "S", "N", "Q", "beta", "gamma", "lambda", "zeta", "class", "def", "pi2", "é"]
+)
+def test_any_identifier_is_a_name(name):
+    made = system(
+        f"{HEAD}parameters: {{p_{name}: 1}}\nmodes: {{A: {{flow: {{{name}: -{name}*p_{name}}}}}}}\n"
+        f"initial: {{mode: A, {name}: 1}}\nexperiment: {{until: 1}}\n"
+    )
+    assert made.modes[0].states == (name,)
+    assert made.modes[0].flow[0].free_symbols == {sp.Symbol(name, real=True), sp.Symbol(f"p_{name}", real=True)}
+
+
+def test_yaml_words_are_words():
+    made = system(HEAD + "modes: {off: {flow: {y: 1}}, on: {flow: {y: no}}}\nparameters: {no: 010}\n"
+                  "initial: {mode: off, y: 1e-3}\nexperiment: {until: 1}\n")  # fmt: skip
+    assert [m.name for m in made.modes] == ["off", "on"]
+    assert made.parameters[0].value == 10 and made.initial.values == (("y", sp.Rational(1, 1000)),)
+
+
+def test_parameters_are_expressions_of_earlier_ones():
+    made = model(
+        "", "parameters: {a: 1/3, b: {value: 2*a, unit: m, min: 0, max: a + 1, about: twice}}\nunits: {x: m}\n"
+    )
+    b = made.parameters[1]
+    assert (b.value, b.text, b.unit, b.minimum, b.maximum, b.about) == (2 * A, "2*a", "m", 0, A + 1, "twice")
+    assert made.units == {"x": "m", "b": "m"}
+
+
+def test_empty_maps_and_lists_are_legal():
+    empty = "parameters:\ninputs: {}\nlet:\noutputs:\nunits:\nreference:\n"
+    made = model("    transitions:\n    domain: []\n    let:\n  N: {flow: {}}\n  M:\n    flow:\n", empty)
+    assert made.modes[1].states == () and made.modes[2].states == () and made.reference == ()
+
+
+def test_sampled_inputs(tmp_path):
+    (tmp_path / "u.csv").write_text("time, u\n0,1e-3\n0.5, -2\n")
+    (tmp_path / "in").mkdir()
+    rest = (
+        "parameters: {a: 2}\ninputs:\n  u: {file: in/../u.csv, hold: linear}\n"
+        "  w: {times: [0, 1/3, 1.5], values: [1, 2, -3]}\n  z: {times: [0, a], values: [1, 2*a]}\n"
+    )
+    text = f"{HEAD}modes:\n  A:\n    flow: {{x: u, v: w + z}}\n{rest}{TAIL}"
+    made = system(text, tmp_path / "m.yaml")
+    u, w, z = made.inputs
+    assert (u.hold, u.times, u.values) == ("linear", (0, Fraction(1, 2)), (Fraction(1, 1000), -2))
+    assert (w.hold, w.times, w.values) == ("zero", (0, Fraction(1, 3), Fraction(3, 2)), (1, 2, -3))
+    assert (z.times, z.values) == ((0, A), (1, 2 * A))
+    assert made.modes[0].flow[0] == sp.Symbol("u", real=True)
+    before = made.digest
+    assert system(text, tmp_path / "m.yaml").digest == before
+    (tmp_path / "u.csv").write_text("time,u\n0,1\n")
+    assert system(text, tmp_path / "m.yaml").digest != before
+
+
+def test_data_may_not_be_linked_from_outside(tmp_path):
+    folder = tmp_path / "model"
+    folder.mkdir()
+    (tmp_path / "u.csv").write_text("time,u\n0,1\n")
+    (folder / "u.csv").symlink_to(tmp_path / "u.csv")
+    text = f"{HEAD}inputs: {{u: {{file: u.csv}}}}\nmodes: {{A: {{flow: {{x: u, v: 1}}}}}}\n{TAIL}"
+    with pytest.raises(ModelError) as raised:
+        system(text, folder / "m.yaml")
+    assert [d.code for d in raised.value.diagnostics] == ["HS311"]
+
+
+def test_experiment_and_initial_are_expressions():
+    tail = "parameters: {a: 2}\ninitial: {mode: A, x: a/4, v: 0}\nexperiment: {until: 40*pi, samples: [0, a, pi], step: a/100}\n"
+    made = model("", tail=tail)
+    assert made.initial.values == (("x", A / 4), ("v", 0))
+    assert made.experiment.until == 40 * sp.pi and made.experiment.samples == (0, A, sp.pi)
+    assert made.experiment.step == A / 100 and made.experiment.tolerance is None and made.experiment.scheme is None
+
+
+def test_references_are_plain_data():
+    rest = (
+        "reference:\n  - set: {initial.x: -0.4, experiment.method: rk4}\n    source: a book\n    trust: 1e-9\n"
+        "    transitions: [1/3, {time: 0.5, edge: hit, before: {v: 1}}]\n    states: [{time: 2*pi, mode: A, x: 1}]\n"
+    )
+    made = model("    transitions: [{name: hit, when: x >= 1, to: A}]\n", rest)
+    assert made.reference == (
+        {
+            "set": {"initial.x": "-0.4", "experiment.method": "rk4"},
+            "source": "a book",
+            "trust": "1e-9",
+            "transitions": [{"time": "1/3"}, {"time": "0.5", "edge": "hit", "before": {"v": "1"}}],
+            "states": [{"time": "2*pi", "mode": "A", "x": "1"}],
+        },
+    )
+
+
+def test_digest_is_of_the_bytes():
+    text = f"{HEAD}modes: {{A: {{flow: {{x: 1, v: 1}}}}}}\n{TAIL}"
+    assert system(text).digest == hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_step_and_tolerance_have_their_own_code():
+    text = HEAD + "modes: {A: {flow: {}}}\ninitial: {mode: A}\nexperiment: {until: 1, step: 0.1, tolerance: 1e-6}\n"
+    assert codes(text) == [STEP_AND_TOLERANCE]
+
+
+def test_a_broken_definition_is_reported_once():
+    text = f"{HEAD}parameters: {{a: 1 +}}\nlet: {{p: a, q: p + x}}\nmodes: {{A: {{flow: {{x: q*a, v: p}}}}}}\n{TAIL}"
+    assert codes(text) == ["HS102"]
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    for path in (tmp_path / "no.yaml", tmp_path):
+        with pytest.raises(UsageError) as raised:
+            elaborate(path)
+        assert str(path) in str(raised.value)
+
+
+class TestOverrides:
+    made = model("", "parameters: {omega: 1, c: 2*omega}\ninputs: {u: t}\n")
+
+    def test_expressions(self):
+        omega = sp.Symbol("omega", real=True)
+        assert parameter_expression(self.made, "0.9", "--set c") == sp.Rational(9, 10)
+        assert parameter_expression(self.made, "-2*omega + pi", "--set c") == sp.pi - 2 * omega
+
+    @pytest.mark.parametrize(
+        ("text", "sentence", "hint"),
+        [
+            ("omga", "--set c: nothing here is called 'omga'", "did you mean 'omega'?"),
+            ("x", "--set c: 'x' is a state; only parameters can be used here", None),
+            ("t", "--set c: 't' is the time; only parameters can be used here", None),
+            ("c", "--set c: 'c' cannot be used here: only earlier parameters can", None),
+            ("1/0", "--set c: nothing can be divided by 0", None),
+            ("nan", "--set c: `nan` is not a finite number", None),
+            ("", "--set c: an expression is missing", None),
+            ("2^3", "--set c: `^` is not an operator of the language", "write `**` for a power"),
+            (
+                "omega > 1",
+                "--set c: `omega > 1` is a condition where a number is wanted",
+                "conditions stand under `if`",
+            ),
+        ],
+    )
+    def test_faults_are_sentences(self, text, sentence, hint):
+        with pytest.raises(UsageError) as raised:
+            parameter_expression(self.made, text, "--set c", allowed=["omega"])
+        assert (str(raised.value), raised.value.hint) == (sentence, hint)
+
+
+def test_large_models_are_read_quickly():
+    side = 25
+    lines = [HEAD, "modes:\n"]
+    for i in range(side):
+        for j in range(side):
+            lines.append(
+                f"  M{i}_{j}:\n    flow: {{x: v, v: -x - {i}*v/100, w: sin(x) + {j}*cos(v)**2}}\n    transitions:\n"
+            )
+            for k, l in ((i + 1, j), (i, j + 1), (i - 1, j), (i, j - 1)):
+                to = f"M{k % side}_{l % side}"
+                lines.append(
+                    f"      - {{when: x - {k}*v >= {l}, if: v > 0 and w < 3, to: {to}, reset: {{v: -0.9*v}}}}\n"
+                )
+    lines.append("initial: {mode: M0_0, x: 0, v: 0, w: 0}\nexperiment: {until: 1}\n")
+    began = time.perf_counter()
+    made = system("".join(lines))
+    assert len(made.modes) == side**2
+    assert time.perf_counter() - began < 20

@@ -1,0 +1,108 @@
+"""The JSON Schema: up to date, draft 7, described, and in agreement with what is read."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import ModelError
+from hsdsl.schema import json_schema
+
+ROOT = Path(__file__).parent.parent.parent
+MODELS = [*ROOT.glob("models/*.yaml")]
+MODELS += [p for p in ROOT.glob("tests/conformance/cases/*.yaml") if not p.name.endswith(".expect.yaml")]
+BASE = {
+    "hsdsl": 1,
+    "modes": {"A": {"flow": {"x": 1}}},
+    "initial": {"mode": "A", "x": 0},
+    "experiment": {"until": 1},
+}
+
+
+def parts(schema):
+    """Every schema in a schema that stands for a key's value."""
+    for name, prop in schema.get("properties", {}).items():
+        yield name, prop
+    for part in schema.get("definitions", {}).values():
+        yield from parts(part)
+
+
+def test_the_written_schema_is_up_to_date():
+    written = (ROOT / "schemas" / "model.schema.json").read_text(encoding="utf-8")
+    assert json.loads(written) == json_schema()
+
+
+def test_it_is_a_draft_7_schema():
+    schema = json_schema()
+    jsonschema.Draft7Validator.check_schema(schema)
+    text = json.dumps(schema)
+    assert "$defs" not in text and "prefixItems" not in text and "unevaluated" not in text
+    assert text.count('"$schema"') == 1
+
+
+def test_nothing_stands_beside_a_reference():
+    def check(part):
+        if isinstance(part, dict):
+            assert "$ref" not in part or len(part) == 1
+            for value in part.values():
+                check(value)
+        elif isinstance(part, list):
+            for value in part:
+                check(value)
+
+    check(json_schema())
+
+
+def test_every_key_is_described():
+    for name, prop in parts(json_schema()):
+        assert prop.get("description", "").endswith("."), name
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
+def test_models_are_valid(path):
+    document = yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
+    document["hsdsl"] = 1
+    for mode in document["modes"].values():
+        if "final" in mode:
+            mode["final"] = mode["final"] == "true"
+        for transition in mode.get("transitions", []):
+            if "priority" in transition:
+                transition["priority"] = int(transition["priority"])
+    jsonschema.Draft7Validator(json_schema()).validate(document)
+
+
+CHANGES = [
+    ({"parameters": {"a": {"value": 1, "unit": "m", "min": 0, "about": "b"}}}, True),
+    ({"parameters": None, "outputs": None, "let": {}, "reference": []}, True),
+    ({"inputs": {"u": {"times": [0, 1], "values": [1, "2/3"], "hold": "linear"}}}, True),
+    ({"reference": {"states": [{"time": 1, "x": 1}]}}, True),
+    ({"reference": [{"transitions": []}, {"trust": 1e-9}]}, True),
+    ({"experiment": {"until": "2*pi", "samples": [0, 1]}}, True),
+    ({"experiment": {"until": 1, "samples": 5}}, True),
+    ({"modes": {"A": {"flow": {"x": 1}, "transitions": None, "domain": None, "final": True}}}, True),
+    ({"hsdsl": 2}, False),
+    ({"parmeters": {}}, False),
+    ({"parameters": {"a": {"unit": "m"}}}, False),
+    ({"inputs": {"u": {"times": [0, 1], "values": [1, 2], "hold": "cubic"}}}, False),
+    ({"modes": {"A": {"flow": {"x": 1}, "transitions": [{"when": "x >= 1"}]}}}, False),
+    ({"modes": {"A": {"flow": {"x": 1}, "final": "yes"}}}, False),
+    ({"modes": []}, False),
+    ({"initial": {"x": 0}}, False),
+    ({"experiment": {}}, False),
+    ({"experiment": {"until": 1, "scheme": "fast"}}, False),
+]
+
+
+@pytest.mark.parametrize(("change", "fits"), CHANGES)
+def test_schema_and_reader_agree(change, fits):
+    document = {**BASE, **change}
+    assert jsonschema.Draft7Validator(json_schema()).is_valid(document) is fits
+    try:
+        elaborate("m.yaml", text=yaml.dump(document).encode())
+        read = True
+    except ModelError:
+        read = False
+    assert read is fits
