@@ -37,7 +37,8 @@ def sum_bits(terms: list[Any]) -> int:
     denominators: dict[Any, set[int]] = {}
     for term in terms:
         for part in sp.Add.make_args(term):
-            coefficient, rest = part.as_coeff_Mul()
+            split: tuple[Any, Any] = part.as_coeff_Mul()
+            coefficient, rest = split
             if coefficient.is_Rational and coefficient.q != 1:
                 denominators.setdefault(rest, set()).add(int(coefficient.q))
     return max((sum(q.bit_length() for q in group) for group in denominators.values()), default=0)

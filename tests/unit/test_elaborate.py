@@ -154,7 +154,8 @@ def test_data_may_not_be_linked_from_outside(tmp_path):
 
 
 def test_experiment_and_initial_are_expressions():
-    tail = "parameters: {a: 2}\ninitial: {mode: A, x: a/4, v: 0}\nexperiment: {until: 40*pi, samples: [0, a, pi], step: a/100}\n"
+    tail = "parameters: {a: 2}\ninitial: {mode: A, x: a/4, v: 0}\n"
+    tail += "experiment: {until: 40*pi, samples: [0, a, pi], step: a/100}\n"
     made = model("", tail=tail)
     assert made.initial.values == (("x", A / 4), ("v", 0))
     assert made.experiment.until == 40 * sp.pi and made.experiment.samples == (0, A, sp.pi)
@@ -240,10 +241,10 @@ def test_large_models_are_read_quickly():
             lines.append(
                 f"  M{i}_{j}:\n    flow: {{x: v, v: -x - {i}*v/100, w: sin(x) + {j}*cos(v)**2}}\n    transitions:\n"
             )
-            for k, l in ((i + 1, j), (i, j + 1), (i - 1, j), (i, j - 1)):
-                to = f"M{k % side}_{l % side}"
+            for k, m in ((i + 1, j), (i, j + 1), (i - 1, j), (i, j - 1)):
+                to = f"M{k % side}_{m % side}"
                 lines.append(
-                    f"      - {{when: x - {k}*v >= {l}, if: v > 0 and w < 3, to: {to}, reset: {{v: -0.9*v}}}}\n"
+                    f"      - {{when: x - {k}*v >= {m}, if: v > 0 and w < 3, to: {to}, reset: {{v: -0.9*v}}}}\n"
                 )
     lines.append("initial: {mode: M0_0, x: 0, v: 0, w: 0}\nexperiment: {until: 1}\n")
     began = time.perf_counter()

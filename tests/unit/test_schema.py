@@ -24,8 +24,7 @@ BASE = {
 
 def parts(schema):
     """Every schema in a schema that stands for a key's value."""
-    for name, prop in schema.get("properties", {}).items():
-        yield name, prop
+    yield from schema.get("properties", {}).items()
     for part in schema.get("definitions", {}).values():
         yield from parts(part)
 
