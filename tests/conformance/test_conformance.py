@@ -17,7 +17,7 @@ grid                      every row's time is a multiple of the step
 rows                      times that must be rows
 ========================= ==========================================================================================
 
-Expectations are arithmetic over ``eps`` (the relaxation), ``h`` (the step, 0 for an adaptive method), the delays
+Expectations are arithmetic over ``eps`` (the relaxation), ``h`` (the step, 0 for an adaptive method), ``u`` (unit round-off), the delays
 ``d0, d1, ...`` (``resumed - time`` of each transition) and ``delay`` (their sum). A *corrected* time is the recorded one less
 all earlier delays: where the flow is the same at all times, the relaxed execution is the execution delayed, so corrected
 times and the states at transitions are those of the hybrid system itself, whatever the relaxation. A strip is
@@ -27,6 +27,8 @@ so the delay is eps + tau (1/s - 1), between eps and eps/s.
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -42,6 +44,7 @@ HERE = Path(__file__).parent
 CASES = {path.name.removesuffix(".expect.yaml"): path for path in sorted((HERE / "cases").glob("*.expect.yaml"))}
 MEANING = [f"M{k}" for k in range(1, 11)]
 SCHEMES = ("relaxed",)
+LIMIT = 6  # seconds for one run; a thousandth of it is the rule
 ENGINES: dict[str, dict[str, Any]] = {"python": {}}
 
 
@@ -153,7 +156,12 @@ class Comparison:
     def __init__(self, run: Run, setting: dict[str, str], execution: Any) -> None:
         digits = int(setting.get("precision", 0))
         self.roundoff = mp.mpf(10) ** (3 - digits) if digits else mp.mpf("2e-13")
-        self.names = {"eps": evaluate(setting["relaxation"]), "h": evaluate(setting.get("step", 0)), "delay": mp.mpf(0)}
+        self.names = {
+            "eps": evaluate(setting["relaxation"]),
+            "h": evaluate(setting.get("step", 0)),
+            "u": mp.mpf(10) ** (1 - digits) if digits else mp.mpf(2) ** -53,
+            "delay": mp.mpf(0),
+        }
         self.raw, self.execution = run, execution
         self.within = self.value(run.within)
         self.delays: list[mp.mpf] = []
@@ -246,6 +254,23 @@ def assert_legal(execution: Any) -> None:
     for one, two in zip(execution.transitions, execution.transitions[1:], strict=False):
         assert one.target == two.source and one.resumed is not None and two.time >= one.resumed
     assert max(ends) == execution.stop.time == max(execution.times), "something is later than the end"
+
+
+@pytest.fixture(autouse=True)
+def no_run_is_endless() -> Iterator[None]:
+    """Make a run that does not end a failure instead of a hang (where the platform has alarms)."""
+
+    def give_up(*_: Any) -> None:
+        raise TimeoutError(f"still running after {LIMIT} s")
+
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(LIMIT)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -132,7 +132,9 @@ class Solution:
         if not len(above):
             return None
         low, high = (mp.mpf(float(times[above[0]])) - mp.mpf("1e-3") * k for k in (1, 0))
-        root = mp.findroot(lambda t: flight.at(t)[0] - stop, (max(low, flight.start), high), solver="anderson", tol=1e-100)
+        root = mp.findroot(
+            lambda t: flight.at(t)[0] - stop, (max(low, flight.start), high), solver="anderson", tol=1e-100
+        )
         return root if root <= self.until else None
 
     def _short(self, flight: Flight, v: mp.mpf, stop: mp.mpf) -> mp.mpf | None:
@@ -167,9 +169,7 @@ class Solution:
 def exact_example_1() -> Solution:
     """Table I, example 1, from (11.36, 31.4) until 40 pi."""
     with mp.workdps(DIGITS):
-        return Solution(
-            Oscillator("0.05", "0.9", "2.5", "14", "20"), mp.mpf("11.36"), mp.mpf("31.4"), 40 * mp.pi
-        )
+        return Solution(Oscillator("0.05", "0.9", "2.5", "14", "20"), mp.mpf("11.36"), mp.mpf("31.4"), 40 * mp.pi)
 
 
 @lru_cache

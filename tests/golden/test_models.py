@@ -1,0 +1,117 @@
+"""Every model in ``models/`` gives what its ``reference:`` block knows.
+
+Transition times are compared *corrected*: recorded time less the delays (``resumed - time``) of earlier transitions, since
+the relaxed execution is the execution delayed. A state known at time T is read off the run at T plus those delays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import hsdsl
+import pytest
+import yaml
+from exact.arithmetic import evaluate
+
+MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
+
+
+@dataclass(frozen=True)
+class Check:
+    """How a model is run for its check, and how close it must come: ``default``, or by state name."""
+
+    within: dict[str, float]
+    settings: dict[str, str] = field(default_factory=lambda: {"tolerance": "1e-12", "relaxation": "1e-9"})
+
+
+CHECKS: dict[str, Check] = {}
+
+
+def read(path: Path) -> Any:
+    """YAML with every scalar as text."""
+    return yaml.load(path.read_text(), Loader=yaml.BaseLoader)
+
+
+def references() -> list[Any]:
+    """Every reference of every model; a single one is written without a list."""
+    found = []
+    for name, path in MODELS.items():
+        block = read(path).get("reference", [])
+        for number, one in enumerate(block if isinstance(block, list) else [block]):
+            found.append(pytest.param(name, one, id=f"{name}-{number}"))
+    return found
+
+
+def arguments(settings: dict[str, str]) -> dict[str, Any]:
+    """What ``set`` overrides, as arguments of ``simulate``."""
+    call: dict[str, Any] = {"parameters": {}, "initial": {}}
+    for name, value in settings.items():
+        group, _, key = name.rpartition(".")
+        if group == "experiment":
+            call[key] = value
+        else:
+            call["initial" if group == "initial" else "parameters"][key] = value
+    return call
+
+
+class Compared:
+    """A run beside its reference."""
+
+    def __init__(self, run: Any, check: Check, trust: float) -> None:
+        self.run, self.check, self.trust = run, check, trust
+        self.delays = [0.0]
+        for transition in run.transitions:
+            lasted = 0.0 if transition.resumed is None else transition.resumed - transition.time
+            self.delays.append(self.delays[-1] + lasted)
+
+    def close(self, actual: float, wanted: str, name: str, what: str) -> None:
+        """Assert that a number is the reference's."""
+        allowed = self.check.within.get(name, self.check.within["default"]) + self.trust
+        off = abs(actual - float(evaluate(wanted)))
+        assert off <= allowed, f"{what}: {name} off by {off:.3g}, allowed {allowed:.3g}"
+
+    def transitions(self, known: list[Any]) -> None:
+        """Compare transitions in order."""
+        assert len(self.run.transitions) == len(known), [(t.edge, t.time) for t in self.run.transitions][:60]
+        for k, (actual, one) in enumerate(zip(self.run.transitions, known, strict=True)):
+            one = one if isinstance(one, dict) else {"time": one}
+            what = f"transition {k}"
+            self.close(actual.time - self.delays[k], one["time"], "time", what)
+            assert actual.edge == one.get("edge", actual.edge), what
+            for side in ("before", "after"):
+                for name, wanted in one.get(side, {}).items():
+                    self.close(getattr(actual, side)[name], wanted, name, f"{what} {side}")
+
+    def states(self, known: list[Any]) -> None:
+        """Compare states at known times."""
+        for one in known:
+            one = dict(one)
+            time = float(evaluate(one.pop("time")))
+            made = sum(t.time - d <= time for t, d in zip(self.run.transitions, self.delays, strict=False))
+            point = self.run(min(time + self.delays[made], self.run.stop.time))
+            assert point.mode == one.pop("mode", point.mode)
+            for name, wanted in one.items():
+                self.close(float(point.state[name]), wanted, name, f"state at {time}")
+
+
+@pytest.mark.parametrize(("name", "reference"), references())
+def test_reference(name: str, reference: dict[str, Any]) -> None:
+    check = CHECKS[name]
+    run = hsdsl.load(MODELS[name]).simulate(**check.settings, **arguments(reference.get("set", {})))
+    assert run.stop.complete, run.stop.message
+    compared = Compared(run, check, float(reference["trust"]))
+    if "transitions" in reference:
+        compared.transitions(reference["transitions"])
+    compared.states(reference.get("states", []))
+
+
+def test_every_model_is_checked() -> None:
+    assert set(CHECKS) == set(MODELS)
+    assert all("reference" in read(path) for path in MODELS.values())
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_model_starts_with_the_modeline(name: str) -> None:
+    assert MODELS[name].read_text().startswith("# yaml-language-server: $schema=../schemas/model.schema.json\n")
