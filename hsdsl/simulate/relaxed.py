@@ -20,6 +20,7 @@ from hsdsl.simulate.run import Here, Run, choose, reset, show
 from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
+MOST_IDLE = 64  # steps in a row too short for time to notice: enough to close in on a surface, and then no more
 NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
 
 
@@ -54,13 +55,13 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     control, append, method = run.control, here.arc.append, run.stepper(len(here.x))
     piece, curved = method.piece, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
-    t, x, limit = here.t, here.x, here.segment.end
+    t, x, limit, idle = here.t, here.x, here.segment.end, 0
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, (x,))
     while t < limit:
-        h, halvings, ratio = control.h, 0, None
+        h, halvings, ratio, obstacle = control.h, 0, None, None
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             found, z, stages, end = attempt(run, here, method, t, h, t1, x, slope)
@@ -70,6 +71,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
                     found = TOO_WRONG
             if not isinstance(found, Obstacle):
                 break
+            obstacle = found
             if found is TOO_WRONG and halvings == 0:
                 control.reject(h, ratio)
                 h = control.h
@@ -81,6 +83,9 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             control.accept(h, ratio)
         if found or end is None:
             return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z))
+        idle = idle + 1 if t1 == t else 0
+        if obstacle and idle and (z == x or idle > MOST_IDLE):
+            return stuck(run, here.moved(t, x), obstacle, slope)
         append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
         t, x, slope = t1, z, end
     return here.moved(t, x)
