@@ -13,7 +13,7 @@ import sympy as sp
 LARGEST_EXPONENT = 1000
 MOST_BITS = 6_000  # of one exact number: the product of two must still print as a decimal (4,300 digits)
 MOST_NODES = 100_000
-MOST_LEVELS = 600
+MOST_LEVELS = 150  # Python compiles no more than 200 nested parentheses
 
 
 def bits(expr: Any) -> int:

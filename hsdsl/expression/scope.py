@@ -52,7 +52,7 @@ class Value:
     uses : frozenset of str
         The states it was written with.
     size, depth : int
-        Its nodes and height, written out in full.
+        Its nodes, and how deep its parentheses are nested, written out in full.
     """
 
     expr: Any
@@ -60,7 +60,7 @@ class Value:
     constant: bool = False
     uses: frozenset[str] = frozenset()
     size: int = 1
-    depth: int = 1
+    depth: int = 0
 
 
 @dataclass(frozen=True)

@@ -176,10 +176,13 @@ class _Builder:
         if constant:
             self.refuse_unless_finite(tree, number)
         uses = frozenset().union(*(part.uses for part in parts))
-        size, depth = 1 + sum(p.size for p in parts), 1 + max(p.depth for p in parts)
-        if size > bounds.MOST_NODES or depth > bounds.MOST_LEVELS:
+        size, depth = 1 + sum(p.size for p in parts), _levels(tree, parts)
+        if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+        if depth > bounds.MOST_LEVELS:
+            message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
         return Value(expr, number, constant, uses, size, depth)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
@@ -218,6 +221,15 @@ class _Builder:
     def said(self, tree: Tree) -> str:
         """The text of a node, cut to what a sentence carries."""
         return shown(self.text[tree.start : tree.end], 40)
+
+
+def _levels(tree: Tree, parts: list[Value]) -> int:
+    """How deep the parentheses are nested when a node is written out."""
+    if isinstance(tree, (Call, Power)):
+        return 1 + max(part.depth for part in parts)
+    if isinstance(tree, Product):
+        return max(part.depth + part.expr.is_Add for part in parts)
+    return max(part.depth for part in parts)
 
 
 def _not_real(expr: Any) -> bool:

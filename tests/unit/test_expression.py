@@ -147,9 +147,10 @@ LARGE = {
     "quotient": "1" + "/x" * 4999,
     "signs": "-" * 9999 + "x",
     "parentheses": "(" * 200 + "x" + ")" * 200,
-    "functions": "sin(" * 200 + "x" + ")" * 200,
+    "functions": "sin(" * 150 + "x" + ")" * 150,
     "nested sums": "(1+2*" * 200 + "x" + ")" * 200,
-    "powers": "x**" * 200 + "x",
+    "products of sums": "(1+x*" * 150 + "x" + ")" * 150,
+    "powers": "x**" * 150 + "x",
     "decimals": "+".join(f"x*3.{i}1" for i in range(900)),
     "quotients": "+".join(f"x**{i}/3.{i}1" for i in range(700)),
 }
@@ -165,6 +166,8 @@ def test_large_expressions_work(text):
 REFUSED = {
     "parentheses": ("(" * 201 + "x" + ")" * 201, "HS110"),
     "powers": ("x**" * 201 + "x", "HS110"),
+    "functions": ("sin(" * 151 + "x" + ")" * 151, "HS120"),
+    "products of sums": ("(1+x*" * 155 + "x" + ")" * 155, "HS120"),
     "length": ("x" * 10_001, "HS110"),
     "tower": ("9**9**9", "HS119"),
     "nested towers": ("(((2*x)**1000)**1000)**1000", "HS120"),
