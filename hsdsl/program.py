@@ -68,8 +68,8 @@ class ModeProgram:
     conditions     as many booleans as edges, true where there is no `if`
     outputs        k values, NaN where the mode lacks a state the output needs
     reset_K        values of edge K's target states
-    spread_K       the size |R_i| + sum |dR_i/dx_k| s_k of the numbers each target state is computed
-                   from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
+    spread_K       the size max(|R_i|, sum |dR_i/dx_k| s_k) of the numbers each target state is
+                   computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
     ``diagnosis`` has one routine ``expression_K`` for each of ``expressions`` (flows, surfaces, conditions as a person

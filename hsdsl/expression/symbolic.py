@@ -176,7 +176,7 @@ class _Builder:
         if constant:
             self.refuse_unless_finite(tree, number)
         uses = frozenset().union(*(part.uses for part in parts))
-        size, depth = 1 + sum(p.size for p in parts), _levels(tree, parts)
+        size, depth = 1 + sum(p.size for p in parts), _levels(tree, expr, parts)
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
@@ -223,11 +223,11 @@ class _Builder:
         return shown(self.text[tree.start : tree.end], 40)
 
 
-def _levels(tree: Tree, parts: list[Value]) -> int:
+def _levels(tree: Tree, expr: Any, parts: list[Value]) -> int:
     """How deep the parentheses are nested when a node is written out."""
     if isinstance(tree, (Call, Power)):
         return 1 + max(part.depth for part in parts)
-    if isinstance(tree, Product):
+    if isinstance(tree, Product) and not expr.is_Add:
         return max(part.depth + part.expr.is_Add for part in parts)
     return max(part.depth for part in parts)
 

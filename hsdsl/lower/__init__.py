@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from hsdsl import program as lowered
-from hsdsl.functions import absolute
+from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
 
@@ -189,4 +189,5 @@ def _mode_routines(mode: Mode, names: Names):
 
 
 def _spread(value: sp.Expr, states, scales) -> sp.Expr:
-    return sp.Add(absolute(value), *(absolute(value.diff(x)) * s for x, s in zip(states, scales, strict=True)))
+    parts = sp.Add(*(absolute(value.diff(x)) * s for x, s in zip(states, scales, strict=True)))
+    return parts if value in states else maximum(absolute(value), parts)

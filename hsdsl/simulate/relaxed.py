@@ -20,7 +20,7 @@ from hsdsl.simulate.run import Here, Run, choose, reset, show
 from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-MOST_IDLE = 64  # steps in a row too short for time to notice: enough to close in on a surface, and then no more
+IDLE_UNITS, MOST_IDLE = 4, 64  # steps that time hardly notices: enough in a row to close in on a surface, no more
 NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
 
 
@@ -82,9 +82,9 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found or end is None:
-            return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z))
-        idle = idle + 1 if t1 == t else 0
-        if obstacle and idle and (z == x or idle > MOST_IDLE):
+            return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z, here))
+        idle = idle + 1 if halvings and h <= IDLE_UNITS * run.arithmetic.unit * max(t, control.h) else 0
+        if idle and (z == x or idle > MOST_IDLE):
             return stuck(run, here.moved(t, x), obstacle, slope)
         append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
         t, x, slope = t1, z, end
@@ -180,7 +180,7 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
     t, x = here.t, here.x
     if obstacle.kind in ("wall", "deep", "flat", "inward") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
-        return Landing(chosen, alternatives, t, sizes(x, x))
+        return Landing(chosen, alternatives, t, sizes(x, x, here))
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
     if obstacle.kind == "not finite":
@@ -194,6 +194,6 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
 
 
-def sizes(x: State, z: State) -> State:
-    """Return the sizes of the numbers that a point between x and z is computed from."""
-    return tuple(max(abs(a), abs(b)) for a, b in zip(x, z, strict=True))
+def sizes(x: State, z: State, here: Here) -> State:
+    """Return the sizes of the numbers that a point between x and z was computed from, since the mode was entered."""
+    return tuple(max(abs(a), abs(b), s) for a, b, s in zip(x, z, here.surfaces.scale, strict=True))

@@ -1,0 +1,50 @@
+"""The other verbs: validate, schema, doctor, and what holds for all."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from cli.conftest import MODELS
+
+import hsdsl
+
+
+def test_all_models_are_valid(command):
+    models = sorted(MODELS.glob("*.yaml"))
+    assert len(models) >= 7
+    answer = command("validate", *models)
+    assert answer.code == 0 and answer.out.count("valid") == len(models)
+
+
+def test_validate_names_every_error_of_every_file(command, model):
+    good = MODELS / "digital-control.yaml"
+    bad = model("hsdsl: 1\nmodes: {a: {flow: {x: y}}}\ninitial: {mode: b, x: 1}\nexperiment: {until: 1}\n")
+    answer = command("validate", good, bad, "--json")
+    assert answer.code == 1
+    assert [entry["valid"] for entry in answer.json["models"]] == [True, False]
+    assert [error["line"] for error in answer.json["errors"]] == [2, 3]
+
+
+def test_validate_unreadable(command, tmp_path):
+    assert command("validate", tmp_path / "no.yaml").code == 2
+
+
+def test_schema_is_the_file(command):
+    printed = json.loads(command("schema").out)
+    assert printed == json.loads((MODELS.parent / "schemas" / "model.schema.json").read_text())
+
+
+def test_doctor(command):
+    answer = command("doctor", "--json")
+    assert answer.code == 0 and answer.json["engines"] == ["python"]
+    assert hsdsl.__version__ in command("doctor").out
+
+
+def test_version(command):
+    assert command("--version").out.strip() == f"hsdsl {hsdsl.__version__}"
+
+
+@pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "a", "b"], ["validate"]])
+def test_wrong_words(command, arguments):
+    assert command(*arguments).code == 2

@@ -1,0 +1,117 @@
+"""Generated routines against the mathematics: random expressions, their gradients and rates, floats and many digits."""
+
+from __future__ import annotations
+
+import mpmath
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hsdsl
+from hsdsl.arithmetic import FLOAT64, multiprecision
+from hsdsl.backends.python import PythonKernel
+from hsdsl.elaborate import elaborate
+from hsdsl.model import Model
+
+MANY = multiprecision(40)
+# every expression stays within [-50, 50] on [-2, 2]^2, and so do its first two derivatives' parts: errors are absolute
+LEAVES = st.sampled_from(["x", "v", "a", "t", "u", "1/3", "0.7", "2", "pi"])
+
+
+def _grown(inner):
+    return st.one_of(
+        st.builds("sin({})".format, inner),
+        st.builds("cos({})".format, inner),
+        st.builds("tanh({})".format, inner),
+        st.builds("atan2({}, 2 + cos({}))".format, inner, inner),
+        st.builds("sqrt(1 + tanh({})**2)".format, inner),
+        st.builds("exp(sin({}))".format, inner),
+        st.builds("({} - {})/2".format, inner, inner),
+        st.builds("tanh({})*cos({})".format, inner, inner),
+        st.builds("sin({})/(2 + cos({}))".format, inner, inner),
+        st.builds("tanh({})**3".format, inner),
+        st.builds("(2 + sin({}))**-2".format, inner),
+        st.builds("(2 + sin({}))**1.5".format, inner),
+        st.builds("-cos({})**2".format, inner),
+        st.builds("max({}, {})".format, inner, inner),
+        st.builds("abs({})".format, inner),
+    )
+
+
+EXPRESSIONS = st.recursive(LEAVES, _grown, max_leaves=5)
+POINTS = st.tuples(*[st.floats(-2, 2).map(lambda v: round(v, 6) + 1e-4) for _ in range(3)])
+
+
+def kernels(flow: str, guard: str):
+    text = f"""
+hsdsl: 1
+parameters: {{a: 0.35}}
+inputs: {{u: {{times: [0, 10], values: [1, 3], hold: linear}}}}
+modes:
+  m:
+    flow: {{x: "{flow}", v: "1 - x*v/4"}}
+    transitions: [{{when: "{guard} >= v/3", to: m, reset: {{x: "{flow}", v: x}}}}]
+outputs: {{y: "{flow}"}}
+initial: {{mode: m, x: 0, v: 0}}
+experiment: {{until: 1}}
+"""
+    program = Model(elaborate("random.yaml", text=text.encode())).program
+    bound = []
+    for arithmetic in (FLOAT64, MANY):
+        kernel = PythonKernel(program, arithmetic)
+        data = [kernel.constant("parameter_0", ())[0], *(arithmetic.zero + n for n in (1, 0, 0))]
+        data[2] = arithmetic.constant(__import__("fractions").Fraction(1, 5))
+        bound.append(kernel.bind(0, data))
+    return bound
+
+
+@settings(max_examples=60, deadline=None)
+@given(EXPRESSIONS, EXPRESSIONS, POINTS)
+def test_floats_agree_with_forty_digits(flow, guard, point):
+    quick, exact = kernels(flow, guard)
+    many = tuple(MANY.zero + p for p in point)
+    for name in ("flow", "surfaces", "magnitudes", "rates", "outputs"):
+        for a, b in zip(getattr(quick, name)(*point), getattr(exact, name)(*many), strict=True):
+            assert abs(a - b) < 1e-11
+    for a, b in zip(quick.gradients(*point)[0], exact.gradients(*many)[0], strict=True):
+        assert abs(a - b) < 1e-11
+    assert quick.resets[0](*point)[1] == point[1]
+
+
+@settings(max_examples=40, deadline=None)
+@given(EXPRESSIONS, EXPRESSIONS, POINTS)
+def test_gradients_are_the_slopes_of_surfaces_and_rates_follow_the_flow(flow, guard, point):
+    _, exact = kernels(flow, guard)
+    at = [MANY.zero + p for p in point]
+    h = mpmath.mpf(10) ** -12
+    gradient = exact.gradients(*at)[0]
+    for i, slope in enumerate(gradient):
+        up, down = list(at), list(at)
+        up[i], down[i] = at[i] + h, at[i] - h
+        difference = (exact.surfaces(*up)[0] - exact.surfaces(*down)[0]) / (2 * h)
+        assert abs(difference - slope) < 1e-9
+    f = exact.flow(*at)
+    rate = gradient[0] + gradient[1] * f[0] + gradient[2] * f[1]
+    assert abs(rate - exact.rates(*at)[0]) < 1e-30
+
+
+NAMES = ["E", "I", "S", "beta", "lambda", "None_", "exec", "import_", "q_1_2", "x0", "p0", "w0", "nan", "e", "class"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_reach_the_generated_text_only_as_numbers(name):
+    text = f"""
+hsdsl: 1
+parameters: {{par_{name}: 3}}
+modes:
+  m: {{flow: {{{name}: "{name}*par_{name} + 1"}}, transitions: [{{when: {name} >= 5, to: m, reset: {{{name}: -{name}}}}}]}}
+initial: {{mode: m, {name}: 1}}
+experiment: {{until: 0}}
+"""
+    system = elaborate("names.yaml", text=text.encode())
+    program = Model(system).program
+    source = program.modes[0].routines.source
+    assert f"par_{name}" not in source
+    kernel = PythonKernel(program, FLOAT64)
+    assert kernel.bind(0, [3.0]).flow(0.0, 2.0) == (7.0,)
+    assert hsdsl.Model(system).simulate().final.state == {name: 1.0}
