@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
-import click
 import typer
 
 from hsdsl import __version__
@@ -21,6 +20,7 @@ from hsdsl.cli.schema import schema
 from hsdsl.cli.validate import validate
 
 INTERRUPTED = 130
+WrongWords: Any = typer.BadParameter.__mro__[2]  # ClickException, wherever typer has it from
 
 app = typer.Typer(
     name="hsdsl",
@@ -54,10 +54,10 @@ def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
     try:
         code = app(standalone_mode=False)
-    except click.ClickException as error:
+    except WrongWords as error:
         error.show()
         code = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         print("interrupted", file=sys.stderr)
         code = INTERRUPTED
     except BrokenPipeError:

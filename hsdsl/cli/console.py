@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import typer
 
 from hsdsl.diagnose import as_json, render
-from hsdsl.errors import ModelError, UsageError
+from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
 from hsdsl.report import dumps
 from hsdsl.simulate.recorder import Recorder
 
@@ -35,7 +35,8 @@ def errors_reported(json: bool) -> Iterator[None]:
             say("\n\n".join(render(d) for d in error.diagnostics))
             count = len(error.diagnostics)
             say(f"\n{count} error{'s' * (count > 1)}")
-        raise typer.Exit(MODEL_ERRORS) from None
+        contradiction = all(d.code == STEP_AND_TOLERANCE for d in error.diagnostics)
+        raise typer.Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
     except UsageError as error:
         report_usage(error, json)
         raise typer.Exit(WRONG_USAGE) from None

@@ -68,6 +68,8 @@ def run(
     }
     with errors_reported(json):
         _check_target(out, "--out", OUT_SUFFIXES)
+        if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
+            raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         _check_target(plot, "--plot", PLOT_SUFFIXES)
         execution = _simulate(model, set_ or [], asked, outputs, estimate, out, plot, json, quiet)
     if execution.stop.reason == "interrupted":

@@ -176,7 +176,8 @@ class Execution:
             The suffix says which.
         samples : times, optional
             For a table: rows at these times and both rows of each jump, instead of the rows the integrator
-            chose. Times outside the run are left out (a run may stop early).
+            chose. Times outside the run are left out (a run may stop early). Left out: the samples the run was
+            asked for (:attr:`sample_times`).
         columns : names, optional
             For a table: which states and outputs, in this order.
 
@@ -192,7 +193,16 @@ class Execution:
         """
         from hsdsl.store import save
 
-        return save(self, path, samples=samples, columns=columns)
+        return save(self, path, samples=self.sample_times if samples is None else samples, columns=columns)
+
+    @property
+    def sample_times(self) -> Array | None:
+        """The times the run was asked to be sampled at, in its ``samples`` setting; None for the integrator's rows."""
+        asked = self.settings.get("samples")
+        if isinstance(asked, int):
+            until = self.settings["until"]
+            return np.array([until * k / (asked - 1) for k in range(asked - 1)] + [until])
+        return None if asked is None else np.array(asked)
 
 
 def _changes(execution: Execution) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from hsdsl import program as lowered
+from hsdsl.expression.stack import deep_stack
 from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
@@ -38,6 +39,11 @@ class Names:
 
 def lower(system: HybridSystem) -> lowered.Program:
     """Lower a system; the result needs no SymPy to run."""
+    with deep_stack():
+        return _lower(system)
+
+
+def _lower(system: HybridSystem) -> lowered.Program:
     names = _number(system)
     experiment = system.experiment
     return lowered.Program(
@@ -61,9 +67,10 @@ def lower(system: HybridSystem) -> lowered.Program:
 def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
     """Lower expressions of parameters (what overrides are made of): each a routine of all parameters."""
     names = _number(system)
-    return print_routines(
-        [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
-    )
+    with deep_stack():
+        return print_routines(
+            [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
+        )
 
 
 def _symbol(name: str) -> sp.Symbol:

@@ -21,7 +21,7 @@ modes:
     transitions: [{name: bounce, when: h <= 0, to: fall, reset: {v: -e*v}}]
 outputs: {energy: v**2/2 + g*h}
 initial: {mode: fall, h: 1, v: 0}
-experiment: {until: 1, tolerance: 1e-9}
+experiment: {until: 1.5, tolerance: 1e-9}
 """
 KEYS = ["model", "engine", "scheme", "method", "settings", "stop", "transitions", "final", "verdict", "seconds"]
 TRANSITION = ["index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives"]
@@ -42,13 +42,13 @@ def test_json_is_the_contract(command, model):
     assert (first["index"], first["edge"], first["from"], first["to"]) == (0, "bounce", "fall", "fall")
     assert first["time"] == pytest.approx((2 / 9.81) ** 0.5, abs=1e-6)
     assert first["after"]["v"] == pytest.approx(-0.8 * first["before"]["v"])
-    assert 1e-6 / 4.43 <= first["resumed"] - first["time"] <= 1.0001e-6
+    assert 1e-6 / 4.43 <= first["resumed"] - first["time"] <= 1.001e-6
 
 
 def test_the_summary_is_for_people(command, model):
     answer = command("run", model(BALL))
     assert answer.code == 0
-    for word in ("bounce", "reached t = 1", "unknown", "energy"):
+    for word in ("bounce", "reached t = 1.5", "unknown", "energy"):
         assert word in answer.out
 
 
@@ -56,20 +56,26 @@ def test_quiet_says_nothing(command, model):
     assert command("run", model(BALL), "--quiet").out == ""
 
 
-SETTINGS = {
+SETTINGS: dict[str, tuple[list[str], object]] = {
     "--until": (["--until", "2*e - 1.35"], lambda run: run["stop"]["time"] == pytest.approx(0.25)),
-    "--set parameter": (["--set", "e=1/2"], lambda run: run["transitions"][0]["after"]["v"] == pytest.approx(2.2147, abs=1e-4)),
+    "--set parameter": (["--set", "e=1/2"], lambda run: abs(run["transitions"][0]["after"]["v"] - 2.2147) < 1e-4),
     "--set derived": (["--set", "twice=e/2", "--set", "e=0.5"], lambda run: True),
-    "--set initial": (["--set", "initial.h=e"], lambda run: run["transitions"][0]["time"] == pytest.approx(0.40386, abs=1e-5)),
+    "--set initial": (["--set", "initial.h=e"], lambda run: abs(run["transitions"][0]["time"] - 0.40386) < 1e-5),
     "--set setting": (["--set", "experiment.until=0.25"], lambda run: run["final"]["time"] == 0.25),
-    "--set setting, below option": (["--set", "experiment.until=0.25", "--until", "0.5"], lambda run: run["final"]["time"] == 0.5),
-    "--step": (["--step", "1e-3", "--method", "rk4"], lambda run: run["settings"]["step"] == 1e-3 and run["method"] == "rk4"),
+    "--set setting, below option": (
+        ["--set", "experiment.until=0.25", "--until", "0.5"],
+        lambda run: run["final"]["time"] == 0.5,
+    ),
+    "--step": (
+        ["--step", "1e-3", "--method", "rk4"],
+        lambda run: run["settings"]["step"] == 1e-3 and run["method"] == "rk4",
+    ),
     "--relaxation": (["--relaxation", "1e-3"], lambda run: run["settings"]["relaxation"] == 1e-3),
     "--engine": (["--engine", "python"], lambda run: run["engine"] == "python"),
     "the last counts": (["--until", "0.1", "--until", "0.2"], lambda run: run["final"]["time"] == 0.2),
     "--precision": (["--precision", "40"], lambda run: True),
     "--outputs": (["--outputs", "h"], lambda run: run["final"]["outputs"] == {}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -142,7 +148,7 @@ def test_a_file_against_itself_is_wrong_usage(command, model):
 STOPS = {
     "left_domain": BALL.replace("    transitions", "    domain: [v >= -1]\n    transitions"),
     "not_finite": BALL.replace("v: -g}", "v: -g/sqrt(h - 1/2)}"),
-    "transition_limit": BALL.replace("until: 1,", "until: 1, max_transitions: 1,"),
+    "transition_limit": BALL.replace("until: 1.5,", "until: 1.5, max_transitions: 1,"),
     "zeno": BALL.replace("reset: {v: -e*v}", "reset: {h: -1}"),
 }
 
@@ -172,10 +178,10 @@ def test_csv(command, model, tmp_path):
 
 def test_samples_and_columns(command, model, tmp_path):
     out = tmp_path / "run.csv"
-    command("run", model(BALL), "--out", out, "--quiet", "--set", "experiment.samples=11", "--outputs", "energy")
+    command("run", model(BALL), "--out", out, "--quiet", "--set", "experiment.samples=16", "--outputs", "energy")
     rows = list(csv.reader(out.open()))
     assert rows[0] == ["time", "mode", "j", "energy"]
-    assert {f"{k / 10:.1f}" for k in range(11)} <= {f"{float(r[0]):.1f}" for r in rows[1:]}
+    assert {f"{k / 10:.1f}" for k in range(16)} <= {f"{float(r[0]):.1f}" for r in rows[1:]}
     assert len(rows) < 30
 
 

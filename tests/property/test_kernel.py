@@ -104,7 +104,9 @@ def test_names_reach_the_generated_text_only_as_numbers(name):
 hsdsl: 1
 parameters: {{par_{name}: 3}}
 modes:
-  m: {{flow: {{{name}: "{name}*par_{name} + 1"}}, transitions: [{{when: {name} >= 5, to: m, reset: {{{name}: -{name}}}}}]}}
+  m:
+    flow: {{{name}: "{name}*par_{name} + 1"}}
+    transitions: [{{when: {name} >= 5, to: m, reset: {{{name}: -{name}}}}}]
 initial: {{mode: m, {name}: 1}}
 experiment: {{until: 0}}
 """
