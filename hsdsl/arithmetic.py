@@ -105,7 +105,7 @@ def multiprecision(digits: int) -> Arithmetic:
     """Make mpmath numbers of ``digits`` decimal digits, in a context of their own (no global state is touched)."""
     import mpmath
 
-    context = mpmath.MPContext()
+    context: Any = mpmath.MPContext()
     context.dps = digits
 
     def real(function: Callable[..., Any]) -> Callable[..., Any]:

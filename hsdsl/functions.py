@@ -3,8 +3,8 @@
 """The functions of the language, as SymPy knows them.
 
 The smooth ones are SymPy's own. The kinked and jumping ones (abs, sign, min, max, floor) are classes of our own:
-SymPy's rewrite themselves, and differentiate into objects no kernel has (DiracDelta, re, im). Ours stay as written, fold exact
-numbers, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side.
+SymPy's rewrite themselves, and differentiate into objects no kernel has (DiracDelta, re, im). Ours stay as written,
+fold exact numbers, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side.
 """
 
 from __future__ import annotations

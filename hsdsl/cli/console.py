@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 import typer
@@ -24,7 +24,7 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def errors_reported(json: bool) -> Iterator[None]:
+def errors_reported(json: bool) -> Generator[None]:
     """Turn the two exceptions of the house into messages and exit codes; never a traceback for bad input."""
     try:
         yield
@@ -51,7 +51,7 @@ def report_usage(error: UsageError, json: bool) -> None:
 
 
 @contextmanager
-def progress(quiet: bool) -> Iterator[Callable[[Recorder], None] | None]:
+def progress(quiet: bool) -> Generator[Callable[[Recorder], None] | None]:
     """Show how far a run is, on a terminal, once it takes longer than a moment. Yields the run's ``watch``."""
     if quiet or not sys.stderr.isatty():
         yield None

@@ -195,6 +195,6 @@ def _mode_routines(mode: Mode, names: Names):
         yield Definition(f"spread_{k}", (*arguments, *scales), tuple(_spread(r, states, scales) for r in reset))
 
 
-def _spread(value: sp.Expr, states, scales) -> sp.Expr:
+def _spread(value: sp.Expr, states, scales):
     parts = sp.Add(*(absolute(value.diff(x)) * s for x, s in zip(states, scales, strict=True)))
     return parts if value in states else maximum(absolute(value), parts)

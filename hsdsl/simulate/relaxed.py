@@ -61,7 +61,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, (x,))
     while t < limit:
-        h, halvings, ratio, obstacle = control.h, 0, None, None
+        h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             found, z, stages, end = attempt(run, here, method, t, h, t1, x, slope)
