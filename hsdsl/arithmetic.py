@@ -103,10 +103,13 @@ FLOAT64 = Arithmetic(
 @cache
 def multiprecision(digits: int) -> Arithmetic:
     """Make mpmath numbers of ``digits`` decimal digits, in a context of their own (no global state is touched)."""
-    import mpmath
+    import mpmath  # pyright: ignore[reportMissingTypeStubs]
 
     context: Any = mpmath.MPContext()
     context.dps = digits
+
+    def heaviside(x: Any) -> Any:
+        return (1 + context.sign(x)) / 2
 
     def real(function: Callable[..., Any]) -> Callable[..., Any]:
         def checked(*arguments: Any) -> Any:
@@ -127,7 +130,7 @@ def multiprecision(digits: int) -> Arithmetic:
         | {
             "abs": abs,
             "sign": context.sign,
-            "heaviside": lambda x: (1 + context.sign(x)) / 2,
+            "heaviside": heaviside,
             "floor": context.floor,
             "min": min,
             "max": max,

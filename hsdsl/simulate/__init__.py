@@ -74,7 +74,7 @@ def simulate(
 
 def _native(value: Any) -> Number:
     """Return a column's number as Python's own (NumPy has its own float)."""
-    return float(value) if isinstance(value, np.floating) else value
+    return float(value) if isinstance(value, np.float64) else value
 
 
 def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
