@@ -1,8 +1,8 @@
 """The pendulum caught by a pin, integrated by Taylor series of order 40 in forty digits.
 
-phi'' = -(g/length) sin phi - (d/m) phi'; the length is 1 where phi >= -pi/12 and 0.3 below; the angular velocity is divided by
-0.3 going in and multiplied by it coming out. Series coefficients follow by recurrence, since with s = sin phi and
-c = cos phi we have s' = c phi' and c' = -s phi'. Switches are roots of the series itself.
+phi'' = -(g/length) sin phi - (d/m) phi'; the length is 1 where phi >= -pi/12 and 0.3 below; the angular velocity is
+divided by 0.3 going in and multiplied by it coming out. Series coefficients follow by recurrence, since with
+s = sin phi and c = cos phi we have s' = c phi' and c' = -s phi'. Switches are roots of the series itself.
 """
 
 from __future__ import annotations

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import hsdsl
 import pytest
 import yaml
 from exact.arithmetic import evaluate
+
+import hsdsl
 
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
 
