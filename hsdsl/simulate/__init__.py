@@ -5,6 +5,7 @@
 `entry`             entering a mode: transitions that fire at once
 `surfaces`          round-off, depth, and where a step crossed a surface
 `control`           the step size
+`patience`          when to stop trying shorter steps
 `timeline`          sampled inputs as segments no step crosses
 `run`               what stays for a whole run, and where it stands
 `recorder`          rows, arcs and transitions, and the execution's columns

@@ -29,7 +29,7 @@ class OpenArc:
     outputs: Outputs | None
     times: list[Number]
     values: list[State]
-    pieces: list[Polynomial]  # one fewer than rows
+    pieces: list[Polynomial]  # one fewer than rows; none at all where every piece is a straight line
     depths: list[Number] = field(default_factory=list[Number])
 
     def append(self, t: Number, x: State, piece: Polynomial) -> None:
@@ -78,7 +78,7 @@ class Recorder:
 
     def columns(self) -> dict[str, Any]:
         """Build the execution's arrays (see `hsdsl.execution`)."""
-        rows = [min(len(a.times), len(a.values), len(a.pieces) + 1) for a in self.arcs]
+        rows = [min(len(a.times), len(a.values), len(a.pieces) + 1 if self.degree else len(a.times)) for a in self.arcs]
         ends = np.cumsum(rows)
         arcs = tuple(
             Arc(a.mode, a.states, a.kind, a.jump, int(end - n), int(end - 1))

@@ -7,7 +7,7 @@ is located on the flow: only the step's own interpolant is asked where it crosse
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log2
 
@@ -16,11 +16,11 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset, show
 from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-IDLE_UNITS, MOST_IDLE = 4, 64  # steps that time hardly notices: enough in a row to close in on a surface, no more
 NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
 
 
@@ -52,10 +52,10 @@ def relaxed(run: Run, here: Here | Stop) -> Stop:
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
     """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
-    control, append, method = run.control, here.arc.append, run.stepper(len(here.x))
-    piece, curved = method.piece, run.recorder.degree > 0
+    control, method, arc, isfinite = run.control, run.stepper(len(here.x)), here.arc, run.arithmetic.isfinite
+    estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
-    t, x, limit, idle = here.t, here.x, here.segment.end, 0
+    t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
@@ -64,9 +64,9 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
-            found, z, stages, end = attempt(run, here, method, t, h, t1, x, slope)
-            if method.error and control.tolerance is not None and end is not None and not isinstance(found, Obstacle):
-                ratio = control.ratio(method.error(h, stages, end), x, z)
+            found, z, stages, end = attempt(run, here, method, isfinite, t, h, t1, x, slope)
+            if estimate and end is not None and not isinstance(found, Obstacle):
+                ratio = control.ratio(estimate(h, stages, end), x, z)
                 if ratio > 1:
                     found = TOO_WRONG
             if not isinstance(found, Obstacle):
@@ -83,35 +83,46 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             control.accept(h, ratio)
         if found or end is None:
             return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z, here))
-        idle = idle + 1 if halvings and h <= IDLE_UNITS * run.arithmetic.unit * max(t, control.h) else 0
-        if idle and (z == x or idle > MOST_IDLE):
-            return stuck(run, here.moved(t, x), obstacle, slope)
-        append(t1, z, piece(h, x, z, stages, slope, end) if curved else ())
+        if halvings == 0:
+            patience.renew()
+        elif end_of_it := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z):
+            return stuck(run, here.moved(t, x), end_of_it, slope)
+        arc.times.append(t1)
+        arc.values.append(z)
+        if curved:
+            arc.pieces.append(method.piece(h, x, z, stages, slope, end))
         t, x, slope = t1, z, end
     return here.moved(t, x)
 
 
 def attempt(
-    run: Run, here: Here, method: Stepper, t: Number, h: Number, t1: Number, x: State, slope: State
+    run: Run,
+    here: Here,
+    method: Stepper,
+    isfinite: Callable[[Number], bool],
+    t: Number,
+    h: Number,
+    t1: Number,
+    x: State,
+    slope: State,
 ) -> tuple[Found, State, Stages, State | None]:
     """Try one step: where it ended, its end z, the stages, and the flow at z if it has a value there."""
-    isfinite, kernel = run.arithmetic.isfinite, here.kernel
+    kernel = here.kernel
     try:
         z, stages = method.step(kernel.flow, t, h, x, slope)
         values = kernel.surfaces(t1, *z)
+        if not values or max(values) <= 0:
+            end = kernel.flow(t1, *z)
+            return () if isfinite(sum(z) + sum(values) + sum(end)) else NOT_FINITE, z, stages, end
         if not isfinite(sum(z) + sum(values)):
             return NOT_FINITE, z, stages, None
-        if not values or max(values) <= 0:
-            found, end = (), kernel.flow(t1, *z)
-        else:
-            trial = Trial(t, h, t1, x, slope, z, stages, kernel.flow, method)
-            found = here.surfaces.judge(trial, values, run.settings.relaxation)
-            end = trial.end
-        if end is None:  # beyond a guard the flow need not have a value, inside it must
-            return found or NOT_FINITE, z, stages, None
-        return found if isfinite(sum(end)) else NOT_FINITE, z, stages, end
+        trial = Trial(t, h, t1, x, slope, z, stages, kernel.flow, method)
+        found = here.surfaces.judge(trial, values, run.settings.relaxation)
+        if found or trial.end is not None:  # beyond a guard the flow need not have a value, inside it must
+            return found, z, stages, trial.end
     except DOMAIN_ERRORS:
-        return NOT_FINITE, x, (), None
+        pass
+    return NOT_FINITE, x, (), None
 
 
 def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
@@ -189,6 +200,7 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
         return not_finite(run, here, t, ahead)
     why = {
         "error": "the error estimate stays above the tolerance",
+        "creeping": "steps had to be cut below a thousandth thousands of times in a row",
         "flat": "the gradient of a guard's surface vanishes on it",
     }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")

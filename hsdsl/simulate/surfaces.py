@@ -42,7 +42,7 @@ class Crossing:
 class Obstacle:
     """Why a trial step ends outside the relaxed domain."""
 
-    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error"]
+    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "creeping"]
     surface: int | None = None
 
 
@@ -64,9 +64,10 @@ class Trial:
     def end(self) -> State | None:
         """The flow at the step's end; None where it has no finite value (beyond a guard it need not have one)."""
         try:
-            return self.flow(self.t1, *self.z)
+            end = self.flow(self.t1, *self.z)
         except DOMAIN_ERRORS:
             return None
+        return end if sum(end) - sum(end) == 0 else None
 
     @cached_property
     def piece(self) -> Polynomial:

@@ -1,0 +1,48 @@
+"""When to stop trying ever shorter steps: a run that closes in on a surface ends there, one that creeps says so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Number
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.run import Here
+from hsdsl.simulate.surfaces import Obstacle
+
+IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
+MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
+CREEPING = 10  # halvings; steps below a thousandth of the full one
+MOST_CREEPING = 2000  # in a row: the run would take a thousand times what it was asked to
+
+
+@dataclass
+class Patience:
+    """Counts accepted steps in a row that had to be cut short; ``unit`` is the unit round-off."""
+
+    unit: Number
+    idle: int = 0
+    creeping: int = 0
+
+    def renew(self) -> None:
+        """Forget: a full step was possible."""
+        self.idle = self.creeping = 0
+
+    def ends(
+        self, here: Here, halvings: int, full: Number, obstacle: Obstacle, t: Number, x: State, t1: Number, z: State
+    ) -> Obstacle | None:
+        """Count a step from (t, x) to (t1, z) that was halved because of ``obstacle``; say what ends the run, if so."""
+        small = t1 - t <= IDLE_UNITS * self.unit * max(t, full)
+        still = _still(here, obstacle, t, x, t1, z)
+        self.idle = self.idle + 1 if small or still else 0
+        self.creeping = self.creeping + 1 if halvings >= CREEPING else 0
+        if self.idle > MOST_IDLE or (small and z == x):
+            return obstacle
+        return Obstacle("creeping", obstacle.surface) if self.creeping > MOST_CREEPING else None
+
+
+def _still(here: Here, obstacle: Obstacle, t: Number, x: State, t1: Number, z: State) -> bool:
+    """Whether the surface in the way did not come nearer: its round-off is larger than what the step adds."""
+    k = obstacle.surface
+    if k is None:
+        return False
+    return here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
