@@ -99,7 +99,8 @@ def digital_control() -> None:
         off = [(run.final.state[s] - e) / eps for s, e in zip("xy", end, strict=True)]
         passed_over = [t.alternatives for t in run.transitions if t.alternatives]
         print(
-            f"digital control {name}: {'-'.join(modes)}, end off by ({off[0]:.2f}, {off[1]:.2f}) eps, passed over {passed_over}"
+            f"digital control {name}: {'-'.join(modes)}, end off by ({off[0]:.2f}, {off[1]:.2f}) eps, "
+            f"passed over {passed_over}"
         )
 
 
