@@ -20,17 +20,17 @@ class Patience:
     """Counts accepted steps in a row that had to be cut short; ``unit`` is the unit round-off."""
 
     unit: Number
+    reached: Number | None = None  # by the last step counted: another start means that full steps came between
     idle: int = 0
     creeping: int = 0
-
-    def renew(self) -> None:
-        """Forget: a full step was possible."""
-        self.idle = self.creeping = 0
 
     def ends(
         self, here: Here, halvings: int, full: Number, obstacle: Obstacle, t: Number, x: State, t1: Number, z: State
     ) -> Obstacle | None:
         """Count a step from (t, x) to (t1, z) that was halved because of ``obstacle``; say what ends the run, if so."""
+        if t != self.reached:
+            self.idle = self.creeping = 0
+        self.reached = t1
         small = t1 - t <= IDLE_UNITS * self.unit * max(t, full)
         still = _still(here, obstacle, t, x, t1, z)
         self.idle = self.idle + 1 if small or still else 0

@@ -13,7 +13,7 @@ from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators.stepper import Stages, State, Stepper
+from hsdsl.integrators.stepper import Stages, State
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
 from hsdsl.simulate.patience import Patience
@@ -35,6 +35,8 @@ class Landing:
 
 
 Found = Sequence[Crossing] | Obstacle  # no crossing: the step ended inside the domain
+Attempted = tuple[Found, State, Stages, State | None]
+Attempt = Callable[[Number, Number, Number, State, State], Attempted]
 
 
 def relaxed(run: Run, here: Here | Stop) -> Stop:
@@ -52,7 +54,7 @@ def relaxed(run: Run, here: Here | Stop) -> Stop:
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
     """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
-    control, method, arc, isfinite = run.control, run.stepper(len(here.x)), here.arc, run.arithmetic.isfinite
+    control, method, arc, attempt = run.control, run.stepper(len(here.x)), here.arc, attempts(run, here)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
     t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
@@ -64,7 +66,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
-            found, z, stages, end = attempt(run, here, method, isfinite, t, h, t1, x, slope)
+            found, z, stages, end = attempt(t, h, t1, x, slope)
             if estimate and end is not None and not isinstance(found, Obstacle):
                 ratio = control.ratio(estimate(h, stages, end), x, z)
                 if ratio > 1:
@@ -83,10 +85,8 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             control.accept(h, ratio)
         if found or end is None:
             return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z, here))
-        if halvings == 0:
-            patience.renew()
-        elif end_of_it := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z):
-            return stuck(run, here.moved(t, x), end_of_it, slope)
+        if halvings and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
+            return stuck(run, here.moved(t, x), given_up, slope)
         arc.times.append(t1)
         arc.values.append(z)
         if curved:
@@ -95,34 +95,32 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     return here.moved(t, x)
 
 
-def attempt(
-    run: Run,
-    here: Here,
-    method: Stepper,
-    isfinite: Callable[[Number], bool],
-    t: Number,
-    h: Number,
-    t1: Number,
-    x: State,
-    slope: State,
-) -> tuple[Found, State, Stages, State | None]:
-    """Try one step: where it ended, its end z, the stages, and the flow at z if it has a value there."""
-    kernel = here.kernel
-    try:
-        z, stages = method.step(kernel.flow, t, h, x, slope)
-        values = kernel.surfaces(t1, *z)
-        if not values or max(values) <= 0:
-            end = kernel.flow(t1, *z)
-            return () if isfinite(sum(z) + sum(values) + sum(end)) else NOT_FINITE, z, stages, end
-        if not isfinite(sum(z) + sum(values)):
-            return NOT_FINITE, z, stages, None
-        trial = Trial(t, h, t1, x, slope, z, stages, kernel.flow, method)
-        found = here.surfaces.judge(trial, values, run.settings.relaxation)
-        if found or trial.end is not None:  # beyond a guard the flow need not have a value, inside it must
-            return found, z, stages, trial.end
-    except DOMAIN_ERRORS:
-        pass
-    return NOT_FINITE, x, (), None
+def attempts(run: Run, here: Here) -> Attempt:
+    """Make the function that tries one step from (t, x) and says where it ended.
+
+    It returns what was found, the step's end z, the stages, and the flow at z if it has a value there.
+    """
+    method, flow, surfaces = run.stepper(len(here.x)), here.kernel.flow, here.kernel.surfaces
+    step, isfinite, epsilon = method.step, run.arithmetic.isfinite, run.settings.relaxation
+
+    def attempt(t: Number, h: Number, t1: Number, x: State, slope: State) -> Attempted:
+        try:
+            z, stages = step(flow, t, h, x, slope)
+            values = surfaces(t1, *z)
+            if not values or max(values) <= 0:
+                end = flow(t1, *z)
+                return () if isfinite(sum(z) + sum(values) + sum(end)) else NOT_FINITE, z, stages, end
+            if not isfinite(sum(z) + sum(values)):
+                return NOT_FINITE, z, stages, None
+            trial = Trial(t, h, t1, x, slope, z, stages, flow, method)
+            found = here.surfaces.judge(trial, values, epsilon)
+            if found or trial.end is not None:  # beyond a guard the flow need not have a value, inside it must
+                return found, z, stages, trial.end
+        except DOMAIN_ERRORS:
+            pass
+        return NOT_FINITE, x, (), None
+
+    return attempt
 
 
 def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
