@@ -1,0 +1,1 @@
+"""The hybrid quotient space of a model, in numbers."""
