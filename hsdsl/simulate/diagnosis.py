@@ -21,7 +21,13 @@ def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop
                 finite = False
             if not finite:
                 return Stop("not_finite", t, f"{name}, has no finite value at t = {show(t)} ({_state(here, x)})")
-    return Stop("not_finite", t, f"the state grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
+    return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
+
+
+def _largest(here: Here) -> str:
+    sized = zip(here.arc.values[-1], here.arc.states, here.mode.flow_texts, strict=True)
+    value, state, text = max(sized, key=lambda entry: abs(entry[0]))
+    return f"{state}, whose flow is {text} and whose value is {show(value)},"
 
 
 def _state(here: Here, x: State) -> str:

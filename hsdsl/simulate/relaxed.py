@@ -18,7 +18,7 @@ from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
 from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset, show
-from hsdsl.simulate.surfaces import Crossing, Obstacle, Trial
+from hsdsl.simulate.surfaces import TIE, Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
 NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
@@ -170,7 +170,10 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:
-    """Guards that the state stands on, to round-off or a tie in time, with the flow pointing out and `if` true."""
+    """Guards that the state stands on, with the flow pointing out and `if` true.
+
+    On the guard means to round-off, or reached within TIE of the time passed: sums of steps are no more exact than that.
+    """
     t, x, zero = here.t, here.x, run.arithmetic.zero
     try:
         values, noise = here.kernel.surfaces(t, *x), here.surfaces.noise(t, x)
@@ -180,7 +183,7 @@ def standing_on(run: Run, here: Here) -> list[Crossing]:
     return [
         Crossing(k, zero, t, x, zero)
         for k in range(len(here.mode.edges))
-        if abs(values[k]) <= max(noise[k], rates[k] * run.tie(t)) and rates[k] > 0 and conditions[k]
+        if abs(values[k]) <= max(noise[k], rates[k] * TIE * t) and rates[k] > 0 and conditions[k]
     ]
 
 
