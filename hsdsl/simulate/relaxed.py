@@ -172,7 +172,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
 def standing_on(run: Run, here: Here) -> list[Crossing]:
     """Guards that the state stands on, with the flow pointing out and `if` true.
 
-    On the guard means to round-off, or reached within TIE of the time passed: sums of steps are no more exact than that.
+    On the guard means to round-off, or within TIE of the time passed: sums of steps are no more exact than that.
     """
     t, x, zero = here.t, here.x, run.arithmetic.zero
     try:
