@@ -1,0 +1,70 @@
+"""Bounds on polynomials between their ends: a polynomial lies in the convex hull of its Bernstein coefficients."""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+
+
+def restrict(coefficients: Array, begin: Array, end: Array) -> Array:
+    """Write polynomials on [0, 1] anew on a part of it.
+
+    Parameters
+    ----------
+    coefficients : array, shape (n, p + 1, w)
+        By power of s.
+    begin, end : array, shape (n,)
+        The part of each: s = begin + u (end - begin).
+
+    Returns
+    -------
+    array, shape (n, p + 1, w)
+        By power of u.
+    """
+    result = coefficients.copy()
+    degree = coefficients.shape[1] - 1
+    at = begin[:, None]
+    for i in range(degree):
+        for m in range(degree - 1, i - 1, -1):
+            result[:, m] += at * result[:, m + 1]
+    width = (end - begin)[:, None]
+    scale = width
+    for k in range(1, degree + 1):
+        result[:, k] *= scale
+        scale = scale * width
+    return result
+
+
+def bernstein(coefficients: Array) -> Array:
+    """Turn powers (n, p + 1, w) into Bernstein coefficients of the same shape."""
+    degree = coefficients.shape[1] - 1
+    weights = np.array([[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
+    result = np.empty_like(coefficients)
+    for i in range(degree + 1):
+        row = coefficients[:, 0].copy()
+        for k in range(1, i + 1):
+            row += weights[i, k] * coefficients[:, k]
+        result[:, i] = row
+    return result
+
+
+def degree_raised(coefficients: Array, degree: int) -> Array:
+    """Pad powers with zeros up to a degree."""
+    missing = degree + 1 - coefficients.shape[1]
+    return np.pad(coefficients, ((0, 0), (0, missing), (0, 0))) if missing > 0 else coefficients
+
+
+def largest_norm(coefficients: Array) -> Array:
+    """Bound the Euclidean norm of each polynomial (by powers) on [0, 1] from above, shape (n,)."""
+    return np.sqrt(np.max(np.sum(bernstein(coefficients) ** 2, axis=2), axis=1))
+
+
+def length(coefficients: Array) -> Array:
+    """Bound the length of each curve on [0, 1] from above by that of its control polygon, shape (n,)."""
+    steps = np.diff(bernstein(coefficients), axis=1)
+    return np.sum(np.sqrt(np.sum(steps**2, axis=2)), axis=1)

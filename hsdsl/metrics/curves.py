@@ -1,0 +1,238 @@
+"""The distance between two executions: the largest distance, over time, of their points (Definition 22).
+
+Between the breakpoints of both runs each is a polynomial, so the supremum comes with a certified upper bound: where
+both are in one convex domain the difference is bounded by its Bernstein coefficients, elsewhere by the distance at the
+ends of ever shorter parts and the length of the way between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.metrics.bernstein import largest_norm, length
+from hsdsl.metrics.interval import Interval
+from hsdsl.metrics.merge import Cells, Side, common_span, merge
+from hsdsl.metrics.supremum import Supremum, supremum
+from hsdsl.metrics.trace import names_of, trace
+
+Array = npt.NDArray[Any]
+
+GAP = 0.01  # of the lower bound, at which refinement stops
+ROUNDOFF = 64 * 2.0**-53  # times the largest state: no smaller gap is asked for
+RESOLVED = 0.05  # a wider gap is explained in the note
+
+
+@dataclass(frozen=True)
+class CurveDistance:
+    """A distance between two executions.
+
+    Attributes
+    ----------
+    interval : Interval
+        The distance lies in it, up to the rounding of the states themselves.
+    time : float or None
+        Where the lower bound is attained; None for a distance that is not a supremum over time.
+    metric : str
+        Its name in the table of metrics.
+    span : tuple of float
+        The time span that was compared.
+    note : str
+        What a reader should know, a sentence each; empty where there is nothing to say.
+    """
+
+    interval: Interval
+    time: float | None
+    metric: str
+    span: tuple[float, float]
+    note: str = ""
+
+    @property
+    def lower(self) -> float:
+        """The distance is at least this."""
+        return self.interval.lower
+
+    @property
+    def upper(self) -> float:
+        """The distance is at most this."""
+        return self.interval.upper
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what ``hsdsl distance --json`` prints."""
+        return {
+            "metric": self.metric,
+            "lower": self.lower,
+            "upper": self.upper,
+            "time": self.time,
+            "span": list(self.span),
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """n points of one mode.
+
+    Attributes
+    ----------
+    mode : str
+        Name of the mode.
+    x : array, shape (n, d)
+        States in the mode's order.
+    t : array, shape (n,)
+        Time.
+    edge : array of str, shape (n,)
+        The edge whose strip a point is in; empty in the domain.
+    depth : array, shape (n,)
+        How deep in the strip.
+    """
+
+    mode: str
+    x: Array
+    t: Array
+    edge: Array
+    depth: Array
+
+
+class PointMetric(Protocol):
+    """A distance between points of a hybrid space."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether time is a coordinate of the domains (a surface or a reset depends on it)."""
+        ...
+
+    def convex(self, mode: str) -> bool:
+        """Whether a mode's domain is known to be convex."""
+        ...
+
+    def between(self, p: Points, q: Points) -> tuple[Array, Array]:
+        """Bound the distances of pairs from below and above, each of shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class OnSpace:
+    """Distances on M, where a strip's point (z, tau) counts as z, or with ``strips`` on the relaxed space."""
+
+    metric: PointMetric
+    strips: bool
+
+    def over(self, a: Side, b: Side) -> Array:
+        """Bound by the difference of the two polynomials, where they are in one convex domain."""
+        bound = np.full(len(a.pieces), np.inf)
+        same = np.flatnonzero(self._in_one_domain(a, b))
+        if len(same):
+            bound[same] = largest_norm(a.powers[same] - b.powers[same])
+            if self.strips:
+                apart = np.max(a.depth[same] + b.depth[same], axis=1)
+                bound[same] += apart
+        return bound
+
+    def at(self, a: Side, b: Side, end: int, times: Array) -> tuple[Array, Array]:
+        """Bound at single times, mode pair by mode pair."""
+        lower, upper = np.zeros(len(a.pieces)), np.full(len(a.pieces), np.inf)
+        x, y = a.at_end(end), b.at_end(end)
+        pairs = np.stack([a.trace.mode[a.pieces], b.trace.mode[b.pieces]], axis=1)
+        for i, j in np.unique(pairs, axis=0).tolist():
+            here = np.flatnonzero((pairs[:, 0] == i) & (pairs[:, 1] == j))
+            p = self._points(a[here], i, x[here], times[here], end)
+            q = self._points(b[here], j, y[here], times[here], end)
+            lower[here], upper[here] = self.metric.between(p, q)
+        return lower, upper
+
+    def motion(self, side: Side) -> Array:
+        """Bound the way by the length of the control polygon, with the depth and the time where they count."""
+        way = length(side.powers)
+        if self.strips:
+            way += np.abs(side.depth[:, 1] - side.depth[:, 0])
+        return way + side.duration if self.metric.timed else way
+
+    def _points(self, side: Side, mode: int, x: Array, times: Array, end: int) -> Points:
+        name, columns = side.trace.modes[mode]
+        edge = side.edge if self.strips else np.full(len(times), "")
+        depth = side.depth[:, end] if self.strips else np.zeros(len(times))
+        return Points(name, x[:, list(columns)], times, edge, depth)
+
+    def _in_one_domain(self, a: Side, b: Side) -> Array:
+        domains = [(name, columns) for name, columns in a.trace.modes if self.metric.convex(name)]
+        number_a = np.array([domains.index(m) if m in domains else -1 for m in a.trace.modes])
+        number_b = np.array([domains.index(m) if m in domains else -2 for m in b.trace.modes])
+        return number_a[a.trace.mode[a.pieces]] == number_b[b.trace.mode[b.pieces]]
+
+
+def rho(a: Execution, b: Execution, metric: PointMetric, *, strips: bool = False, gap: float = GAP) -> CurveDistance:
+    """Return the supremum over the common time span of the distance between two executions (Def. 22).
+
+    Parameters
+    ----------
+    a, b : Execution
+        Runs of one model, of any schemes, steps, engines and lengths; of multiprecision numbers the nearest float64
+        counts.
+    metric : PointMetric
+        The distance of points.
+    strips : bool
+        Compare on the relaxed space, where a strip's points differ by their depth; else such a point counts as the
+        guard's.
+    gap : float
+        How far apart lower and upper bound may be, relative to the lower one; less than rounding is not asked for.
+
+    Raises
+    ------
+    UsageError
+        The runs have no time in common, or one is not finite there.
+    """
+    cells = merged(a, b)
+    found = supremum(cells, OnSpace(metric, strips), gap, ROUNDOFF * largest_state(cells))
+    return curve_distance(found, cells, a, b, "relaxed" if strips else "rho", gap)
+
+
+def merged(a: Execution, b: Execution) -> Cells:
+    """Cut two executions at the breakpoints of both; refuse what is not finite."""
+    names = names_of((a, b))
+    cells = merge(trace(a, names), trace(b, names))
+    for run, curve, pieces in ((a, cells.a, cells.piece_a), (b, cells.b, cells.piece_b)):
+        used = slice(int(pieces[0]), int(pieces[-1]) + 1)
+        finite = np.isfinite(curve.coefficients[used]).all(axis=(1, 2))
+        if not finite.all():
+            when = curve.start[used][int(np.argmin(finite))]
+            raise UsageError(
+                f"a run of {run.model} is not finite at t = {when:.10g}: no distance is defined there",
+                "compare runs that end before that time",
+            )
+    return cells
+
+
+def largest_state(cells: Cells) -> float:
+    """Return the size of the numbers that are compared."""
+    sizes = (np.max(np.abs(curve.coefficients[:, 0]), initial=0.0) for curve in (cells.a, cells.b))
+    return float(max(1.0, *sizes))
+
+
+def curve_distance(found: Supremum, cells: Cells, a: Execution, b: Execution, metric: str, gap: float) -> CurveDistance:
+    """Say what a supremum means."""
+    notes = [span_note(a, b, common_span(cells.a, cells.b))]
+    if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + ROUNDOFF * largest_state(cells)):
+        cause = (
+            "the bounds on single point distances allow no less"
+            if found.complete
+            else f"the search stopped after {found.evaluations} point distances"
+        )
+        notes.append(f"Upper and lower bound differ: {cause}.")
+    interval = Interval(found.lower, max(found.lower, found.upper))
+    return CurveDistance(interval, found.time, metric, common_span(cells.a, cells.b), " ".join(filter(None, notes)))
+
+
+def span_note(a: Execution, b: Execution, span: tuple[float, float]) -> str:
+    """Say so where a run goes on beyond what was compared."""
+    spans = [(float(run.time_span[0]), float(run.time_span[1])) for run in (a, b)]
+    return (
+        ""
+        if all(s == span for s in spans)
+        else f"Compared from t = {span[0]:.10g} to {span[1]:.10g}, which both cover."
+    )

@@ -1,0 +1,134 @@
+"""Two curves on their common time span, cut at the breakpoints of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hsdsl.errors import UsageError
+from hsdsl.metrics.bernstein import degree_raised, restrict
+from hsdsl.metrics.trace import Array, Trace
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One curve on n cells.
+
+    Attributes
+    ----------
+    pieces : array of int, shape (n,)
+        The piece of ``trace`` that the cell is part of.
+    powers : array, shape (n, p + 1, w)
+        Its polynomial by powers of u in [0, 1] over the cell.
+    depth : array, shape (n, 2)
+        Depth in the strip at the cell's ends, 0 where the state flows.
+    duration : array, shape (n,)
+        Length of the cell in time.
+    """
+
+    trace: Trace
+    pieces: Array
+    powers: Array
+    depth: Array
+    duration: Array
+
+    @property
+    def mode(self) -> Array:
+        """Name of each cell's mode."""
+        return np.array([name for name, _ in self.trace.modes])[self.trace.mode[self.pieces]]
+
+    @property
+    def edge(self) -> Array:
+        """Edge of the strip that each cell is in, empty where the state flows."""
+        return np.array([*self.trace.edges, ""])[self.trace.strip[self.pieces]]
+
+    def at_end(self, end: int) -> Array:
+        """Return the states at the cells' left (0) or right (1) ends, shape (n, w)."""
+        return self.powers[:, 0] if end == 0 else np.sum(self.powers, axis=1)
+
+    def __getitem__(self, chosen: Array) -> Side:
+        return replace(
+            self,
+            pieces=self.pieces[chosen],
+            powers=self.powers[chosen],
+            depth=self.depth[chosen],
+            duration=self.duration[chosen],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Parts of the common time span in which each curve is one polynomial; the ends of a cell belong to it.
+
+    The left end of a cell compares values with values, its right end left limits with left limits. The last cell has no
+    length: it compares the values at the very end.
+    """
+
+    a: Trace
+    b: Trace
+    piece_a: Array
+    piece_b: Array
+    begin: Array
+    end: Array
+
+    def __len__(self) -> int:
+        return len(self.begin)
+
+    def __getitem__(self, chosen: Array | slice) -> Cells:
+        return Cells(self.a, self.b, self.piece_a[chosen], self.piece_b[chosen], self.begin[chosen], self.end[chosen])
+
+    def halved(self) -> Cells:
+        """Cut each cell in two, first halves first."""
+        middle = self.begin + (self.end - self.begin) / 2
+        return Cells(
+            self.a,
+            self.b,
+            np.concatenate([self.piece_a, self.piece_a]),
+            np.concatenate([self.piece_b, self.piece_b]),
+            np.concatenate([self.begin, middle]),
+            np.concatenate([middle, self.end]),
+        )
+
+    @property
+    def divisible(self) -> Array:
+        """Whether there is a number between the ends of each cell."""
+        middle = self.begin + (self.end - self.begin) / 2
+        return (middle > self.begin) & (middle < self.end)
+
+    def sides(self) -> tuple[Side, Side]:
+        """Return both curves on the cells, their polynomials of one degree."""
+        degree = max(self.a.coefficients.shape[1], self.b.coefficients.shape[1]) - 1
+        return self._side(self.a, self.piece_a, degree), self._side(self.b, self.piece_b, degree)
+
+    def _side(self, trace: Trace, pieces: Array, degree: int) -> Side:
+        first, last = trace.share(pieces, self.begin), trace.share(pieces, self.end)
+        powers = degree_raised(restrict(trace.coefficients[pieces], first, last), degree)
+        depth = np.stack([trace.depths(pieces, first), trace.depths(pieces, last)], axis=1)
+        return Side(trace, pieces, powers, depth, self.end - self.begin)
+
+
+def common_span(a: Trace, b: Trace) -> tuple[float, float]:
+    """Return the time span that both curves cover.
+
+    Raises
+    ------
+    UsageError
+        They have no time in common.
+    """
+    begin, end = max(a.start[0], b.start[0]), min(a.end[-1], b.end[-1])
+    if begin > end:
+        raise UsageError(
+            f"the runs have no time in common: one goes from {a.start[0]:.10g} to {a.end[-1]:.10g}, "
+            f"the other from {b.start[0]:.10g} to {b.end[-1]:.10g}"
+        )
+    return float(begin), float(end)
+
+
+def merge(a: Trace, b: Trace) -> Cells:
+    """Cut the common time span of two curves at the breakpoints of both."""
+    begin, end = common_span(a, b)
+    breaks = np.union1d(a.start, b.start)
+    breaks = np.union1d(breaks[(breaks > begin) & (breaks < end)], [begin, end])
+    starts, ends = breaks, np.append(breaks[1:], end)
+    return Cells(a, b, a.find(starts), b.find(starts), starts, ends)

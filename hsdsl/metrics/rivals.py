@@ -1,0 +1,60 @@
+"""Distances on the space of trajectories, for comparison: they see the mode, and stay away from zero at a jump.
+
+All of them take the states of a hybrid system with the discrete metric on modes (Tavernini 1987; Gokhman 2008):
+
+    D((i, x), (j, y)) = |x - y| + [i != j],
+
+states compared by name, one that a mode lacks counting as 0 there, so that D is a metric for modes with different states.
+A strip's point (z, tau) counts as z in its mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.execution import Execution
+from hsdsl.metrics.bernstein import largest_norm, length
+from hsdsl.metrics.curves import GAP, ROUNDOFF, CurveDistance, curve_distance, largest_state, merged
+from hsdsl.metrics.merge import Side
+from hsdsl.metrics.supremum import supremum
+from hsdsl.metrics.trace import Array
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """The distance D of states with modes."""
+
+    def over(self, a: Side, b: Side) -> Array:
+        """Bound by the difference of the two polynomials."""
+        return largest_norm(a.powers - b.powers) + (a.mode != b.mode)
+
+    def at(self, a: Side, b: Side, end: int, times: Array) -> tuple[Array, Array]:
+        """Return D, exact up to rounding."""
+        difference = a.at_end(end) - b.at_end(end)
+        apart = np.sqrt(np.sum(difference**2, axis=1)) + (a.mode != b.mode)
+        return apart, apart
+
+    def motion(self, side: Side) -> Array:
+        """Bound the way by the length of the control polygon."""
+        return length(side.powers)
+
+
+def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
+    """Return the supremum over the common time span of D between two runs at the same time.
+
+    Parameters
+    ----------
+    a, b : Execution
+    gap : float
+        How far apart lower and upper bound may be, relative to the lower one.
+
+    Raises
+    ------
+    UsageError
+        The runs have no time in common, or one is not finite there.
+    """
+    cells = merged(a, b)
+    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells))
+    return curve_distance(found, cells, a, b, "sup", gap)

@@ -1,0 +1,134 @@
+"""An execution as a curve: its pieces of positive length, each a polynomial, in float64.
+
+Of several transitions at one instant only the last value counts, so arcs that take no time are left out, except for
+the value at the very end, which is a last piece of no length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.execution import Execution
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """An execution's n pieces in time order, the last of no length.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What the w columns are: states by name, of all modes of all curves that are compared. A state that a mode lacks
+        is 0 there.
+    start, end : array, shape (n,)
+        Time; each piece but the last starts where the one before it ends.
+    mode : array of int, shape (n,)
+        Index into ``modes``.
+    modes : tuple of (str, tuple of int)
+        Name and the columns of its states, in the mode's order.
+    jump : array of int, shape (n,)
+        Transitions made before it.
+    strip : array of int, shape (n,)
+        In a strip: the index of the transition that ends it; -1 where the state flows.
+    edges : tuple of str
+        Edge of each transition.
+    coefficients : array, shape (n, p + 1, w)
+        By power of s in [0, 1], s = 0 at the start.
+    depth : array, shape (n, 2)
+        How deep in the strip at start and end.
+    """
+
+    names: tuple[str, ...]
+    start: Array
+    end: Array
+    mode: Array
+    modes: tuple[tuple[str, tuple[int, ...]], ...]
+    jump: Array
+    strip: Array
+    edges: tuple[str, ...]
+    coefficients: Array
+    depth: Array
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def find(self, times: Array) -> Array:
+        """Return the piece that begins at or holds each time, seen from the right."""
+        return np.searchsorted(self.start, times, side="right") - 1
+
+    def share(self, pieces: Array, times: Array) -> Array:
+        """Return how far through its piece each time is, from 0 to 1."""
+        length = self.end[pieces] - self.start[pieces]
+        passed = times - self.start[pieces]
+        return np.divide(passed, length, out=np.zeros_like(passed), where=length > 0)
+
+    def depths(self, pieces: Array, share: Array) -> Array:
+        """Return the depth at a share of each piece."""
+        begin, end = self.depth[pieces, 0], self.depth[pieces, 1]
+        return np.where(share == 1, end, begin + share * (end - begin))
+
+
+def names_of(executions: Sequence[Execution]) -> tuple[str, ...]:
+    """Return the states of all executions, each name once."""
+    return tuple(dict.fromkeys(name for execution in executions for name in execution.states))
+
+
+def trace(execution: Execution, names: Sequence[str], instants: bool = False) -> Trace:
+    """Make a curve of an execution; ``names`` are the columns, ``instants`` keeps the arcs that take no time."""
+    table = execution.arc_table
+    times = np.asarray(execution.times, dtype=float)
+    arc_of = np.repeat(np.arange(len(execution.arcs)), [arc.last - arc.first + 1 for arc in execution.arcs])
+    rows = np.flatnonzero((times[1:] > times[:-1]) & (arc_of[1:] == arc_of[:-1]))
+    still = [arc.last for arc in execution.arcs[:-1] if instants and times[arc.first] == times[arc.last]]
+    pieces = np.sort(np.concatenate([rows, np.array([*still, len(times) - 1], dtype=int)]))
+    followers = pieces + np.isin(pieces, rows)
+    arcs = arc_of[pieces]
+    layouts = list(dict.fromkeys((arc.mode, arc.states) for arc in execution.arcs))
+    mode_of = np.array([layouts.index((arc.mode, arc.states)) for arc in execution.arcs])[arcs]
+    waits = table.kind[arcs] == "strip"
+    columns = [tuple(names.index(state) for state in states) for _, states in layouts]
+    depth = np.asarray(execution.depth, dtype=float)
+    return Trace(
+        names=tuple(names),
+        start=times[pieces],
+        end=times[followers],
+        mode=mode_of,
+        modes=tuple((mode, place) for (mode, _), place in zip(layouts, columns, strict=True)),
+        jump=table.jump[arcs],
+        strip=np.where(waits, table.jump[arcs], -1),
+        edges=tuple(transition.edge for transition in execution.transitions),
+        coefficients=_polynomials(execution, pieces, followers, waits, mode_of, columns, len(names)),
+        depth=np.stack([depth[pieces], depth[followers]], axis=1),
+    )
+
+
+def _polynomials(
+    execution: Execution,
+    pieces: Array,
+    followers: Array,
+    waits: Array,
+    mode_of: Array,
+    columns: Sequence[tuple[int, ...]],
+    width: int,
+) -> Array:
+    """Sort the recorded pieces into columns by name; a strip, and the last value, stay where they are."""
+    degree = max(1, execution.coefficients.shape[1])
+    sorted_by_name = np.zeros((len(pieces), degree + 1, width))
+    for number, places in enumerate(columns):
+        here = np.flatnonzero(mode_of == number)
+        moving = here[~waits[here] & (followers[here] > pieces[here])]
+        for own, column in enumerate(places):
+            values = np.asarray(execution.values[:, own], dtype=float)
+            sorted_by_name[here, 0, column] = values[pieces[here]]
+            if execution.coefficients.shape[1] == 0:
+                sorted_by_name[moving, 1, column] = values[followers[moving]] - values[pieces[moving]]
+            else:
+                sorted_by_name[moving, 1:, column] = execution.coefficients[pieces[moving], :, own]
+    return sorted_by_name
