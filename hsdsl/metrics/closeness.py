@@ -1,7 +1,7 @@
 """(tau, epsilon)-closeness of hybrid arcs (Goebel, Sanfelice, Teel, *Hybrid Dynamical Systems*, 2012, Sec. 5.3).
 
-Two hybrid arcs are (tau, epsilon)-close when for every (t, j) of one with t + j <= tau there is (s, j) of the other, with
-the same j, |t - s| < epsilon and D < epsilon, and the other way round; D is the distance of states with modes
+Two hybrid arcs are (tau, epsilon)-close when for every (t, j) of one with t + j <= tau there is (s, j) of the other,
+with the same j, |t - s| < epsilon and D < epsilon, and the other way round; D is the distance of states with modes
 (:mod:`hsdsl.metrics.rivals`), the mode being one of the state's components there.
 """
 
@@ -63,7 +63,7 @@ def one_way(p: Polyline, q: Polyline, tau: float) -> float:
     largest = 0.0
     for j in np.unique(p.jump[asked]).tolist():
         here = asked[np.searchsorted(p.jump[asked], j) : np.searchsorted(p.jump[asked], j, side="right")]
-        there = slice(int(np.searchsorted(q.jump, j)), int(np.searchsorted(q.jump, j, side="right")))
+        there = slice(*np.searchsorted(q.jump, [j, j + 1]).tolist())
         if there.start == there.stop:
             return np.inf
         step = max(1, PAIRS // (there.stop - there.start))

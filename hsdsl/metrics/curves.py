@@ -7,7 +7,7 @@ ends of ever shorter parts and the length of the way between them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np

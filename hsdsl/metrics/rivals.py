@@ -4,8 +4,8 @@ All of them take the states of a hybrid system with the discrete metric on modes
 
     D((i, x), (j, y)) = |x - y| + [i != j],
 
-states compared by name, one that a mode lacks counting as 0 there, so that D is a metric for modes with different states.
-A strip's point (z, tau) counts as z in its mode.
+states compared by name, one that a mode lacks counting as 0 there: D is a metric also where modes have different
+states. A strip's point (z, tau) counts as z in its mode.
 """
 
 from __future__ import annotations

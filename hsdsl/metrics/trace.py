@@ -61,7 +61,8 @@ class Trace:
 
     def find(self, times: Array) -> Array:
         """Return the piece that begins at or holds each time, seen from the right."""
-        return np.searchsorted(self.start, times, side="right") - 1
+        found: Array = np.asarray(np.searchsorted(self.start, times, side="right"), dtype=int) - 1
+        return found
 
     def share(self, pieces: Array, times: Array) -> Array:
         """Return how far through its piece each time is, from 0 to 1."""
