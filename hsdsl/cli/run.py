@@ -27,7 +27,7 @@ def run(
         ),
     ] = None,
     until: Annotated[str | None, typer.Option(metavar="T", help="End of the run.")] = None,
-    scheme: Annotated[str | None, typer.Option(metavar="S", help="relaxed.")] = None,
+    scheme: Annotated[str | None, typer.Option(metavar="S", help="relaxed or paoli-schatzman.")] = None,
     method: Annotated[
         str | None, typer.Option(metavar="M", help="euler, midpoint, heun, ralston, rk4, dopri5 or auto.")
     ] = None,

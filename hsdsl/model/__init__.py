@@ -15,8 +15,10 @@ from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+from hsdsl.integrators import INTEGRATORS
 from hsdsl.lower import lower
 from hsdsl.model.estimate import Estimate, compare, finer_settings
+from hsdsl.model.mechanical import one_stop
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
@@ -97,7 +99,7 @@ class Model:
         until : number or str, optional
             End of the run.
         scheme, method : str, optional
-            ``relaxed``; a name of :data:`hsdsl.integrators.INTEGRATORS`, or ``auto``.
+            A name of :data:`hsdsl.simulate.SCHEMES`; a name of :data:`hsdsl.integrators.INTEGRATORS`, or ``auto``.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to 1 + |x|; they exclude each other.
         relaxation : number or str, optional
@@ -141,6 +143,8 @@ class Model:
         values = with_parameters(self._values(_arithmetic(precision)), parameters or {})
         chosen = self._settings(request, values)
         mode, states, x = initial_state(values, initial or {})
+        if request.method is None:
+            chosen = replace(chosen, one_stop=one_stop(values, x))
         try:
             execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch)
         except ValueError as error:
@@ -150,7 +154,9 @@ class Model:
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
         finer = finer_settings(execution)
-        asked |= {"step": None, "tolerance": None, "watch": None, **finer, "method": execution.method}
+        asked |= {"step": None, "tolerance": None, "watch": None, **finer}
+        if execution.method in INTEGRATORS:
+            asked["method"] = execution.method
         return compare(execution, self.simulate(**asked), finer)
 
     def plot(

@@ -61,7 +61,7 @@ class Estimate:
 def finer_settings(execution: Execution) -> dict[str, Number]:
     """Return settings with half the step (or the tolerance of half steps) and half the relaxation."""
     settings = execution.settings
-    finer = {"relaxation": settings["relaxation"] / 2}
+    finer = {"relaxation": settings["relaxation"] / 2} if "relaxation" in settings else {}
     if "step" in settings:
         return {"step": settings["step"] / 2, **finer}
     return {"tolerance": settings["tolerance"] / FINER_TOLERANCE, **finer}

@@ -1,7 +1,8 @@
 """What a run is asked, from four places: the file, `--set`, and options or a call; the later place wins.
 
 ``step`` and ``tolerance`` exclude each other: the one given later removes the other. A method that the file names and
-that cannot serve what a later place asks gives way to the default; asked for explicitly, it is refused.
+that cannot serve what a later place asks gives way to the default; asked for explicitly, it is refused. A scheme with
+its own formula (:data:`OWN_FORMULA`) takes a step, and neither a method nor a relaxation: the file's give way.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from hsdsl.simulate import SCHEMES
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
 SCHEMES_TO_COME = ("located",)
+OWN_FORMULA = ("paoli-schatzman",)
 FILE = "the file"
 DEFAULTS: dict[str, Any] = {
     "scheme": "relaxed",
@@ -46,10 +48,13 @@ class Source:
 
 @dataclass(frozen=True)
 class Request:
-    """What the places agree on: ``size`` is ``step`` or ``tolerance``, and ``values`` holds it with the rest."""
+    """What the places agree on: ``size`` is ``step`` or ``tolerance``, and ``values`` holds it with the rest.
+
+    ``method`` is None for a scheme with its own formula.
+    """
 
     scheme: str
-    method: ButcherTableau
+    method: ButcherTableau | None
     size: str
     values: dict[str, Asked]
 
@@ -80,7 +85,19 @@ def resolve(sources: Sequence[Source]) -> Request:
     if "step" not in values:
         values.setdefault("tolerance", Asked(DEFAULT_TOLERANCE, "default"))
     size = "step" if "step" in values else "tolerance"
-    return Request(_scheme(values["scheme"]), _method(values["method"], values[size], size), size, values)
+    scheme = _scheme(values["scheme"])
+    if scheme in OWN_FORMULA:
+        _own_formula(scheme, values)
+        return Request(scheme, None, size, values)
+    return Request(scheme, _method(values["method"], values[size], size), size, values)
+
+
+def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:
+    for key, without in (("method", "auto"), ("relaxation", None)):
+        if values[key].place not in (FILE, "default") and values[key].value != without:
+            raise UsageError(f"scheme '{scheme}' has its own formula and no {key} ({values[key].place})")
+    if "step" not in values:
+        raise UsageError(f"scheme '{scheme}' needs a step, and keeps no tolerance", "give a step, for example 1e-3")
 
 
 def _scheme(asked: Asked) -> str:

@@ -195,8 +195,8 @@ Word = Annotated[Scalar | None, PlainValidator(_identifier), WithJsonSchema({"ty
 Version = Annotated[Scalar, PlainValidator(_version), WithJsonSchema({"const": 1})]
 Scheme = Annotated[
     Scalar | None,
-    PlainValidator(choice("relaxed", "located")),
-    WithJsonSchema({"type": "string", "enum": ["relaxed", "located"]}),
+    PlainValidator(choice("relaxed", "located", "paoli-schatzman")),
+    WithJsonSchema({"type": "string", "enum": ["relaxed", "located", "paoli-schatzman"]}),
 ]
 Hold = Annotated[
     Literal["zero", "linear"],

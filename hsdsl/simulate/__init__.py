@@ -7,6 +7,7 @@
 `control`           the step size
 `patience`          when to stop trying shorter steps
 `timeline`          sampled inputs as segments no step crosses
+`paoli_schatzman`   the rival: a two-step formula for one mass and one stop
 `run`               what stays for a whole run, and where it stands
 `recorder`          rows, arcs and transitions, and the execution's columns
 ==================  ===========================================================================================
@@ -28,13 +29,14 @@ from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.entry import enter
+from hsdsl.simulate.paoli_schatzman import NOTES, paoli_schatzman
 from hsdsl.simulate.recorder import Recorder
 from hsdsl.simulate.relaxed import relaxed
 from hsdsl.simulate.run import Here, Run, show
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.timeline import make_timeline
 
-SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed}
+SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed, "paoli-schatzman": paoli_schatzman}
 _DEGREE = {"secant": 0, "hermite": 3, "dense": 4}
 
 __all__ = ["SCHEMES", "Settings", "simulate"]
@@ -56,7 +58,7 @@ def simulate(
     An interrupt (Ctrl-C) ends the run with what was computed.
     """
     timeline = make_timeline(program, kernel, parameters, settings.until)
-    degree = _DEGREE[settings.method.interpolant]
+    degree = _DEGREE[settings.method.interpolant] if settings.method else 0
     recorder = Recorder(kernel.arithmetic, settings.until, degree, len(program.outputs))
     run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
     if watch is not None:
@@ -96,12 +98,12 @@ def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
         digest=program.digest,
         engine="python",
         scheme=settings.scheme,
-        method=settings.method.name,
+        method=settings.method.name if settings.method else "two-step",
         settings=described(settings),
         stop=stop,
         transitions=tuple(recorder.transitions),
         final=final,
-        verdict=verdict(recorder),
+        verdict=verdict(recorder) if settings.one_stop is None else Verdict("unknown", NOTES),
         output_function=partial(output_values, run),
         output_names=program.outputs,
         seconds={"simulate": seconds},
@@ -125,7 +127,7 @@ def described(settings: Settings) -> dict[str, Any]:
     return {
         "until": settings.until,
         **size,
-        "relaxation": settings.relaxation,
+        **({"relaxation": settings.relaxation} if settings.method else {}),
         "max_transitions": settings.max_transitions,
         **({} if samples is None else {"samples": samples}),
     }

@@ -54,7 +54,8 @@ class Control:
 
 def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     """Start from the fixed step, or from a hundredth of the largest step and the error formula."""
+    order = settings.method.order if settings.method else 1
     if settings.step is not None:
-        return Control(settings.step, None, settings.method.order, settings.step, None)
+        return Control(settings.step, None, order, settings.step, None)
     largest = settings.until * LARGEST_SHARE
-    return Control(largest / 100, settings.tolerance, settings.method.order, largest, arithmetic.functions["pow"])
+    return Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"])

@@ -56,6 +56,7 @@ class Run:
 
     def stepper(self, dimension: int) -> Stepper:
         """The method for states of one dimension."""
+        assert self.settings.method is not None
         return stepper(self.settings.method, dimension, self.arithmetic)
 
     def tie(self, t: Number) -> Number:

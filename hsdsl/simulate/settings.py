@@ -9,27 +9,45 @@ from hsdsl.integrators import ButcherTableau
 
 
 @dataclass(frozen=True)
+class OneStop:
+    """A mass against one stop: x'' = f(t) - 2 damping x' - stiffness x, and x' -> -restitution x' at x = level.
+
+    ``position`` is the index (0 or 1) of x among the mode's states, x' being the other; ``above`` says that the stop
+    bounds x from above. f is the flow of x' at rest in the origin.
+    """
+
+    position: int
+    above: bool
+    level: Number
+    restitution: Number
+    damping: Number
+    stiffness: Number
+
+
+@dataclass(frozen=True)
 class Settings:
     """Settings of one run, resolved and checked.
 
     Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to 1 + |x|) is given.
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
+    ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
     scheme: str
-    method: ButcherTableau
+    method: ButcherTableau | None
     step: Number | None
     tolerance: Number | None
     relaxation: Number
     until: Number
     max_transitions: int
     samples: int | tuple[Number, ...] | None = None
+    one_stop: OneStop | None = None
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):
             raise ValueError("exactly one of step and tolerance")
-        if self.tolerance is not None and not self.method.adaptive:
-            raise ValueError(f"{self.method.name} has no error estimate")
+        if self.tolerance is not None and (self.method is None or not self.method.adaptive):
+            raise ValueError(f"{self.method.name if self.method else self.scheme} has no error estimate")
         if not self.relaxation > 0 or not self.until >= 0:
             raise ValueError("relaxation must be positive and until not negative")

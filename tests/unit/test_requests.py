@@ -28,6 +28,7 @@ ACCEPTED = {
     "auto": (({"step": 1, "method": "euler"}, {}, {"method": "auto"}), ("dopri5", "step", 1)),
     "none is not given": (({"step": 1, "method": "euler"}, {}, {"step": None}), ("euler", "step", 1)),
 }
+OWN = {"scheme": "paoli-schatzman"}
 REFUSED = {
     "both in the file": (({"step": 1, "tolerance": 1}, {}, {}), "both step and tolerance"),
     "both in --set": (({}, {"step": 1, "tolerance": 1}, {}), "both step and tolerance"),
@@ -39,6 +40,11 @@ REFUSED = {
     "unknown method": (({}, {}, {"method": "rk5"}), "no method 'rk5'"),
     "unknown scheme": (({}, {}, {"scheme": "relax"}), "no scheme 'relax'"),
     "scheme to come": (({}, {}, {"scheme": "located"}), "not built yet"),
+    "own formula, explicit method": (({"step": 1}, {}, {**OWN, "method": "rk4"}), "no method"),
+    "own formula, --set method": (({**OWN, "step": 1}, {"method": "rk4"}, {}), "no method"),
+    "own formula, explicit relaxation": (({"step": 1}, {}, {**OWN, "relaxation": 1}), "no relaxation"),
+    "own formula, default tolerance": (({}, {}, OWN), "needs a step"),
+    "own formula, tolerance": (({**OWN, "step": 1}, {}, {"tolerance": 1}), "needs a step"),
     "unknown setting": (({}, {"stepp": 1}, {}), "no setting 'stepp'"),
 }
 
@@ -52,6 +58,14 @@ def test_precedence(case):
     places, (method, size, value) = ACCEPTED[case]
     request = ask(places)
     assert (request.method.name, request.size, float(request.values[request.size].value)) == (method, size, value)
+
+
+@pytest.mark.parametrize("places", [({}, {}, OWN), (OWN, {}, {}), ({}, OWN, {"method": "auto"})])
+def test_a_scheme_with_its_own_formula_takes_no_method(places):
+    """What the file says for other schemes gives way."""
+    in_file, in_set, call = places
+    request = ask(({"step": 1, "method": "rk4", "relaxation": 1, **in_file}, in_set, call))
+    assert (request.scheme, request.method, request.size) == ("paoli-schatzman", None, "step")
 
 
 @pytest.mark.parametrize("case", REFUSED)

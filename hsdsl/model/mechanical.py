@@ -1,0 +1,120 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
+"""Whether a model is one mass against one stop, and its numbers: what the scheme paoli-schatzman can run."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.backends.python import compile_routines
+from hsdsl.errors import UsageError
+from hsdsl.expression.stack import deep_stack
+from hsdsl.lower import lower_expressions
+from hsdsl.model.values import Values
+from hsdsl.simulate.run import show
+from hsdsl.simulate.settings import OneStop
+from hsdsl.system import Edge, HybridSystem, Mode
+
+HINT = "use scheme 'relaxed'"
+
+
+def one_stop(values: Values, x: tuple[Number, ...]) -> OneStop:
+    """Recognise x' = v, v' = f(t) - 2 a v - k x with one stop on x and v -> -c v there.
+
+    Parameters
+    ----------
+    values : Values
+        The model with its parameters' values.
+    x : tuple of Number
+        The state a run starts from.
+
+    Raises
+    ------
+    UsageError
+        The model is not of that form, or starts beyond its stop; the message says why.
+    """
+    with deep_stack():
+        position, expressions = _structure(values.system)
+    numbers = _evaluate(values, expressions)
+    slope, offset = numbers["slope"], numbers["offset"]
+    if slope == 0:
+        raise _refusal("its surface does not depend on the position with these parameters")
+    level, restitution = -offset / slope, numbers["restitution"]
+    if not 0 <= restitution <= 1:
+        raise _refusal(f"its restitution is {show(restitution)}, not between 0 and 1")
+    if (x[position] - level) * slope > 0:
+        raise _refusal(f"it starts at {show(x[position])}, beyond its stop at {show(level)}")
+    return OneStop(position, slope > 0, level, restitution, numbers["drag"] / 2, numbers["stiffness"])
+
+
+def _refusal(reason: str) -> UsageError:
+    return UsageError(f"scheme paoli-schatzman is for one mass and one stop, but in this model {reason}", HINT)
+
+
+def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
+    """Return which of the two states is the position, and the numbers as expressions of parameters."""
+    mode, edge = _only(system)
+    symbols = [sp.Symbol(name, real=True) for name in mode.states]
+    known = {sp.Symbol(p.name, real=True) for p in system.parameters}
+    position = _position(edge, symbols, known)
+    x, v = symbols[position], symbols[1 - position]
+    if mode.flow[position] != v:
+        raise _refusal(f"the derivative of {x} is not {v}")
+    residual, acceleration = edge.surface.residual, mode.flow[1 - position]
+    found = {
+        "slope": residual.diff(x),
+        "offset": residual.subs({x: 0}),
+        "stiffness": sp.expand(-acceleration.diff(x)),
+        "drag": sp.expand(-acceleration.diff(v)),
+        "restitution": -edge.reset[1 - position].diff(v),
+    }
+    for name, what in (("stiffness", x), ("drag", v)):
+        if not found[name].free_symbols <= known:
+            raise _refusal(f"the acceleration does not have a constant coefficient of {what}")
+    if edge.reset[position] != x:
+        raise _refusal(f"the reset changes {x}")
+    remainder = sp.expand(edge.reset[1 - position] + found["restitution"] * v)
+    if remainder != 0 or not found["restitution"].free_symbols <= known:
+        raise _refusal(f"the reset of {v} is not a constant times {v}")
+    return position, found
+
+
+def _only(system: HybridSystem) -> tuple[Mode, Edge]:
+    """Return the one mode and its one transition."""
+    if len(system.modes) != 1:
+        raise _refusal(f"there are {len(system.modes)} modes")
+    mode = system.modes[0]
+    if len(mode.states) != 2:
+        raise _refusal(f"mode {mode.name} has {len(mode.states)} states, not a position and its velocity")
+    if mode.walls:
+        raise _refusal(f"mode {mode.name} has a wall, {mode.walls[0].text}")
+    if len(mode.edges) != 1:
+        raise _refusal(f"mode {mode.name} has {len(mode.edges)} transitions")
+    if mode.edges[0].condition is not None:
+        raise _refusal(f"transition {mode.edges[0].name} has an `if`")
+    return mode, mode.edges[0]
+
+
+def _position(edge: Edge, symbols: list[sp.Symbol], known: set[sp.Symbol]) -> int:
+    """Return which state the guard is a level of."""
+    residual = edge.surface.residual
+    for k, x in enumerate(symbols):
+        slope = residual.diff(x)
+        if slope != 0 and slope.free_symbols <= known and residual.subs({x: 0}).free_symbols <= known:
+            return k
+    raise _refusal(f"the guard {edge.surface.text} is not a constant level of one state")
+
+
+def _evaluate(values: Values, expressions: dict[str, sp.Expr]) -> dict[str, Number]:
+    arithmetic = values.kernel.arithmetic
+    routines = compile_routines(lower_expressions(values.system, expressions), arithmetic, "one_stop")()
+    found: dict[str, Number] = {}
+    for name, routine in zip(expressions, routines, strict=True):
+        try:
+            found[name] = routine(*values.parameters)[0]
+        except DOMAIN_ERRORS:
+            found[name] = arithmetic.functions["nan"]
+        if not arithmetic.isfinite(found[name]):
+            raise _refusal(f"its {name} has no finite value")
+    return found
