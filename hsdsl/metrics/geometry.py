@@ -1,0 +1,190 @@
+"""Domains, guards and passages as float64 geometry.
+
+A domain is a polyhedron, a guard a polyhedron inside a plane of its mode, a reset an affine map: exact for models whose
+surfaces, conditions and resets are affine. What is not affine stands beside it as a function that is at most 0 where
+the point is allowed, so that the polyhedra contain the sets they stand for: lower bounds stay valid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Curved = Callable[[Array], float]
+VectorMap = Callable[[Array], Array]
+
+TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """A mode's domain: ``normals @ x <= levels`` (m rows of n) and ``curved(x) <= 0``."""
+
+    mode: str
+    coordinates: tuple[str, ...]
+    normals: Array
+    levels: Array
+    curved: tuple[Curved, ...] = ()
+    texts: tuple[str, ...] = ()
+
+    @property
+    def convex(self) -> bool:
+        """Whether the polyhedron is the domain itself."""
+        return not self.curved
+
+    def excess(self, x: Array) -> tuple[float, str | None]:
+        """How far a point is beyond the worst inequality, relative to its numbers, and that inequality's text."""
+        sizes = np.abs(self.normals) @ np.abs(x) + np.abs(self.levels) + 1e-300
+        flat = (self.normals @ x - self.levels) / np.maximum(sizes, 1.0)
+        beyond = [*flat.tolist(), *(value(x) / (1 + float(np.abs(x).max(initial=0))) for value in self.curved)]
+        worst = max(range(len(beyond)), key=beyond.__getitem__, default=None)
+        return (0.0, None) if worst is None else (beyond[worst], self.texts[worst] if self.texts else None)
+
+
+@dataclass(frozen=True, eq=False)
+class Gate:
+    """A convex piece of a guard, ``base + frame s`` with ``normals s <= levels``, and its image.
+
+    The image is ``image_base + image_frame s``. ``frame`` has orthonormal columns (n of n - 1), so lengths on the guard
+    are lengths of s. ``curved`` are conditions on the guard's points that are not affine; with any, the piece contains
+    the guard and may be larger.
+    """
+
+    edge: str
+    source: int
+    target: int
+    base: Array
+    frame: Array
+    image_base: Array
+    image_frame: Array
+    normals: Array
+    levels: Array
+    curved: tuple[Curved, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Dimension of the guard."""
+        return self.frame.shape[1]
+
+    @cached_property
+    def stretch(self) -> tuple[float, float]:
+        """Smallest and largest factor by which the reset changes lengths along the guard."""
+        if self.size == 0:
+            return 1.0, 1.0
+        values = np.linalg.svd(self.image_frame, compute_uv=False)
+        least = float(values[-1]) if self.image_frame.shape[0] >= self.size else 0.0
+        return least, float(values[0]) if values.size else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedGate:
+    """A guard whose surface or reset is not affine: ``surface(x) = 0``, ``conditions(x) <= 0``, ``reset(x)``."""
+
+    edge: str
+    source: int
+    target: int
+    surface: Curved
+    conditions: tuple[Curved, ...]
+    reset: VectorMap
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """A gate passed in one direction: entered at ``enter`` and left at ``leave``, both affine in s."""
+
+    index: int
+    gate: Gate
+    forward: bool
+
+    @property
+    def source(self) -> int:
+        """The mode it is entered from."""
+        return self.gate.source if self.forward else self.gate.target
+
+    @property
+    def target(self) -> int:
+        """The mode it leads into."""
+        return self.gate.target if self.forward else self.gate.source
+
+    @property
+    def enter(self) -> tuple[Array, Array]:
+        """Base and frame of the side it is entered at."""
+        return self._side(self.forward)
+
+    @property
+    def leave(self) -> tuple[Array, Array]:
+        """Base and frame of the side it is left at."""
+        return self._side(not self.forward)
+
+    def _side(self, guard: bool) -> tuple[Array, Array]:
+        gate = self.gate
+        return (gate.base, gate.frame) if guard else (gate.image_base, gate.image_frame)
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """A model's domains glued along its guards, for one set of parameter values.
+
+    Attributes
+    ----------
+    modes : tuple of str
+        Names, in file order.
+    domains : tuple of Domain
+        One for each mode; coordinates are its states and, where ``timed``, time as the last one.
+    gates : tuple of Gate
+        Guards with affine surface and reset, in convex pieces; without those that are empty.
+    curved_gates : tuple of CurvedGate
+        The other guards.
+    kept : tuple of tuple of int, or None
+        For each mode where the coordinates stand that every mode has and no passage changes: their Euclidean distance
+        is a lower bound everywhere. None where there are none.
+    timed : bool
+        Whether a surface, condition or reset depends on time or an input, so that time is a coordinate.
+    """
+
+    modes: tuple[str, ...]
+    domains: tuple[Domain, ...]
+    gates: tuple[Gate, ...]
+    curved_gates: tuple[CurvedGate, ...]
+    kept: tuple[tuple[int, ...], ...] | None
+    timed: bool
+    cache: dict[Any, Any] = field(default_factory=dict[Any, Any], repr=False)
+
+    def mode_index(self, name: str) -> int:
+        """Where a mode stands.
+
+        Raises
+        ------
+        KeyError
+            There is none of that name.
+        """
+        try:
+            return self.modes.index(name)
+        except ValueError:
+            raise KeyError(name) from None
+
+    @cached_property
+    def passages(self) -> tuple[Passage, ...]:
+        """Every gate in both directions; gate i forwards is 2 i, backwards 2 i + 1."""
+        both = [(gate, forward) for gate in self.gates for forward in (True, False)]
+        return tuple(Passage(i, gate, forward) for i, (gate, forward) in enumerate(both))
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether everything is affine, so that both ends of a distance are certified."""
+        return not self.curved_gates and all(d.convex for d in self.domains) and not any(g.curved for g in self.gates)
+
+    @cached_property
+    def components(self) -> tuple[int, ...]:
+        """For each mode the connected part of the mode graph it lies in, edges taken both ways."""
+        part = list(range(len(self.modes)))
+        for gate in (*self.gates, *self.curved_gates):
+            old, new = part[gate.source], part[gate.target]
+            part = [new if p == old else p for p in part]
+        return tuple(part)

@@ -1,0 +1,158 @@
+"""How far apart are two points of the hybrid quotient space, or of the relaxed one?
+
+The distance is the length of the shortest connected curve (Def. 4, 5, 12 and 19): straight pieces inside domains, free
+passage between a guard point and its reset image in either direction; on the relaxed space every passage costs the
+relaxation and a strip has the metric of Def. 15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.metrics.chain import chain_of
+from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.interval import INFINITE, ZERO, Interval
+from hsdsl.metrics.search import HOPS, End, Found, search
+
+ROUNDING = 16 * 2.0**-53  # relative to the size of the numbers
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point: of a mode's domain or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.
+
+    ``x`` are the mode's states in file order; in a strip, the guard point's. ``t`` where time is a coordinate.
+    """
+
+    mode: str
+    x: tuple[float, ...]
+    edge: str | None = None
+    depth: float = 0.0
+    t: float | None = None
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A straight piece of a path inside one mode, and the passage after it (``edge``, or None at the end)."""
+
+    mode: str
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    edge: str | None = None
+    forward: bool = True
+
+
+@dataclass(frozen=True)
+class PointDistance:
+    """A distance with the path that attains its upper end, and what is certified of it, in words."""
+
+    interval: Interval
+    path: tuple[Piece, ...]
+    certified: str
+
+
+def distance(
+    space: Space, p: Place, q: Place, relaxation: float | None = None, hops: int | None = None
+) -> PointDistance:
+    """The distance between two points.
+
+    Parameters
+    ----------
+    space : Space
+        The model's.
+    p, q : Place
+        The points; both of the same kind of space.
+    relaxation : float, optional
+        The relaxed metric's (Def. 19); without it, the quotient metric's (Def. 12), in which a point of a strip counts
+        as its guard point.
+    hops : int, optional
+        The most passages of the paths compared.
+
+    Raises
+    ------
+    ValueError
+        A place does not fit the space: unknown mode or edge, wrong number of states, missing time, impossible depth.
+    """
+    starts, ends = ends_of(space, p, relaxation, False), ends_of(space, q, relaxation, True)
+    if p == q:
+        return PointDistance(ZERO, (), "certified")
+    a, b = starts[0], ends[0]
+    if space.components[a.mode] != space.components[b.mode]:
+        return PointDistance(INFINITE, (), "certified: no edges connect the modes")
+    strip = _along_strip(p, q, a, b, relaxation)
+    most = HOPS if hops is None else hops
+    return _answer(space, search(space, starts, ends, relaxation or 0.0, most, strip), a, b, most)
+
+
+def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) -> list[End]:
+    """The ways a path can end at a place: in its domain, or bound to go on through its strip."""
+    mode, x = coordinates(space, place)
+    if place.edge is None or relaxation is None:
+        return [End(mode, x)]
+    if not 0 <= place.depth <= relaxation:
+        raise ValueError(f"the depth in a strip lies between 0 and {relaxation}, not {place.depth}")
+    gates = [i for i, g in enumerate(space.gates) if g.edge == place.edge and g.source == mode]
+    if not gates:
+        raise ValueError(f"mode {place.mode} has no edge '{place.edge}' with a guard")
+    on = [End(mode, x, -place.depth, 2 * i + is_end) for i in gates]
+    return [End(mode, x, place.depth), *on]
+
+
+def coordinates(space: Space, place: Place) -> tuple[int, Array]:
+    """A place's mode and coordinates."""
+    try:
+        mode = space.mode_index(place.mode)
+    except KeyError:
+        raise ValueError(f"there is no mode '{place.mode}'") from None
+    values = tuple(place.x)
+    if space.timed:
+        if place.t is None:
+            raise ValueError("time is a coordinate here (a guard or reset depends on it): give t")
+        values += (place.t,)
+    names = space.domains[mode].coordinates
+    if len(values) != len(names):
+        raise ValueError(f"mode {place.mode} has the coordinates {', '.join(names)}, not {len(values)} numbers")
+    return mode, np.array(values, dtype=float)
+
+
+def _along_strip(p: Place, q: Place, a: End, b: End, relaxation: float | None) -> float:
+    """The distance inside one strip (Def. 15), inf where the two are not in one."""
+    if relaxation is None or p.edge is None or (p.edge, p.mode) != (q.edge, q.mode):
+        return np.inf
+    return float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
+
+
+def _answer(space: Space, found: Found, a: End, b: End, hops: int) -> PointDistance:
+    upper, lower = found.upper, min(found.lower, found.upper)
+    if upper == np.inf and found.cut == np.inf and not found.ended_early:
+        return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
+    rounding = ROUNDING * float(np.abs(a.x).sum() + np.abs(b.x).sum() + 2 * (0 if upper == np.inf else upper))
+    interval = Interval(max(0.0, lower - rounding), upper + rounding)
+    return PointDistance(interval, _path(space, found), _sentence(found, hops))
+
+
+def _sentence(found: Found, hops: int) -> str:
+    if found.ended_early:
+        return "certified, with a wide gap: the search ended early"
+    if found.cut < np.inf:
+        return f"certified up to {hops} hops"
+    return "certified"
+
+
+def _path(space: Space, found: Found) -> tuple[Piece, ...]:
+    if found.start is None or found.end is None:
+        return ()
+    at, mode = found.start.x, found.start.mode
+    pieces: list[Piece] = []
+    if found.sequence:
+        chain = chain_of(space, found.sequence)
+        for passage, (enter, leave) in zip(chain.passages, chain.sides(found.unknowns), strict=True):
+            pieces.append(_piece(space, mode, at, enter, passage.gate.edge, passage.forward))
+            at, mode = leave, passage.target
+    return (*pieces, _piece(space, mode, at, found.end.x))
+
+
+def _piece(space: Space, mode: int, start: Array, end: Array, edge: str | None = None, forward: bool = True) -> Piece:
+    return Piece(space.modes[mode], tuple(start.tolist()), tuple(end.tolist()), edge, forward)

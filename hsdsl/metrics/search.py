@@ -1,0 +1,213 @@
+"""The shortest connected curve (Def. 4, 5 and 12) as a search over sequences of passages, the most promising first.
+
+Every open sequence carries a lower bound on all its continuations: the shortest way through it so far, plus the least
+that is left to q. A sequence is dropped once that bound reaches the best path found.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hsdsl.metrics.chain import Chain, Problem, chain_of
+from hsdsl.metrics.cones import solve
+from hsdsl.metrics.follow import may_follow
+from hsdsl.metrics.geometry import Array, Space
+
+TOLERANCE = 2e-10  # relative: bounds this near to the best path do not beat it
+HOPS = 8
+MOST_PROBLEMS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a path ends: a point of a domain, what it costs to be there, and a passage it is bound to (in a strip)."""
+
+    mode: int
+    x: Array
+    cost: float = 0.0
+    bound: int | None = None
+
+
+@dataclass
+class Found:
+    """What a search knows: the best path, and the least that what it left out can have."""
+
+    upper: float = np.inf
+    lower: float = np.inf
+    cut: float = np.inf
+    sequence: tuple[int, ...] = ()
+    unknowns: Array = field(default_factory=lambda: np.zeros(0))
+    start: End | None = None
+    end: End | None = None
+    ended_early: bool = False
+
+
+def search(space: Space, starts: list[End], ends: list[End], relaxation: float, hops: int, limit: float) -> Found:
+    """Search between any of ``starts`` and any of ``ends``.
+
+    Parameters
+    ----------
+    relaxation : float
+        What each passage costs.
+    hops : int
+        The most passages on a path; what is cut there is kept apart in ``Found.cut``.
+    limit : float
+        Only paths shorter than this matter (inf: all).
+    """
+    found = Found(upper=limit)
+    for end in ends:
+        for start in starts:
+            _Search(space, start, end, relaxation, hops, found).run()
+    return found
+
+
+class _Search:
+    """One pair of ends."""
+
+    def __init__(self, space: Space, start: End, end: End, relaxation: float, hops: int, found: Found) -> None:
+        self.space, self.start, self.end = space, start, end
+        self.relaxation, self.hops, self.found = relaxation, hops, found
+        self.fixed = start.cost + end.cost
+        self.heap: list[tuple[float, int, tuple[int, ...]]] = []
+        self.solved = 0
+        self.rest = remaining(space, end, relaxation)
+
+    def run(self) -> None:
+        """Best first until nothing open can be shorter."""
+        self._finish(())
+        self._extend(())
+        while self.heap:
+            bound, _, sequence = heapq.heappop(self.heap)
+            if bound >= self._enough():
+                self.found.lower = min(self.found.lower, bound)
+                break
+            if self.solved > MOST_PROBLEMS:
+                self.found.lower = min(self.found.lower, bound)
+                self.found.ended_early = True
+                break
+            self._finish(sequence)
+            if len(sequence) < self.hops:
+                self._extend(sequence)
+            elif (least := self._cut(sequence, bound)) < self._enough():
+                self.found.cut = min(self.found.cut, least)
+
+    def _enough(self) -> float:
+        return self.found.upper * (1 - TOLERANCE)
+
+    def _finish(self, sequence: tuple[int, ...]) -> None:
+        """The path through exactly this sequence."""
+        last = self.space.passages[sequence[-1]].target if sequence else self.start.mode
+        if last != self.end.mode:
+            return
+        if not sequence and (self.start.bound, self.end.bound) != (None, None):
+            return
+        if sequence and not self._bound_end(sequence):
+            return
+        if sequence:
+            problem = chain_of(self.space, sequence).problem(self.start.x, self.end.x)
+        else:
+            problem = Problem(
+                (np.zeros((len(self.end.x), 0)),), (self.end.x - self.start.x,), np.zeros((0, 0)), np.zeros(0)
+            )
+        lower, upper, s = self._solve(problem)
+        toll = self.fixed + self.relaxation * len(sequence)
+        self.found.lower = min(self.found.lower, lower + toll)
+        if upper + toll < self.found.upper:
+            self.found.upper, self.found.sequence, self.found.unknowns = upper + toll, sequence, s
+            self.found.start, self.found.end = self.start, self.end
+
+    def _bound_end(self, sequence: tuple[int, ...]) -> bool:
+        if self.end.bound is not None and sequence[-1] != self.end.bound:
+            return False
+        return len(sequence) < 2 or self._pair(
+            sequence[-2], sequence[-1], len(sequence) - 2, self.end.bound is not None
+        )
+
+    def _extend(self, sequence: tuple[int, ...]) -> None:
+        """Every sequence one passage longer, with its bound."""
+        for following in self._following(sequence):
+            longer = (*sequence, following)
+            if (bound := self._bound(longer)) < self._enough():
+                heapq.heappush(self.heap, (bound, len(longer), longer))
+
+    def _following(self, sequence: tuple[int, ...]) -> Iterator[int]:
+        if not sequence:
+            if self.start.bound is not None:
+                yield self.start.bound
+                return
+            yield from (p.index for p in self.space.passages if p.source == self.start.mode)
+            return
+        mode = self.space.passages[sequence[-1]].target
+        for passage in self.space.passages:
+            if passage.source == mode:
+                last = passage.index == self.end.bound
+                if self._pair(sequence[-1], passage.index, len(sequence) - 1, last):
+                    yield passage.index
+
+    def _pair(self, first: int, second: int, position: int, last: bool) -> bool:
+        worth, after, before = may_follow(self.space, first, second)
+        begins = position == 0 and self.start.bound is not None
+        return (worth or (begins and last)) and (after or last) and (before or begins)
+
+    def _bound(self, sequence: tuple[int, ...]) -> float:
+        """The least any path beginning with this sequence can have."""
+        last = self.space.passages[sequence[-1]]
+        toll = self.fixed + self.relaxation * len(sequence)
+        rest = float(self.rest[last.index])
+        if rest == np.inf:
+            return np.inf
+        chain = chain_of(self.space, sequence)
+        simple = self._solve(chain.problem(self.start.x, None))[0] + rest + toll
+        if simple >= self._enough() or self.space.kept is None:
+            return simple
+        goal = self.end.x[list(self.space.kept[self.end.mode])]
+        return max(simple, self._solve(chain.problem(self.start.x, goal, kept=True))[0] + toll)
+
+    def _cut(self, sequence: tuple[int, ...], bound: float) -> float:
+        """The least that continuations beyond the cap on hops can have."""
+        longer = [self._bound((*sequence, following)) for following in self._following(sequence)]
+        return max(bound, min(longer, default=np.inf))
+
+    def _solve(self, problem: Problem) -> tuple[float, float, Array]:
+        self.solved += 1
+        return solve(problem)
+
+
+def remaining(space: Space, end: End, relaxation: float) -> Array:
+    """For each passage, a lower bound on what is left to the end once it has been left (Bellman's recursion)."""
+    count = len(space.passages)
+    rest = np.full(count, np.inf)
+    for passage in space.passages:
+        if passage.target == end.mode:
+            goal = chain_of(space, (passage.index,)).problem(None, end.x)
+            rest[passage.index] = solve(goal)[0]
+    gaps = _gaps(space)
+    for _ in range(count):
+        through = np.min(gaps + (rest + relaxation)[None, :], axis=1, initial=np.inf)
+        closer = np.minimum(rest, through)
+        if np.array_equal(closer, rest):
+            break
+        rest = closer
+    return rest
+
+
+def _gaps(space: Space) -> Array:
+    """The distance from where one passage is left to where another is entered, inf in different modes."""
+    found: Array | None = space.cache.get("gaps")
+    if found is None:
+        count = len(space.passages)
+        found = np.full((count, count), np.inf)
+        for f in space.passages:
+            for g in space.passages:
+                if f.target == g.source:
+                    found[f.index, g.index] = _gap(chain_of(space, (f.index, g.index)))
+        space.cache["gaps"] = found
+    return found
+
+
+def _gap(chain: Chain) -> float:
+    return solve(chain.problem(None, None))[0]
