@@ -166,7 +166,9 @@ class OnSpace:
         return number_a[a.trace.mode[a.pieces]] == number_b[b.trace.mode[b.pieces]]
 
 
-def rho(a: Execution, b: Execution, metric: PointMetric, *, strips: bool = False, gap: float = GAP) -> CurveDistance:
+def rho(
+    a: Execution, b: Execution, metric: PointMetric, *, relaxation: float | None = None, gap: float = GAP
+) -> CurveDistance:
     """Return the supremum over the common time span of the distance between two executions (Def. 22).
 
     Parameters
@@ -176,20 +178,31 @@ def rho(a: Execution, b: Execution, metric: PointMetric, *, strips: bool = False
         counts.
     metric : PointMetric
         The distance of points.
-    strips : bool
-        Compare on the relaxed space, where a strip's points differ by their depth; else such a point counts as the
-        guard's.
+    relaxation : float, optional
+        Compare on the relaxed space of strips so deep, where a strip's points differ by their depth (``metric`` is that
+        space's); else such a point counts as the guard's.
     gap : float
         How far apart lower and upper bound may be, relative to the lower one; less than rounding is not asked for.
 
     Raises
     ------
     UsageError
-        The runs have no time in common, or one is not finite there.
+        The runs have no time in common, one is not finite there, or a strip is deeper than ``relaxation``.
     """
     cells = merged(a, b)
-    found = supremum(cells, OnSpace(metric, strips), gap, ROUNDOFF * largest_state(cells))
-    return curve_distance(found, cells, a, b, "relaxed" if strips else "rho", gap)
+    if relaxation is not None:
+        _check_depth(cells, relaxation)
+    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, ROUNDOFF * largest_state(cells))
+    return curve_distance(found, cells, a, b, "quotient" if relaxation is None else "relaxed", gap)
+
+
+def _check_depth(cells: Cells, relaxation: float) -> None:
+    deepest = float(max(np.max(curve.depth) for curve in (cells.a, cells.b)))
+    if deepest > relaxation * (1 + 1e-9):
+        raise UsageError(
+            f"a strip of these runs is {deepest:.3g} deep, and the relaxed space's strips only {relaxation:.3g}",
+            f"relaxation {deepest:.3g}",
+        )
 
 
 def merged(a: Execution, b: Execution) -> Cells:

@@ -61,19 +61,18 @@ class Trace:
 
     def find(self, times: Array) -> Array:
         """Return the piece that begins at or holds each time, seen from the right."""
-        found: Array = np.asarray(np.searchsorted(self.start, times, side="right"), dtype=int) - 1
-        return found
+        return np.searchsorted(self.start, times, side="right") - 1
 
     def share(self, pieces: Array, times: Array) -> Array:
         """Return how far through its piece each time is, from 0 to 1."""
         length = self.end[pieces] - self.start[pieces]
         passed = times - self.start[pieces]
-        return np.divide(passed, length, out=np.zeros_like(passed), where=length > 0)
+        return np.where(length > 0, passed / np.where(length > 0, length, 1.0), 0.0)
 
     def depths(self, pieces: Array, share: Array) -> Array:
         """Return the depth at a share of each piece."""
-        begin, end = self.depth[pieces, 0], self.depth[pieces, 1]
-        return np.where(share == 1, end, begin + share * (end - begin))
+        ends: Array = self.depth[pieces]
+        return ends[:, 0] * (1 - share) + ends[:, 1] * share
 
 
 def names_of(executions: Sequence[Execution]) -> tuple[str, ...]:

@@ -1,0 +1,85 @@
+"""The table of distances between executions: a name, what it is, and the function that computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.metrics.closeness import tau_epsilon
+from hsdsl.metrics.curves import CurveDistance, PointMetric, rho
+from hsdsl.metrics.rivals import sup_norm
+from hsdsl.metrics.sampled import rho_hat
+from hsdsl.metrics.skorokhod import skorokhod
+from hsdsl.names import did_you_mean
+
+SpaceMaker = Callable[[float | None], PointMetric]  # the model's, relaxed or not
+
+
+@dataclass(frozen=True)
+class Request:
+    """Two runs and what else a distance may need; ``space`` is asked for only by those that measure on it."""
+
+    a: Execution
+    b: Execution
+    space: SpaceMaker
+    relaxation: float | None = None
+    coordinates: Sequence[str] | None = None
+
+
+@dataclass(frozen=True)
+class CurveMetric:
+    """One distance between executions."""
+
+    summary: str
+    compute: Callable[[Request], CurveDistance]
+
+
+def _quotient(request: Request) -> CurveDistance:
+    return rho(request.a, request.b, request.space(None))
+
+
+def _relaxed(request: Request) -> CurveDistance:
+    relaxation = request.relaxation
+    if relaxation is None:
+        relaxation = max(float(run.settings.get("relaxation") or 0.0) for run in (request.a, request.b))
+    if not relaxation > 0:
+        raise UsageError("the relaxed space needs a positive relaxation, and these runs have none")
+    return rho(request.a, request.b, request.space(relaxation), relaxation=relaxation)
+
+
+def _rho(request: Request) -> CurveDistance:
+    return _quotient(request) if request.relaxation is None else _relaxed(request)
+
+
+CURVE_METRICS: dict[str, CurveMetric] = {
+    "rho": CurveMetric("largest quotient distance over time; with a relaxation, on the relaxed space", _rho),
+    "quotient": CurveMetric("the same on the quotient space, a strip's points counting as the guard's", _quotient),
+    "relaxed": CurveMetric("the same on the relaxed space, its strips as deep as the runs' own", _relaxed),
+    "rho-hat": CurveMetric(
+        "largest difference of states at the first run's samples", lambda r: rho_hat(r.a, r.b, r.coordinates)
+    ),
+    "sup": CurveMetric("largest difference of states, plus 1 in different modes", lambda r: sup_norm(r.a, r.b)),
+    "skorokhod": CurveMetric("the same under the best retiming, which is paid for", lambda r: skorokhod(r.a, r.b)),
+    "tau-epsilon": CurveMetric("closeness of hybrid arcs, jump by jump", lambda r: tau_epsilon(r.a, r.b)),
+}
+
+
+def between(metric: str, request: Request) -> CurveDistance:
+    """Compute a distance between two executions by its name.
+
+    Raises
+    ------
+    UsageError
+        There is no such distance, the runs are of different models, or the distance refuses them.
+    """
+    if metric not in CURVE_METRICS:
+        raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
+    if request.a.digest != request.b.digest:
+        raise UsageError(
+            f"the runs are of different models ({request.a.model} and {request.b.model}, or an edited file): "
+            "a distance is defined in one space only",
+            "run both again with the same model file",
+        )
+    return replace(CURVE_METRICS[metric].compute(request), metric=metric)
