@@ -14,6 +14,7 @@ import numpy as np
 from hsdsl.metrics.chain import chain_of
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import INFINITE, ZERO, Interval
+from hsdsl.metrics.many import Pairs, around_guards, search_many
 from hsdsl.metrics.search import HOPS, End, Found, search
 
 ROUNDING = 16 * 2.0**-53  # relative to the size of the numbers
@@ -84,6 +85,78 @@ def distance(
     strip = _along_strip(p, q, a, b, relaxation)
     most = HOPS if hops is None else hops
     return _answer(space, search(space, starts, ends, relaxation or 0.0, most, strip), a, b, most)
+
+
+def distances(
+    space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None = None
+) -> tuple[Array, Array]:
+    """The distances of many pairs of points in the same two modes' domains.
+
+    Parameters
+    ----------
+    space : Space
+        The model's.
+    mode_p, mode_q : str
+        The modes.
+    p, q : (N, n) arrays
+        The pairs, a row each; the columns are the mode's states and, where ``space.timed``, time.
+    relaxation : float, optional
+        The relaxed metric's.
+
+    Returns
+    -------
+    lower, upper : (N,) arrays
+        Bounds; of paths with up to eight passages where no cap can be proved.
+    """
+    pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
+    if space.components[pairs.source] != space.components[pairs.target]:
+        pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
+    elif space.affine:
+        search_many(pairs, HOPS)
+    else:
+        _one_by_one(pairs, relaxation)
+    return pairs.widened()
+
+
+def _one_by_one(pairs: Pairs, relaxation: float | None) -> None:
+    names = pairs.space.modes[pairs.source], pairs.space.modes[pairs.target]
+    for k, (p, q) in enumerate(zip(pairs.p.tolist(), pairs.q.tolist(), strict=True)):
+        found = distance(pairs.space, _place(pairs.space, names[0], p), _place(pairs.space, names[1], q), relaxation)
+        pairs.lower[k], pairs.upper[k] = found.interval.lower, found.interval.upper
+
+
+def _place(space: Space, mode: str, values: list[float]) -> Place:
+    return Place(mode, tuple(values[:-1]), t=values[-1]) if space.timed else Place(mode, tuple(values))
+
+
+def quick_bounds(
+    space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None = None
+) -> tuple[Array, Array]:
+    """Cheap valid bounds on :func:`distances`, with the same parameters.
+
+    Above: the straight line in a convex domain. Below: what no passage changes, and the way to the nearest guards.
+    """
+    pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
+    if space.components[pairs.source] != space.components[pairs.target]:
+        pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
+        return pairs.lower, pairs.upper
+    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, around_guards(pairs)))
+    if not space.domains[pairs.source].convex:
+        pairs.upper = np.full(len(pairs.p), np.inf)
+    return pairs.widened()
+
+
+def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None) -> Pairs:
+    try:
+        source, target = space.mode_index(mode_p), space.mode_index(mode_q)
+    except KeyError as error:
+        raise ValueError(f"there is no mode {error}") from None
+    p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
+    for values, mode in ((p, source), (q, target)):
+        names = space.domains[mode].coordinates
+        if values.shape != (len(p), len(names)):
+            raise ValueError(f"mode {space.modes[mode]}: rows of {', '.join(names)} are wanted, not {values.shape}")
+    return Pairs.of(space, source, p, target, q, relaxation)
 
 
 def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) -> list[End]:

@@ -185,9 +185,9 @@ def remaining(space: Space, end: End, relaxation: float) -> Array:
         if passage.target == end.mode:
             goal = chain_of(space, (passage.index,)).problem(None, end.x)
             rest[passage.index] = solve(goal)[0]
-    gaps = _gaps(space)
+    between = gaps(space)
     for _ in range(count):
-        through = np.min(gaps + (rest + relaxation)[None, :], axis=1, initial=np.inf)
+        through = np.min(between + (rest + relaxation)[None, :], axis=1, initial=np.inf)
         closer = np.minimum(rest, through)
         if np.array_equal(closer, rest):
             break
@@ -195,7 +195,7 @@ def remaining(space: Space, end: End, relaxation: float) -> Array:
     return rest
 
 
-def _gaps(space: Space) -> Array:
+def gaps(space: Space) -> Array:
     """The distance from where one passage is left to where another is entered, inf in different modes."""
     found: Array | None = space.cache.get("gaps")
     if found is None:
