@@ -23,7 +23,8 @@ PAIRS = 4_000_000  # distances held at once
 def tau_epsilon(a: Execution, b: Execution, tau: float | None = None, resolution: int = RESOLUTION) -> CurveDistance:
     """Return the infimum of the epsilons for which two runs are (tau, epsilon)-close.
 
-    Infinite where one run makes a transition, with t + j <= tau, that the other never makes.
+    Infinite where one run makes a transition, with t + j <= tau, that the other never makes. Symmetric, but no metric:
+    the cut at tau breaks the triangle inequality.
 
     Parameters
     ----------

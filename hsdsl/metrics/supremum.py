@@ -14,7 +14,7 @@ Array = npt.NDArray[Any]
 
 CHUNK = 65_536  # cells whose polynomials are held at once
 FIRST_BATCH, LARGEST_BATCH = 32, 4096
-EVALUATIONS = 400_000
+EVALUATIONS = 50_000
 
 
 class CellDistance(Protocol):
@@ -96,21 +96,12 @@ def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, mos
     Supremum
     """
     found = Supremum(float(cells.begin[0]))
-    frontier = _Frontier(cells, _bounds(cells, distance), np.full((len(cells), 2), np.nan))
-    size = FIRST_BATCH
-    while True:
-        frontier = _undecided(frontier, found, gap, floor)
-        if not len(frontier.cells):
-            break
-        if found.evaluations >= most:
-            found.complete = False
-            found.upper = max(found.upper, float(np.max(frontier.bound)))
-            break
-        n = len(frontier.cells)
-        order = np.argpartition(-frontier.bound, size - 1) if size < n else np.arange(n)
-        batch, frontier = frontier.take(order[:size]), frontier.take(order[size:])
-        size = min(2 * size, LARGEST_BATCH)
-        frontier = frontier.joined(_refined(batch, found, distance, gap, floor))
+    search = _Search(distance, found, gap, floor, most)
+    bounds = _bounds(cells, distance)
+    known = np.isfinite(bounds)
+    frontier = _Frontier(cells, bounds, np.full((len(cells), 2), np.nan))
+    search.best_first(frontier.take(np.flatnonzero(known)))
+    search.best_first(search.coarse_to_fine(frontier, np.flatnonzero(~known)))
     found.upper = max(found.upper, found.points, found.lower)
     return found
 
@@ -120,45 +111,133 @@ def _bounds(cells: Cells, distance: CellDistance) -> Array:
     return np.concatenate(parts)
 
 
-def _undecided(frontier: _Frontier, found: Supremum, gap: float, floor: float) -> _Frontier:
-    """Drop the cells that cannot matter, keeping the largest of their bounds."""
-    decided = frontier.bound <= found.accepted(gap, floor)
-    if decided.any():
-        found.upper = max(found.upper, float(np.max(frontier.bound[decided])))
-        frontier = frontier.take(np.flatnonzero(~decided))
-    return frontier
+@dataclass
+class _Search:
+    """Refines until what is left cannot matter."""
+
+    distance: CellDistance
+    found: Supremum
+    gap: float
+    floor: float
+    most: int
+
+    def best_first(self, frontier: _Frontier) -> None:
+        """Evaluate and cut the cells with the largest bounds until all are decided."""
+        size = FIRST_BATCH
+        while True:
+            frontier = frontier.take(self._undecided(frontier.bound))
+            if not len(frontier.cells) or self._spent(frontier.bound):
+                return
+            order = _largest(frontier.bound, size)
+            batch, frontier = frontier.take(order[:size]), frontier.take(order[size:])
+            size = min(2 * size, LARGEST_BATCH)
+            frontier = frontier.joined(self._refined(batch))
+
+    def coarse_to_fine(self, frontier: _Frontier, chosen: Array) -> _Frontier:
+        """Bound stretches of consecutive cells by the distance at their ends and the way between; return what is left.
+
+        Stretches end at the transitions of either curve. What remains undecided is cut down to single cells.
+        """
+        if not len(chosen):
+            return frontier.take(chosen)
+        cells = frontier.cells[chosen]
+        way = np.concatenate([[0.0], np.cumsum(_ways(cells, self.distance))])
+        opens = np.append(True, _breaks(cells, chosen))
+        first = np.flatnonzero(opens)
+        last = np.append(first[1:], len(cells)) - 1
+        ends = np.full((len(cells), 2), np.nan)
+        bound = np.full(len(first), np.inf)
+        single: list[Array] = []
+        size = FIRST_BATCH
+        while True:
+            open_ = self._undecided(bound)
+            first, last, bound = first[open_], last[open_], bound[open_]
+            if not len(first) or self._spent(bound):
+                break
+            order = _largest(bound, size)
+            now, later = order[:size], order[size:]
+            size = min(2 * size, LARGEST_BATCH)
+            self._evaluate(cells, ends, first[now], 0)
+            self._evaluate(cells, ends, last[now], 1)
+            f, g = first[now], last[now]
+            reached = np.minimum(bound[now], (ends[f, 0] + ends[g, 1] + way[g + 1] - way[f]) / 2)
+            left = self._undecided(reached)
+            f, g, reached = f[left], g[left], reached[left]
+            single.append(f[f == g])
+            f, g, reached = f[f < g], g[f < g], reached[f < g]
+            middle = (f + g) // 2
+            first = np.concatenate([first[later], f, middle + 1])
+            last = np.concatenate([last[later], middle, g])
+            bound = np.concatenate([bound[later], reached, reached])
+        rest = np.concatenate(single) if single else np.zeros(0, dtype=int)
+        return _Frontier(cells[rest], np.full(len(rest), np.inf), ends[rest])
+
+    def _undecided(self, bound: Array) -> Array:
+        """Return which bounds may still matter, keeping the largest of the others."""
+        decided = bound <= self.found.accepted(self.gap, self.floor)
+        if decided.any():
+            self.found.upper = max(self.found.upper, float(np.max(bound[decided])))
+        return np.flatnonzero(~decided)
+
+    def _spent(self, bound: Array) -> bool:
+        if self.found.evaluations < self.most:
+            return False
+        self.found.complete = False
+        self.found.upper = max(self.found.upper, float(np.max(bound)))
+        return True
+
+    def _refined(self, batch: _Frontier) -> _Frontier:
+        """Evaluate a batch at the ends of its cells, then cut those in two that may still hold the supremum."""
+        every = np.arange(len(batch.cells))
+        for end in (0, 1):
+            self._evaluate(batch.cells, batch.ends, every, end)
+        reached = (batch.ends[:, 0] + batch.ends[:, 1] + _ways(batch.cells, self.distance)) / 2
+        batch.bound = np.minimum(batch.bound, reached)
+        batch = batch.take(self._undecided(batch.bound))
+        stuck = ~batch.cells.divisible
+        if stuck.any():
+            self.found.upper = max(self.found.upper, float(np.max(batch.bound[stuck])))
+            batch = batch.take(np.flatnonzero(~stuck))
+        if not len(batch.cells):
+            return batch
+        halves = batch.cells.halved()
+        unknown = np.full(len(batch.cells), np.nan)
+        ends = np.concatenate([np.stack([batch.ends[:, 0], unknown], 1), np.stack([unknown, batch.ends[:, 1]], 1)])
+        bound = np.minimum(np.concatenate([batch.bound, batch.bound]), _bounds(halves, self.distance))
+        return _Frontier(halves, bound, ends)
+
+    def _evaluate(self, cells: Cells, ends: Array, chosen: Array, end: int) -> None:
+        """Fill in the upper bounds at one end of some cells, where they are not known."""
+        unknown = chosen[np.isnan(ends[chosen, end])]
+        if not len(unknown):
+            return
+        asked = cells[unknown]
+        times = (asked.begin, asked.end)[end]
+        lower, upper = self.distance.at(*asked.sides(), end, times)
+        ends[unknown, end] = upper
+        found = self.found
+        found.evaluations += len(unknown)
+        best = int(np.argmax(lower))
+        if lower[best] > found.lower:
+            found.lower, found.time = float(lower[best]), float(times[best])
+        found.points = max(found.points, float(np.max(upper)))
 
 
-def _refined(batch: _Frontier, found: Supremum, distance: CellDistance, gap: float, floor: float) -> _Frontier:
-    """Evaluate a batch at the ends of its cells, then cut those in two that may still hold the supremum."""
-    a, b = batch.cells.sides()
-    for end in (0, 1):
-        _evaluate(batch, found, distance, a, b, end)
-    reached = (batch.ends[:, 0] + batch.ends[:, 1] + distance.motion(a) + distance.motion(b)) / 2
-    batch.bound = np.minimum(batch.bound, reached)
-    batch = _undecided(batch, found, gap, floor)
-    stuck = ~batch.cells.divisible
-    if stuck.any():
-        found.upper = max(found.upper, float(np.max(batch.bound[stuck])))
-        batch = batch.take(np.flatnonzero(~stuck))
-    if not len(batch.cells):
-        return batch
-    halves = batch.cells.halved()
-    unknown = np.full(len(batch.cells), np.nan)
-    ends = np.concatenate([np.stack([batch.ends[:, 0], unknown], 1), np.stack([unknown, batch.ends[:, 1]], 1)])
-    bound = np.minimum(np.concatenate([batch.bound, batch.bound]), _bounds(halves, distance))
-    return _Frontier(halves, bound, ends)
+def _largest(bound: Array, size: int) -> Array:
+    """Order bounds so that the largest ``size`` come first."""
+    return np.argpartition(-bound, size - 1) if size < len(bound) else np.arange(len(bound))
 
 
-def _evaluate(batch: _Frontier, found: Supremum, distance: CellDistance, a: Side, b: Side, end: int) -> None:
-    unknown = np.flatnonzero(np.isnan(batch.ends[:, end]))
-    if not len(unknown):
-        return
-    times = (batch.cells.begin, batch.cells.end)[end][unknown]
-    lower, upper = distance.at(a[unknown], b[unknown], end, times)
-    batch.ends[unknown, end] = upper
-    found.evaluations += len(unknown)
-    best = int(np.argmax(lower))
-    if lower[best] > found.lower:
-        found.lower, found.time = float(lower[best]), float(times[best])
-    found.points = max(found.points, float(np.max(upper)))
+def _ways(cells: Cells, distance: CellDistance) -> Array:
+    """Bound how far both curves together move in each cell."""
+    parts: list[Array] = []
+    for k in range(0, len(cells), CHUNK):
+        a, b = cells[k : k + CHUNK].sides()
+        parts.append(distance.motion(a) + distance.motion(b))
+    return np.concatenate(parts)
+
+
+def _breaks(cells: Cells, number: Array) -> Array:
+    """Say, for each cell but the first, whether a curve jumps before it or it does not follow the cell before it."""
+    jumps = [curve.jump[piece] for curve, piece in ((cells.a, cells.piece_a), (cells.b, cells.piece_b))]
+    return (np.diff(number) > 1) | (np.diff(jumps[0]) != 0) | (np.diff(jumps[1]) != 0)
