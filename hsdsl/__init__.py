@@ -15,26 +15,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["Execution", "Model", "ModelError", "UsageError", "__version__", "load"]
+__all__ = ["Execution", "Model", "ModelError", "UsageError", "__version__", "distance", "load"]
 
 if TYPE_CHECKING:
     from hsdsl.errors import ModelError, UsageError
     from hsdsl.execution import Execution
     from hsdsl.model import Model, load
+    from hsdsl.model.distances import distance
 
 _HOMES = {
     "Execution": "hsdsl.execution",
     "Model": "hsdsl.model",
     "ModelError": "hsdsl.errors",
     "UsageError": "hsdsl.errors",
+    "distance": "hsdsl.model.distances",
     "load": "hsdsl.model",
 }
 
 
 def __getattr__(name: str) -> Any:
     """Import public names on first use: importing one stage must not load the others."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'hsdsl' has no attribute '{name}'")
     from importlib import import_module
 
+    if name == "exact":
+        return import_module("hsdsl.exact")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hsdsl' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

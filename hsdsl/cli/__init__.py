@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from hsdsl import __version__
+from hsdsl.cli.distance import distance
 from hsdsl.cli.doctor import doctor
 from hsdsl.cli.run import run
 from hsdsl.cli.schema import schema
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (run, validate, schema, doctor):
+for verb in (run, validate, distance, schema, doctor):
     app.command()(verb)
 
 

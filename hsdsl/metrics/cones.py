@@ -7,7 +7,7 @@ last answer, in units of its value, until the gap is small or stops shrinking.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def solve(problem: Problem) -> tuple[float, float, Array]:
 
 def _refined(problem: Problem) -> tuple[float, float, Array]:
     stacked, offsets = np.vstack(problem.matrices), np.concatenate(problem.offsets)
-    center = np.linalg.lstsq(stacked, -offsets, rcond=None)[0]
+    center = cast(Array, np.linalg.lstsq(stacked, -offsets, rcond=None)[0])
     unit = max(problem.length(center), 1e-300)
     lower, upper, best = 0.0, np.inf, center
     for _ in range(ROUNDS):

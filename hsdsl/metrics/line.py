@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsdsl.metrics.geometry import Array
 
@@ -90,7 +89,7 @@ def _norm(parts: list[Array]) -> Array:
 def _best(matrices: list[Array], offsets: list[Array], candidates: list[Array]) -> tuple[Array, Array]:
     values = np.array([_length(matrices, offsets, s) for s in candidates])
     chosen = np.argmin(values, axis=0)
-    columns: NDArray[np.int64] = np.arange(values.shape[1])
+    columns = np.arange(len(candidates[0]))
     return values[chosen, columns], np.array(candidates)[chosen, columns]
 
 

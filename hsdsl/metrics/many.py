@@ -6,6 +6,7 @@ Sequences of passages are gone through by length; each keeps only the pairs for 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ def search_many(pairs: Pairs, hops: int) -> None:
 
 
 def around_guards(pairs: Pairs) -> Array:
-    """A lower bound for paths with passages: to the first guard, between guards, from the last; 0 where guards are curved."""
+    """A lower bound for paths with passages: to a guard, between guards, from one; 0 where guards are curved."""
     if pairs.space.curved_gates:
         return np.zeros(len(pairs.p))
     enters, leaves = _entered(pairs), _left(pairs)
@@ -119,7 +120,7 @@ def _promising(
 ) -> Indices:
     """Drop by the cheapest bound: from p to the first guard, from guard to guard, from some last guard to q."""
     inner = gaps(pairs.space)
-    fixed = sum(float(inner[a, b]) for a, b in zip(sequence, sequence[1:], strict=False)) + pairs.toll * len(sequence)
+    fixed = sum(float(inner[a, b]) for a, b in pairwise(sequence)) + pairs.toll * len(sequence)
     rest = _rest(between, leaves, sequence[-1], candidates)
     bound = np.maximum(enters[sequence[0], candidates] + fixed + rest, floor[candidates] + pairs.toll * len(sequence))
     return pairs.open(bound, candidates)
@@ -132,17 +133,18 @@ def _still_open(pairs: Pairs, sequence: tuple[int, ...], active: Indices, leaves
     space, toll = pairs.space, pairs.toll * len(sequence)
     chain = chain_of(space, sequence)
     rest = _rest(between, leaves, sequence[-1], active)
-    problem = chain.problem(np.zeros(pairs.p.shape[1]), None)
-    offsets = [np.broadcast_to(o, (len(active), len(o))) for o in problem.offsets]
+    zero = np.zeros(len(space.domains[pairs.source].coordinates))
+    problem = chain.problem(zero, None)
+    offsets = repeated(problem.offsets, len(active))
     offsets[0] = offsets[0] - pairs.p[active]
     active = active[
         _below(pairs, active, shortest(problem.matrices, offsets, chain.normals, chain.levels)[0] + toll + rest)
     ]
     if space.kept is None or not active.size:
         return active
-    goals = pairs.q[np.ix_(active, list(space.kept[pairs.target]))]
-    problem = chain.problem(np.zeros(pairs.p.shape[1]), np.zeros(goals.shape[1]), kept=True)
-    offsets = [np.broadcast_to(o, (len(active), len(o))) for o in problem.offsets]
+    goals = pairs.q[active][:, list(space.kept[pairs.target])]
+    problem = chain.problem(zero, np.zeros(len(space.kept[pairs.target])), kept=True)
+    offsets = repeated(problem.offsets, len(active))
     offsets[0], offsets[-1] = offsets[0] - pairs.p[active], offsets[-1] - goals
     return active[_below(pairs, active, shortest(problem.matrices, offsets, chain.normals, chain.levels)[0] + toll)]
 
@@ -154,13 +156,20 @@ def _below(pairs: Pairs, active: Indices, bound: Array) -> NDArray[np.bool_]:
 def _finish(pairs: Pairs, sequence: tuple[int, ...], active: Indices) -> None:
     """The paths through exactly this sequence."""
     chain = chain_of(pairs.space, sequence)
-    problem = chain.problem(np.zeros(pairs.p.shape[1]), np.zeros(pairs.q.shape[1]))
-    offsets = [np.broadcast_to(o, (len(active), len(o))) for o in problem.offsets]
+    domains = pairs.space.domains
+    zeros = [np.zeros(len(domains[mode].coordinates)) for mode in (pairs.source, pairs.target)]
+    problem = chain.problem(zeros[0], zeros[1])
+    offsets = repeated(problem.offsets, len(active))
     offsets[0], offsets[-1] = offsets[0] - pairs.p[active], offsets[-1] - pairs.q[active]
     lower, upper, _ = shortest(problem.matrices, offsets, chain.normals, chain.levels)
     toll = pairs.toll * len(sequence)
     pairs.lower[active] = np.minimum(pairs.lower[active], lower + toll)
     pairs.upper[active] = np.minimum(pairs.upper[active], upper + toll)
+
+
+def repeated(offsets: tuple[Array, ...], count: int) -> list[Array]:
+    """The same offsets for every problem."""
+    return [np.tile(o, (count, 1)) for o in offsets]
 
 
 def shortest(

@@ -1,7 +1,8 @@
 """Sums of Euclidean norms over a polyhedron, minimised for many offsets at once.
 
 A primal-dual interior-point method (Andersen, Christiansen, Conn, Overton, "An efficient primal-dual interior-point
-method for minimizing a sum of Euclidean norms", SIAM J. Sci. Comput. 22, 2000), with inequalities added: Newton's method on
+method for minimizing a sum of Euclidean norms", SIAM J. Sci. Comput. 22, 2000), with inequalities
+added: Newton's method on
 
     sum M_i' y_i + C' w = 0,   r_i y_i = M_i s + o_i,   (d - C s) w = mu,   r_i^2 = |M_i s + o_i|^2 + mu^2
 
@@ -11,8 +12,10 @@ as mu goes to 0. Whatever it returns is judged afterwards, as a feasible path an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsdsl.metrics.geometry import Array
 
@@ -77,7 +80,7 @@ def minimise(matrices: list[Array], offsets: list[Array], normals: Array, levels
     return np.minimum(lower, upper), upper, best
 
 
-def _around(whole: Family, todo: Array, center: Array, unit: Array) -> tuple[Array, Array]:
+def _around(whole: Family, todo: NDArray[np.intp], center: Array, unit: Array) -> tuple[Array, Array]:
     """Solve in ``s = center + unit sigma``; returns lower bounds and proposals."""
     scaled = Family(
         whole.matrices,
@@ -134,7 +137,7 @@ def _direction(
         right += (u / r[:, None]) @ m
     floor = 1e-15 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] + 1e-300
     matrix += floor * np.eye(size)
-    ds = np.linalg.solve(matrix, -right[:, :, None])[:, :, 0]
+    ds = cast(Array, np.linalg.solve(matrix, -right[:, :, None]))[:, :, 0]
     dslack = missing - ds @ family.normals.T
     dvectors: list[Array] = []
     for m, u, y, r in zip(family.matrices, legs, vectors, radii, strict=True):
@@ -146,7 +149,8 @@ def _direction(
 
 def _room(values: Array, steps: Array) -> Array:
     """The part of a step that keeps values positive."""
-    share = np.divide(-values, steps, out=np.full_like(values, np.inf), where=steps < 0)
+    falling = steps < 0
+    share = cast(Array, np.where(falling, -values / np.where(falling, steps, 1.0), np.inf))
     return np.minimum(1.0, REACH * share.min(axis=1, initial=np.inf))
 
 

@@ -53,6 +53,19 @@ class PointDistance:
     path: tuple[Piece, ...]
     certified: str
 
+    @property
+    def sentence(self) -> str:
+        """The distance and its path, for a person."""
+        if self.interval.lower == np.inf:
+            return f"inf ({self.certified})"
+        lines = [f"{self.interval.upper:.10g}, in {self.interval} ({self.certified})"]
+        for piece in self.path:
+            start, end = (", ".join(f"{v:.6g}" for v in x) for x in (piece.start, piece.end))
+            backwards = "" if piece.forward else " backwards"
+            passage = "" if piece.edge is None else f", then {piece.edge}{backwards}"
+            lines.append(f"  {piece.mode}: ({start}) to ({end}){passage}")
+        return "\n".join(lines)
+
 
 def distance(
     space: Space, p: Place, q: Place, relaxation: float | None = None, hops: int | None = None

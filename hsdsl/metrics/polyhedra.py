@@ -55,7 +55,7 @@ def pieces_of(
         return []
     normals = np.vstack([row[0] for row in rows if row is not None])
     levels = np.concatenate([row[1] for row in rows if row is not None])
-    nothing: Array = np.zeros(frame.shape[1])
+    nothing = np.zeros(len(base) - 1)
     if len(levels) and largest(nothing, normals, levels) is None:
         return []
     return [Gate(edge, source[0], target[0], base, frame, image_base, image_frame, normals, levels, curved)]

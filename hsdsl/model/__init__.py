@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.backends.python import PythonKernel
@@ -27,6 +27,9 @@ from hsdsl.program import Program
 from hsdsl.simulate import Settings, simulate
 from hsdsl.simulate.recorder import Recorder
 from hsdsl.system import HybridSystem
+
+if TYPE_CHECKING:
+    from hsdsl.metrics.points import Place, PointDistance
 
 ENGINES = ("auto", "python", "c")
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
@@ -178,6 +181,41 @@ class Model:
 
         values = with_parameters(self._values(FLOAT64), parameters or {})
         plot(execution, path, guards=guard_lines(values), units=self.system.units)
+
+    def distance(
+        self,
+        p: str | Place,
+        q: str | Place,
+        *,
+        metric: str = "quotient",
+        relaxation: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        hops: int | None = None,
+    ) -> PointDistance:
+        """Return how far apart two points are: the length of the shortest curve that may pass through guards.
+
+        Parameters
+        ----------
+        p, q : str or Place
+            A mode and all its states, as ``"free x=13 v=5"``; values are expressions of parameters.
+        metric : {"quotient", "relaxed"}
+            The paper's d_M (Def. 12), or that of the relaxed space (Def. 19).
+        relaxation : number or str, optional
+            The paper's epsilon; left out, the file's or 1e-6.
+        parameters : mapping, optional
+            Overrides by name.
+        hops : int, optional
+            The most passages of a path.
+
+        Raises
+        ------
+        UsageError
+            A point or a number that does not fit the model, or a point outside its mode's domain.
+        """
+        from hsdsl.model.places import distance_of_points
+
+        values = with_parameters(self._values(FLOAT64), parameters or {})
+        return distance_of_points(values, p, q, metric, relaxation, hops)
 
     @property
     def columns(self) -> list[str]:

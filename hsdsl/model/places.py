@@ -1,0 +1,106 @@
+"""Points of a model's space, as people write them: ``free x=13 v=5``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hsdsl.errors import UsageError
+from hsdsl.metrics.geometry import TOLERANCE, Space
+from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
+from hsdsl.metrics.space import make_space
+from hsdsl.model.values import Values
+from hsdsl.names import did_you_mean
+from hsdsl.simulate.run import show
+
+METRICS = ("quotient", "relaxed")
+_ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
+
+
+def distance_of_points(
+    values: Values, p: str | Place, q: str | Place, metric: str, relaxation: Any, hops: int | None
+) -> PointDistance:
+    """Return how far apart two points of a model's space are; see `Model.distance`."""
+    if metric not in METRICS:
+        raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, METRICS))
+    depth = None if metric == "quotient" else _relaxation(values, relaxation)
+    if metric == "quotient" and relaxation is not None:
+        raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
+    space = make_space(values.system, [float(v) for v in values.parameters])
+    start, end = (read_place(values, space, given) if isinstance(given, str) else given for given in (p, q))
+    for place in (start, end):
+        _check_inside(space, place)
+    try:
+        return distance(space, start, end, depth, hops)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def read_place(values: Values, space: Space, text: str) -> Place:
+    """Read ``MODE STATE=VALUE ...``; values are expressions of parameters.
+
+    Raises
+    ------
+    UsageError
+        It is not of that form, names no mode, or does not give every state once.
+    """
+    mode, _, rest = text.strip().partition(" ")
+    if mode not in space.modes:
+        raise UsageError(f"'{text}': the model has no mode '{mode}'", did_you_mean(mode, space.modes))
+    found = list(_ASSIGNMENT.finditer(rest))
+    ends = [*(m.start() for m in found[1:]), len(rest)]
+    if rest[: found[0].start() if found else len(rest)].strip():
+        raise UsageError(f"'{text}': after the mode come its states, as NAME=VALUE", _example(space, mode))
+    given: dict[str, str] = {}
+    for match, end in zip(found, ends, strict=False):
+        if match[1] in given:
+            raise UsageError(f"'{text}': {match[1]} is given twice")
+        given[match[1]] = rest[match.end() : end].strip().rstrip(",").strip()
+    return _place(values, space, mode, given, text)
+
+
+def _place(values: Values, space: Space, mode: str, given: Mapping[str, str], text: str) -> Place:
+    names = space.domains[space.mode_index(mode)].coordinates
+    for name in given:
+        if name == "t" and not space.timed:
+            raise UsageError(
+                f"'{text}': time is no coordinate here, since no guard or reset depends on it", "leave out t"
+            )
+        if name not in names:
+            raise UsageError(f"'{text}': mode {mode} has no state '{name}'", did_you_mean(name, names))
+    if missing := [name for name in names if name not in given]:
+        raise UsageError(f"'{text}': no value is given for {', '.join(missing)}", _example(space, mode))
+    numbers = [float(values.number(given[name], f"{mode} {name}")) for name in names]
+    if space.timed:
+        return Place(mode, tuple(numbers[:-1]), t=numbers[-1])
+    return Place(mode, tuple(numbers))
+
+
+def _example(space: Space, mode: str) -> str:
+    names = space.domains[space.mode_index(mode)].coordinates
+    return "for example: " + " ".join([mode, *(f"{name}=0" for name in names)])
+
+
+def _relaxation(values: Values, given: Any) -> float:
+    if given is None:
+        given = values.constant("relaxation")[0] if values.has("relaxation") else 1e-6
+    number = float(values.number(given, "relaxation"))
+    if number <= 0:
+        raise UsageError(f"relaxation must be positive, not {show(number)}")
+    return number
+
+
+def _check_inside(space: Space, place: Place) -> None:
+    """Refuse a point that is in no domain: the distance is between points of the space."""
+    try:
+        mode, x = coordinates(space, place)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    excess, text = space.domains[mode].excess(x)
+    if not excess <= TOLERANCE:
+        at = ", ".join(f"{n} = {show(v)}" for n, v in zip(space.domains[mode].coordinates, x.tolist(), strict=True))
+        beyond = f"beyond `{text}`" if np.isfinite(excess) else f"where `{text}` has no value"
+        raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")
