@@ -62,6 +62,12 @@ class CurveDistance:
         """The distance is at most this."""
         return self.interval.upper
 
+    @property
+    def sentence(self) -> str:
+        """What is known, for a person."""
+        where = "" if self.time is None or self.upper == 0 else f", the lower bound at t = {self.time:.10g}"
+        return f"{self.metric} distance in {self.interval}{where}"
+
     def as_json(self) -> dict[str, Any]:
         """Return what ``hsdsl distance --json`` prints."""
         return {

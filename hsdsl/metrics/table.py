@@ -76,10 +76,21 @@ def between(metric: str, request: Request) -> CurveDistance:
     """
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
-    if request.a.digest != request.b.digest:
+    check_same_model(request.a, request.b)
+    return replace(CURVE_METRICS[metric].compute(request), metric=metric)
+
+
+def check_same_model(a: Execution, b: Execution) -> None:
+    """Refuse runs of different models.
+
+    Raises
+    ------
+    UsageError
+        Their digests differ.
+    """
+    if a.digest != b.digest:
         raise UsageError(
-            f"the runs are of different models ({request.a.model} and {request.b.model}, or an edited file): "
+            f"the runs are of different models ({a.model} and {b.model}, or an edited file): "
             "a distance is defined in one space only",
             "run both again with the same model file",
         )
-    return replace(CURVE_METRICS[metric].compute(request), metric=metric)

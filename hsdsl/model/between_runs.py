@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import CurveDistance, PointMetric
-from hsdsl.metrics.table import Request, between
+from hsdsl.metrics.table import Request, between, check_same_model
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
+    from hsdsl.model.values import Values
 
 
-def distance_of_runs(
+def distance(
     run: Execution,
     other: Execution,
     metric: str = "rho",
     *,
-    relaxation: float | None = None,
+    relaxation: Any = None,
     model: Model | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     coordinates: Sequence[str] | None = None,
@@ -32,8 +34,8 @@ def distance_of_runs(
     run, other : Execution
         Of one model file; schemes, steps, engines, initial values and lengths may differ.
     metric : str
-        A key of `hsdsl.metrics.table.CURVE_METRICS`.
-    relaxation : float, optional
+        A key of `hsdsl.metrics.table.CURVE_METRICS`: rho, quotient, relaxed, rho-hat, sup, skorokhod or tau-epsilon.
+    relaxation : number or str, optional
         For ``rho`` and ``relaxed``: how deep the strips of the relaxed space are.
     model : Model or path, optional
         The model that the space is made of; left out, the file that the first run names.
@@ -53,35 +55,77 @@ def distance_of_runs(
         Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
         since.
     """
-
-    def space(depth: float | None) -> PointMetric:
-        return _space(run, model, parameters or {}, depth)
-
-    return between(metric, Request(run, other, space, relaxation, coordinates))
+    source = _Source(run, model, parameters or {})
+    depth = None if relaxation is None else source.number(relaxation)
+    return between(metric, Request(run, other, source.space, depth, coordinates))
 
 
-def _space(
-    run: Execution, model: Model | str | os.PathLike[str] | None, parameters: Mapping[str, Any], depth: float | None
-) -> PointMetric:
-    from hsdsl.arithmetic import FLOAT64
-    from hsdsl.metrics.pointwise import SpaceMetric
-    from hsdsl.metrics.space import make_space
-    from hsdsl.model import Model
-    from hsdsl.model.values import with_parameters
+class _Source:
+    """The model behind a run, read when it is first needed."""
 
-    given = model if isinstance(model, Model) else _load(run.model if model is None else model, run)
-    if given.system.digest != run.digest:
-        raise UsageError(
-            f"{given.system.path} is not the model that the run is of, or was edited since",
-            "run it again, or give the model as it was",
-        )
-    values = with_parameters(given._values(FLOAT64), parameters)  # pyright: ignore[reportPrivateUsage]
-    return SpaceMetric(make_space(given.system, [float(v) for v in values.parameters]), depth)
+    def __init__(
+        self, run: Execution, model: Model | str | os.PathLike[str] | None, parameters: Mapping[str, Any]
+    ) -> None:
+        self.run, self.model, self.parameters = run, model, parameters
+
+    @cached_property
+    def values(self) -> Values:
+        from hsdsl.arithmetic import FLOAT64
+        from hsdsl.model import Model
+        from hsdsl.model.values import with_parameters
+
+        given = self.model if isinstance(self.model, Model) else _load(self.model, self.run)
+        if given.system.digest != self.run.digest:
+            raise UsageError(
+                f"{given.system.path} is not the model that the run is of, or was edited since",
+                "run it again, or give the model as it was",
+            )
+        return with_parameters(given._values(FLOAT64), self.parameters)  # pyright: ignore[reportPrivateUsage]
+
+    def number(self, relaxation: Any) -> float:
+        number = float(self.values.number(relaxation, "relaxation") if isinstance(relaxation, str) else relaxation)
+        if not number > 0:
+            raise UsageError(f"relaxation must be positive, not {number:.10g}")
+        return number
+
+    def space(self, depth: float | None) -> PointMetric:
+        from hsdsl.metrics.pointwise import SpaceMetric
+        from hsdsl.metrics.space import make_space
+
+        return SpaceMetric(make_space(self.values.system, [float(v) for v in self.values.parameters]), depth)
 
 
-def _load(path: str | os.PathLike[str], run: Execution) -> Model:
+def _load(path: str | os.PathLike[str] | None, run: Execution) -> Model:
     from hsdsl.model import load
 
-    if not os.path.exists(path):
+    if path is None and not os.path.exists(run.model):
         raise UsageError(f"the run is of {run.model}, which is not there: the distance needs the model")
-    return load(path)
+    return load(run.model if path is None else path)
+
+
+def plot_distance(
+    run: Execution,
+    other: Execution,
+    path: str | os.PathLike[str],
+    *,
+    relaxation: Any = None,
+    model: Model | str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw the distance of two runs over time, beside the difference of their states; see :func:`distance`.
+
+    Raises
+    ------
+    UsageError
+        As :func:`distance`, or a file that cannot be drawn.
+    """
+    from hsdsl.metrics.profile import profiles
+    from hsdsl.plot.over_time import plot_over_time
+
+    check_same_model(run, other)
+    source = _Source(run, model, parameters or {})
+    depth = None if relaxation is None else source.number(relaxation)
+    found = profiles(run, other, source.space(depth), depth)
+    words = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}
+    bounds = {words[name]: (profile.lower, profile.upper) for name, profile in found.items()}
+    plot_over_time(path, found["rho"].times, bounds, f"Distance over time: {run.title or run.model}")

@@ -1,0 +1,77 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""A picture of a distance over time: its lower and upper bound, on a logarithmic scale."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.errors import UsageError
+from hsdsl.store.atomic import replacing
+
+Array = npt.NDArray[Any]
+FORMATS = (".png", ".svg")
+DECADES = 12  # below the largest value: smaller ones are drawn there
+
+
+def plot_over_time(
+    path: str | os.PathLike[str], times: Array, bounds: dict[str, tuple[Array, Array]], title: str
+) -> None:
+    """Draw bands of lower and upper bounds against time.
+
+    Parameters
+    ----------
+    path : path
+        ``.png`` or ``.svg``.
+    times : array, shape (n,)
+        Not decreasing; two equal ones at a jump.
+    bounds : mapping of str to (lower, upper)
+        Each of shape (n,), by the name to stand in the legend.
+    title : str
+        What stands above.
+
+    Raises
+    ------
+    UsageError
+        For an unknown suffix, or a file that cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
+    import matplotlib.style
+    from matplotlib.figure import Figure
+
+    from hsdsl.plot import STYLE
+
+    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
+        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        axis = figure.add_subplot()
+        finite = [v[np.isfinite(v)] for pair in bounds.values() for v in pair]
+        top = max((float(v.max()) for v in finite if len(v)), default=1.0) or 1.0
+        floor = top * 10.0**-DECADES
+        for name, (lower, upper) in bounds.items():
+            (line,) = axis.plot(times, np.maximum(upper, floor), linewidth=1.2, label=name)
+            axis.fill_between(
+                times,
+                np.maximum(lower, floor),
+                np.maximum(upper, floor),
+                color=line.get_color(),
+                alpha=0.3,
+                linewidth=0,
+            )
+        axis.set_yscale("log")
+        axis.set_xlabel("time t")
+        axis.set_ylabel("distance")
+        axis.set_title(title, loc="left", parse_math=False)
+        axis.legend(frameon=False)
+        figure.savefig(
+            file,
+            format=target.suffix[1:].lower(),
+            dpi=150,
+            metadata={"Date": None} if target.suffix == ".svg" else None,
+        )
