@@ -8,12 +8,16 @@ from typing import Annotated, Any
 import typer
 
 from hsdsl.cli.console import errors_reported
+from hsdsl.cli.distance_runs import of_runs
 from hsdsl.errors import UsageError
 
 
 def distance(
-    first: Annotated[Path, typer.Argument(help="The model file, or a saved run (.npz).", metavar="A")],
-    second: Annotated[Path | None, typer.Argument(help="A second saved run.", metavar="[B]")] = None,
+    first: Annotated[
+        Path,
+        typer.Argument(help="The model file, or a run: a saved one (.npz), or a model's own experiment.", metavar="A"),
+    ],
+    second: Annotated[Path | None, typer.Argument(help="A second run.", metavar="[B]")] = None,
     from_: Annotated[
         str | None,
         typer.Option(
@@ -35,6 +39,12 @@ def distance(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Override a parameter. May be repeated."),
     ] = None,
+    coordinates: Annotated[
+        str | None, typer.Option(metavar="A,B", help="For rho-hat: the states that count as the position.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the distance of two runs over time: .png, .svg or .html.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the sentence.")] = False,
 ) -> None:
     """Measure how far apart two states, or two runs, are in the hybrid metric."""
@@ -43,7 +53,10 @@ def distance(
         if second is not None:
             if from_ is not None or to is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
-            of_runs(first, second, metric, relaxation, parameters, json)
+            names = None if coordinates is None else [name.strip() for name in coordinates.split(",")]
+            of_runs(first, second, metric, relaxation, parameters, json, names, plot)
+        elif coordinates is not None or plot is not None:
+            raise UsageError("--coordinates and --plot are for two runs")
         elif from_ is None or to is None:
             raise UsageError(
                 "two states are wanted, or a second run",
@@ -74,33 +87,6 @@ def of_points(
     ]  # fmt: skip
     bounds = {"lower": found.interval.lower, "upper": found.interval.upper}
     print(dumps({**bounds, "metric": name, "certified": found.certified, "path": pieces}))
-
-
-def of_runs(
-    first: Path, second: Path, metric: str | None, relaxation: str | None, parameters: dict[str, str], json: bool
-) -> None:
-    """Measure between two saved runs."""
-    from hsdsl.model.between_runs import distance_of_runs
-    from hsdsl.report import dumps
-    from hsdsl.store.npz import load
-
-    depth = None if relaxation is None else _number(relaxation)
-    runs = load(first), load(second)
-    found = distance_of_runs(*runs, metric or "rho", relaxation=depth, parameters=parameters)
-    if json:
-        print(dumps(found.as_json()))
-        return
-    attained = "" if found.time is None else f", attained at t = {found.time:.10g}"
-    print(
-        f"{found.metric}: {found.upper:.10g}, in {found.interval}{attained}" + (f"\n{found.note}" if found.note else "")
-    )
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise UsageError(f"--relaxation is a number here, not {text}") from None
 
 
 def _parameters(pairs: list[str]) -> dict[str, str]:

@@ -17,7 +17,7 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
     Parameters
     ----------
     first, second : Execution
-        Two runs of one model; further arguments as :func:`hsdsl.model.between_runs.distance_of_runs` (``metric``,
+        Two runs of one model; further arguments as :func:`hsdsl.model.between_runs.distance` (``metric``,
         ``relaxation``, ``model``, ``parameters``, ``coordinates``).
     first : Model or path; second, third : str or Place
         A model and two of its points, as ``"free x=13 v=5"``; further arguments as :meth:`hsdsl.Model.distance`
@@ -27,7 +27,7 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
     -------
     Interval
         What the distance is at least and at most; :meth:`hsdsl.Model.distance` also says the path, and
-        ``distance_of_runs`` the time.
+        that function the time.
 
     Raises
     ------
@@ -35,10 +35,10 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
         The arguments are neither, or do not fit the model.
     """
     from hsdsl.model import Model, load
-    from hsdsl.model.between_runs import distance_of_runs
+    from hsdsl.model.between_runs import distance as between_runs
 
     if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
-        return distance_of_runs(first, second, **asked).interval
+        return between_runs(first, second, **asked).interval
     model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
     if isinstance(model, Model) and isinstance(second, (str, Place)) and isinstance(third, (str, Place)):
         return model.distance(second, third, **asked).interval
