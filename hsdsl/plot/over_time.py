@@ -16,6 +16,7 @@ from hsdsl.store.atomic import replacing
 
 Array = npt.NDArray[Any]
 FORMATS = (".png", ".svg")
+COLOURS = ("#0b5394", "#c8c8c8", "#b45f06")
 DECADES = 12  # below the largest value: smaller ones are drawn there
 
 
@@ -31,7 +32,7 @@ def plot_over_time(
     times : array, shape (n,)
         Not decreasing; two equal ones at a jump.
     bounds : mapping of str to (lower, upper)
-        Each of shape (n,), by the name to stand in the legend.
+        Each of shape (n,), by the name to stand in the legend; the first is drawn in front.
     title : str
         What stands above.
 
@@ -54,15 +55,17 @@ def plot_over_time(
         finite = [v[np.isfinite(v)] for pair in bounds.values() for v in pair]
         top = max((float(v.max()) for v in finite if len(v)), default=1.0) or 1.0
         floor = top * 10.0**-DECADES
-        for name, (lower, upper) in bounds.items():
-            (line,) = axis.plot(times, np.maximum(upper, floor), linewidth=1.2, label=name)
+        for k, (name, (lower, upper)) in enumerate(bounds.items()):
+            colour, front = COLOURS[k % len(COLOURS)], 10 - k
+            axis.plot(times, np.maximum(upper, floor), color=colour, linewidth=1.2, label=name, zorder=front)
             axis.fill_between(
                 times,
                 np.maximum(lower, floor),
                 np.maximum(upper, floor),
-                color=line.get_color(),
+                color=colour,
                 alpha=0.3,
                 linewidth=0,
+                zorder=front,
             )
         axis.set_yscale("log")
         axis.set_xlabel("time t")
