@@ -1,7 +1,7 @@
 """Random planar models with constant flows and affine guards and resets, against an event-driven solution in fractions.
 
-Where every flow is constant the relaxed execution is the execution delayed: states at transitions, their order and their
-times less the delays spent in strips are those of the hybrid system itself, whatever the relaxation.
+Where every flow is constant the relaxed execution is the execution delayed: states at transitions, their order and
+their times less the delays spent in strips are those of the hybrid system itself, whatever the relaxation.
 """
 
 from __future__ import annotations
