@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import hsdsl
+from hsdsl.exact.stop import exact_example_1, exact_example_2
 from hsdsl.model.estimate import corrected_times
 
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "tests"))  # the exact solutions live with the tests
+sys.path.insert(0, str(ROOT / "tests"))  # the independent integrations live with the tests
 
-from exact.oscillator import exact_example_1, exact_example_2  # noqa: E402
 from exact.pendulum import exact_pendulum  # noqa: E402
 
 RUNNER = {

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact.oscillator import Solution, exact_example_1, exact_example_2
 
 import hsdsl
+from hsdsl.exact.stop import Motion, exact_example_1, exact_example_2
 
 MODELS = Path(__file__).parents[2] / "models"
 
 
 def error(example: int, step: float) -> float:
     """Largest error in position at the steps."""
-    solution: Solution = exact_example_1() if example == 1 else exact_example_2()
+    solution: Motion = exact_example_1() if example == 1 else exact_example_2()
     run: Any = hsdsl.load(MODELS / f"oscillator-with-stop-{example}.yaml").simulate(scheme="paoli-schatzman", step=step)
     return float(np.max(np.abs(run.values[:-1, 0] - solution.at(run.times[:-1])[0])))
 

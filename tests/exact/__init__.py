@@ -1,1 +1,1 @@
-"""Exact answers for tests: closed forms and high-precision numbers that owe nothing to the package under test."""
+"""Exact answers for tests: closed forms and high-precision numbers that owe nothing to the simulator under test."""

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import mpmath as mp
 import numpy as np
 
-DIGITS = 80  # flights down to REST cancel half of them
-REST = mp.mpf(10) ** -25  # impacts slower than this are summed
+from hsdsl.exact.numbers import Number, Vector, mp
+from hsdsl.execution import Array
+
+REST = mp.mpf(10) ** -25  # impacts slower than this are summed; flights down to it cancel half of the digits
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Oscillator:
     x_max: str
     amplitude: str
 
-    def number(self, name: str) -> mp.mpf:
+    def number(self, name: str) -> Number:
         """A parameter in high precision."""
         return mp.mpf(getattr(self, name))
 
@@ -38,16 +39,16 @@ class Oscillator:
 class Flight:
     """x = B sin(omega t) + exp(-a s) (C cos(wd s) + S sin(wd s)), s = t - start."""
 
-    start: mp.mpf
-    a: mp.mpf
-    omega: mp.mpf
-    damped: mp.mpf
-    forced: mp.mpf
-    cosine: mp.mpf
-    sine: mp.mpf
+    start: Number
+    a: Number
+    omega: Number
+    damped: Number
+    forced: Number
+    cosine: Number
+    sine: Number
 
     @classmethod
-    def of(cls, oscillator: Oscillator, start: mp.mpf, x: mp.mpf, v: mp.mpf) -> Flight:
+    def of(cls, oscillator: Oscillator, start: Number, x: Number, v: Number) -> Flight:
         """The flight that begins at (x, v): initial values less the particular solution's."""
         a, omega = oscillator.number("a"), oscillator.number("omega")
         forced = oscillator.number("amplitude") / (2 * a * omega)
@@ -68,24 +69,29 @@ class Flight:
         )
         return x, v
 
+    def derivative(self, n: int) -> Vector:
+        """Bounds on the n-th derivatives: every part is a multiple of exp(q t) with |q| = omega, and none grows."""
+        size = (abs(self.forced) + mp.hypot(self.cosine, self.sine)) * self.omega**n
+        return size, size * self.omega
+
 
 @dataclass(frozen=True)
 class Impact:
     """An impact: its time and the velocity before it."""
 
-    time: mp.mpf
-    velocity: mp.mpf
+    time: Number
+    velocity: Number
 
 
-class Solution:
+class Motion:
     """An exact solution: ``impacts``, ``zeno`` (times), ``released`` (times), and ``at(t)`` for floats or arrays."""
 
-    def __init__(self, oscillator: Oscillator, x: mp.mpf, v: mp.mpf, until: mp.mpf) -> None:
+    def __init__(self, oscillator: Oscillator, x: Number, v: Number, until: Number) -> None:
         self.oscillator, self.until = oscillator, until
-        self.pieces: list[tuple[mp.mpf, Flight | None]] = []  # None: stuck
+        self.pieces: list[tuple[Number, Flight | None]] = []  # None: stuck
         self.impacts: list[Impact] = []
-        self.zeno: list[mp.mpf] = []
-        self.released: list[mp.mpf] = []
+        self.zeno: list[Number] = []
+        self.released: list[Number] = []
         t = mp.mpf(0)
         stop, c = oscillator.number("x_max"), oscillator.number("c")
         while t < until:
@@ -108,18 +114,18 @@ class Solution:
                 t, v = t + 2 * abs(v) / self._pressed(t) / (1 - c), mp.mpf(0)
                 self.zeno.append(t)
 
-    def _pressed(self, t: mp.mpf) -> mp.mpf:
+    def _pressed(self, t: Number) -> Number:
         o = self.oscillator
         return o.number("amplitude") * mp.cos(o.number("omega") * t) - o.number("omega") ** 2 * o.number("x_max")
 
-    def _release(self, t: mp.mpf) -> mp.mpf:
+    def _release(self, t: Number) -> Number:
         o = self.oscillator
         omega = o.number("omega")
         first = mp.acos(omega**2 * o.number("x_max") / o.number("amplitude")) / omega
         period = 2 * mp.pi / omega
         return first + period * mp.ceil((t - first) / period)
 
-    def _hit(self, flight: Flight) -> mp.mpf | None:
+    def _hit(self, flight: Flight) -> Number | None:
         """First time after the start at which the flight is back at the stop."""
         stop = self.oscillator.number("x_max")
         x, v = flight.at(flight.start)
@@ -132,48 +138,51 @@ class Solution:
         if not len(above):
             return None
         low, high = (mp.mpf(float(times[above[0]])) - mp.mpf("1e-3") * k for k in (1, 0))
-        root = mp.findroot(
-            lambda t: flight.at(t)[0] - stop, (max(low, flight.start), high), solver="anderson", tol=1e-100
-        )
+
+        def beyond(t: Number) -> Number:
+            return flight.at(t)[0] - stop
+
+        root = mp.findroot(beyond, (max(low, flight.start), high), solver="anderson", tol=1e-100)
         return root if root <= self.until else None
 
-    def _short(self, flight: Flight, v: mp.mpf, stop: mp.mpf) -> mp.mpf | None:
+    def _short(self, flight: Flight, v: Number, stop: Number) -> Number | None:
         """A flight of less than a tenth: Newton's method on (x - x_max)/s from 2 |v|/p; None where it is longer."""
         pressed = self._pressed(flight.start)
         if v >= 0 or pressed <= 0 or -v / pressed > 0.02:
             return None
-        scaled = lambda s: (flight.at(flight.start + s)[0] - stop) / s  # noqa: E731
+
+        def scaled(s: Number) -> Number:
+            return (flight.at(flight.start + s)[0] - stop) / s
+
         guess = -2 * v / pressed
         return flight.start + mp.findroot(scaled, (guess, guess * mp.mpf("1.01")), tol=1e-90)
 
     def at(self, times: Any) -> tuple[Any, Any]:
         """Position and velocity at float times, in double precision; at an impact the values after it."""
-        times = np.asarray(times, dtype=float)
-        x, v = np.full(times.shape, float(self.oscillator.number("x_max"))), np.zeros(times.shape)
-        starts = [float(start) for start, _ in self.pieces]
-        which = np.searchsorted(starts, times, side="right") - 1
-        for k in np.unique(which):
-            flight = self.pieces[k][1]
-            if flight is not None:
-                here = which == k
-                x[here], v[here] = flight.at(times[here], np)
+        moments: Array = np.asarray(times, dtype=float)
+        x, v = np.full(moments.shape, float(self.oscillator.number("x_max"))), np.zeros(moments.shape)
+        starts: Array = np.array([float(start) for start, _ in self.pieces])
+        which: Array = np.asarray(np.searchsorted(starts, moments, side="right")) - 1
+        for k, (_, flight) in enumerate(self.pieces):
+            here: Array = np.equal(which, k)
+            if flight is not None and here.any():
+                x[here], v[here] = flight.at(moments[here], np)
         return x, v
 
-    def exactly(self, t: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
+    def exactly(self, t: Any) -> tuple[Number, Number]:
         """Position and velocity at one time, in high precision."""
+        t = mp.mpf(t)
         _, flight = [piece for piece in self.pieces if piece[0] <= t][-1]
         return flight.at(t) if flight else (self.oscillator.number("x_max"), mp.mpf(0))
 
 
 @lru_cache
-def exact_example_1() -> Solution:
+def exact_example_1() -> Motion:
     """Table I, example 1, from (11.36, 31.4) until 40 pi."""
-    with mp.workdps(DIGITS):
-        return Solution(Oscillator("0.05", "0.9", "2.5", "14", "20"), mp.mpf("11.36"), mp.mpf("31.4"), 40 * mp.pi)
+    return Motion(Oscillator("0.05", "0.9", "2.5", "14", "20"), mp.mpf("11.36"), mp.mpf("31.4"), 40 * mp.pi)
 
 
 @lru_cache
-def exact_example_2() -> Solution:
+def exact_example_2() -> Motion:
     """Table I, example 2, from rest on the stop until 4 pi; two Zeno points."""
-    with mp.workdps(DIGITS):
-        return Solution(Oscillator("0.95", "0.5", "1", "-0.8", "1"), mp.mpf("-0.8"), mp.mpf(0), 4 * mp.pi)
+    return Motion(Oscillator("0.95", "0.5", "1", "-0.8", "1"), mp.mpf("-0.8"), mp.mpf(0), 4 * mp.pi)
