@@ -43,7 +43,7 @@ def distance(
         str | None, typer.Option(metavar="A,B", help="For rho-hat: the states that count as the position.")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the distance of two runs over time: .png, .svg or .html.")
+        Path | None, typer.Option(metavar="FILE", help="Draw the distance of two runs over time: .png or .svg.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the sentence.")] = False,
 ) -> None:

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from hsdsl.cli.console import say
+from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+
+PICTURES = (".png", ".svg")
 
 
 def of_runs(
@@ -24,6 +27,8 @@ def of_runs(
     from hsdsl.model.between_runs import distance
     from hsdsl.report import dumps
 
+    if plot is not None and plot.suffix.lower() not in PICTURES:
+        raise UsageError(f"--plot {plot}: the name should end in .png or .svg")
     run, other = _run(first, parameters), _run(second, parameters)
     model = _model_beside(first, run)
     options: dict[str, Any] = {"relaxation": relaxation, "model": model, "parameters": parameters}
@@ -37,8 +42,6 @@ def of_runs(
         print(dumps(found.as_json()))
         return
     print(found.sentence)
-    if found.note:
-        say(f"note: {found.note}")
 
 
 def _run(path: Path, parameters: dict[str, Any]) -> Execution:

@@ -63,10 +63,15 @@ class CurveDistance:
         return self.interval.upper
 
     @property
+    def middle(self) -> float:
+        """Middle of the interval."""
+        return self.interval.middle
+
+    @property
     def sentence(self) -> str:
         """What is known, for a person."""
-        where = "" if self.time is None or self.upper == 0 else f", the lower bound at t = {self.time:.10g}"
-        return f"{self.metric} distance in {self.interval}{where}"
+        where = "" if self.time is None or self.upper == 0 else f", the lower end attained at t = {self.time:.10g}"
+        return f"{self.metric}: {self.upper:.10g}, in {self.interval}{where}" + (f"\n{self.note}" if self.note else "")
 
     def as_json(self) -> dict[str, Any]:
         """Return what ``hsdsl distance --json`` prints."""

@@ -1,0 +1,77 @@
+"""``hsdsl distance`` of runs: saved ones, and models standing for their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import hsdsl
+from hsdsl.store import load
+
+MODELS = Path(__file__).parents[2] / "models"
+THERMOSTAT, QUADRANTS = MODELS / "thermostat.yaml", MODELS / "digital-control.yaml"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two saved runs of the thermostat, a coarse and a fine one, and one of another model."""
+    place = tmp_path_factory.mktemp("runs")
+    model = hsdsl.load(THERMOSTAT)
+    model.simulate(method="euler", step=0.1, relaxation=1e-6).save(place / "coarse.npz")
+    model.simulate(relaxation=1e-6).save(place / "fine.npz")
+    hsdsl.load(QUADRANTS).simulate().save(place / "other.npz")
+    return place
+
+
+@pytest.fixture
+def ask(command, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    return lambda *words: command("distance", *words)
+
+
+def test_one_object_on_standard_output(ask, folder):
+    asked = ask("coarse.npz", "fine.npz", "--json")
+    found = asked.json
+    assert asked.code == 0
+    assert list(found) == ["metric", "lower", "upper", "time", "span", "note"]
+    assert found["metric"] == "rho"
+    assert 0 < found["lower"] <= found["upper"] <= 1.05 * found["lower"]
+    assert found["span"] == [0.0, 24.0]
+    in_python = hsdsl.distance(load(folder / "coarse.npz"), load(folder / "fine.npz"))
+    assert (in_python.lower, in_python.upper) == (found["lower"], found["upper"])
+
+
+def test_a_sentence_for_people(ask):
+    asked = ask("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "T")
+    assert asked.code == 0
+    assert asked.out.startswith("rho-hat: 0.")
+    assert "attained at t = " in asked.out
+
+
+def test_a_model_stands_for_its_own_run(ask):
+    asked = ask(THERMOSTAT, "fine.npz", "--json")
+    assert asked.json["upper"] <= 1e-6
+
+
+def test_a_picture(ask, folder):
+    asked = ask("coarse.npz", "fine.npz", "--plot", "apart.svg")
+    assert asked.code == 0
+    assert (folder / "apart.svg").read_text().startswith("<?xml")
+
+
+WRONG = {
+    "runs are of different models": ("fine.npz", "other.npz"),
+    "no distance 'skorohod' between runs": ("coarse.npz", "fine.npz", "--metric", "skorohod"),
+    "no state 'S'": ("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "S"),
+    "relaxation must be positive": ("coarse.npz", "fine.npz", "--relaxation", "0"),
+    "cannot read gone.npz": ("gone.npz", "fine.npz"),
+    "should end in .png or .svg": ("coarse.npz", "fine.npz", "--plot", "apart.pdf"),
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_wrong_use_is_refused_with_a_sentence(sentence, ask):
+    asked = ask(*WRONG[sentence])
+    assert asked.code == 2
+    assert sentence in asked.err
