@@ -98,6 +98,39 @@ def test_of_several_transitions_at_one_instant_only_the_last_value_counts():
     assert (found.lower, found.upper) == (0.0, 0.0)
 
 
+class Counting(Bent):
+    """Counts how many point distances it is asked for."""
+
+    asked = 0
+
+    def between(self, p, q):
+        self.asked += len(p.t)
+        return super().between(p, q)
+
+
+def test_few_point_distances_decide_many_samples():
+    """Where no domain is known to be convex, stretches of samples are bounded together."""
+    cuts = np.linspace(0, 2, 20_001)[1:-1]
+    a, b = ramp((0, 0), (2, 2), cuts=cuts), ramp((0, 5), (2, 2.5), cuts=cuts[::3])
+    space = Counting()
+    found = rho(a, b, space)
+    assert found.lower == 5.0
+    assert found.upper <= 5.0 * 1.011
+    assert space.asked < 200
+
+
+class Clock(Bent):
+    """The plane with time as a coordinate."""
+
+    timed = True
+
+
+def test_time_as_a_coordinate_counts_as_way():
+    found = rho(ramp((0, 0), (2, 2)), ramp((0, 0.5), (2, 2.5)), Clock())
+    assert found.lower == pytest.approx(0.5, abs=1e-15)
+    assert 0.5 <= found.upper <= 0.5 * 1.011
+
+
 def test_a_parabola_against_its_chord_is_bounded_between_samples():
     """On one piece x = t^2 against x = t: the difference is 1/4 at 1/2, and 0 at both samples."""
     draft = hand_made.Draft(degree=3)
