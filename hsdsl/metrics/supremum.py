@@ -100,7 +100,9 @@ def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, mos
     bounds = _bounds(cells, distance)
     known = np.isfinite(bounds)
     frontier = _Frontier(cells, bounds, np.full((len(cells), 2), np.nan))
-    search.best_first(frontier.take(np.flatnonzero(known)))
+    likely, others = _largest_first(bounds, np.flatnonzero(known))
+    search.best_first(frontier.take(likely))
+    search.best_first(frontier.take(others[search.undecided(bounds[others])]))
     search.best_first(search.coarse_to_fine(frontier, np.flatnonzero(~known)))
     found.upper = max(found.upper, found.points, found.lower)
     return found
@@ -125,7 +127,7 @@ class _Search:
         """Evaluate and cut the cells with the largest bounds until all are decided."""
         size = FIRST_BATCH
         while True:
-            frontier = frontier.take(self._undecided(frontier.bound))
+            frontier = frontier.take(self.undecided(frontier.bound))
             if not len(frontier.cells) or self._spent(frontier.bound):
                 return
             order = _largest(frontier.bound, size)
@@ -150,7 +152,7 @@ class _Search:
         single: list[Array] = []
         size = FIRST_BATCH
         while True:
-            open_ = self._undecided(bound)
+            open_ = self.undecided(bound)
             first, last, bound = first[open_], last[open_], bound[open_]
             if not len(first) or self._spent(bound):
                 break
@@ -161,7 +163,7 @@ class _Search:
             self._evaluate(cells, ends, last[now], 1)
             f, g = first[now], last[now]
             reached = np.minimum(bound[now], (ends[f, 0] + ends[g, 1] + way[g + 1] - way[f]) / 2)
-            left = self._undecided(reached)
+            left = self.undecided(reached)
             f, g, reached = f[left], g[left], reached[left]
             single.append(f[f == g])
             f, g, reached = f[f < g], g[f < g], reached[f < g]
@@ -172,7 +174,7 @@ class _Search:
         rest = np.concatenate(single) if single else np.zeros(0, dtype=int)
         return _Frontier(cells[rest], np.full(len(rest), np.inf), ends[rest])
 
-    def _undecided(self, bound: Array) -> Array:
+    def undecided(self, bound: Array) -> Array:
         """Return which bounds may still matter, keeping the largest of the others."""
         decided = bound <= self.found.accepted(self.gap, self.floor)
         if decided.any():
@@ -193,7 +195,7 @@ class _Search:
             self._evaluate(batch.cells, batch.ends, every, end)
         reached = (batch.ends[:, 0] + batch.ends[:, 1] + _ways(batch.cells, self.distance)) / 2
         batch.bound = np.minimum(batch.bound, reached)
-        batch = batch.take(self._undecided(batch.bound))
+        batch = batch.take(self.undecided(batch.bound))
         stuck = ~batch.cells.divisible
         if stuck.any():
             self.found.upper = max(self.found.upper, float(np.max(batch.bound[stuck])))
@@ -221,6 +223,12 @@ class _Search:
         if lower[best] > found.lower:
             found.lower, found.time = float(lower[best]), float(times[best])
         found.points = max(found.points, float(np.max(upper)))
+
+
+def _largest_first(bound: Array, chosen: Array) -> tuple[Array, Array]:
+    """Part the cells with the largest bounds, which settle most of the others, from the rest."""
+    order = chosen[_largest(bound[chosen], LARGEST_BATCH)]
+    return order[:LARGEST_BATCH], order[LARGEST_BATCH:]
 
 
 def _largest(bound: Array, size: int) -> Array:
