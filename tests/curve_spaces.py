@@ -9,6 +9,7 @@ class Plane:
     """All modes are parts of one plane: the digital control system, or any model whose guards glue without moving."""
 
     timed = False
+    budget = 50_000
 
     def convex(self, mode):
         return True

@@ -118,6 +118,11 @@ class PointMetric(Protocol):
         """Whether time is a coordinate of the domains (a surface or a reset depends on it)."""
         ...
 
+    @property
+    def budget(self) -> int:
+        """How many distances may be asked for before a search has to end with what it knows."""
+        ...
+
     def convex(self, mode: str) -> bool:
         """Whether a mode's domain is known to be convex."""
         ...
@@ -203,7 +208,8 @@ def rho(
     cells = merged(a, b)
     if relaxation is not None:
         _check_depth(cells, relaxation)
-    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, ROUNDOFF * largest_state(cells))
+    floor = ROUNDOFF * largest_state(cells)
+    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, floor, metric.budget)
     return curve_distance(found, cells, a, b, "quotient" if relaxation is None else "relaxed", gap)
 
 

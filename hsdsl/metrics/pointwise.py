@@ -12,6 +12,8 @@ from hsdsl.metrics.curves import Points
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.points import Place, distance, distances
 
+QUICK, SLOW = 50_000, 2_000
+
 
 @dataclass(frozen=True)
 class SpaceMetric:
@@ -24,6 +26,11 @@ class SpaceMetric:
     def timed(self) -> bool:
         """Whether time is a coordinate of the domains."""
         return self.space.timed
+
+    @property
+    def budget(self) -> int:
+        """Distances are quick where everything is affine, and solved one by one elsewhere."""
+        return QUICK if self.space.affine else SLOW
 
     def convex(self, mode: str) -> bool:
         """Whether a mode's domain is known to be convex."""

@@ -21,6 +21,8 @@ from hsdsl.metrics.merge import Side
 from hsdsl.metrics.supremum import supremum
 from hsdsl.metrics.trace import Array
 
+EVALUATIONS = 50_000
+
 
 @dataclass(frozen=True)
 class Labelled:
@@ -56,5 +58,5 @@ def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
         The runs have no time in common, or one is not finite there.
     """
     cells = merged(a, b)
-    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells))
+    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells), EVALUATIONS)
     return curve_distance(found, cells, a, b, "sup", gap)

@@ -14,7 +14,6 @@ Array = npt.NDArray[Any]
 
 CHUNK = 65_536  # cells whose polynomials are held at once
 FIRST_BATCH, LARGEST_BATCH = 32, 4096
-EVALUATIONS = 50_000
 
 
 class CellDistance(Protocol):
@@ -77,7 +76,7 @@ class _Frontier:
         return _Frontier(cells, np.concatenate([self.bound, other.bound]), np.concatenate([self.ends, other.ends]))
 
 
-def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int = EVALUATIONS) -> Supremum:
+def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int) -> Supremum:
     """Find the supremum over all cells.
 
     Parameters
