@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import hand_made
 import numpy as np
@@ -15,6 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.metrics.bernstein import bernstein, largest_norm, length, restrict
 from hsdsl.metrics.closeness import tau_epsilon
 from hsdsl.metrics.curves import rho
+from hsdsl.metrics.profile import profiles
 from hsdsl.metrics.rivals import sup_norm
 from hsdsl.metrics.sampled import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
@@ -364,3 +366,21 @@ def test_bernstein_bounds_hold_and_are_attained_by_lines(degree):
     if degree == 1:
         assert np.allclose(largest_norm(part), norms)
         assert np.allclose(length(part), ways)
+
+
+@pytest.mark.parametrize("metric", CURVE_METRICS)
+def test_every_metric_is_documented_and_answers_to_its_name(metric):
+    theory = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
+    assert f"`{metric}`" in theory
+    a, b = ramp((0, 0), (2, 2)), ramp((0, 0), (2, 1))
+    found = between(metric, Request(a, b, lambda depth: Plane()))
+    assert found.metric == metric
+    assert found.lower <= 1.0 <= found.upper + 1e-12
+
+
+def test_the_profile_holds_both_sides_of_a_transition():
+    found = profiles(two_modes(1.0), two_modes(1.5), Plane())
+    assert found["rho"].upper.max() == 0.0
+    labels = found["sup"]
+    assert labels.times.tolist() == [0.0, 1.0, 1.0, 1.5, 1.5, 2.0, 2.0, 2.0]
+    assert labels.lower.tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
