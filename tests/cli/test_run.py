@@ -100,6 +100,7 @@ USAGE = {
     "method": (["--method", "tsit6"], "no method"),
     "fixed method": (["--method", "rk4"], "cannot keep a tolerance"),
     "scheme": (["--scheme", "located"], "not built yet"),
+    "no method": (["--scheme", "paoli-schatzman", "--step", "1e-3", "--method", "rk4"], "no method"),
     "engine": (["--engine", "c"], "no compiled engine"),
     "precision": (["--precision", "3"], "precision"),
     "zero step": (["--step", "0"], "step"),
