@@ -4,7 +4,8 @@
 
 The smooth ones are SymPy's own. The kinked and jumping ones (abs, sign, min, max, floor) are classes of our own:
 SymPy's rewrite themselves, and differentiate into objects no kernel has (DiracDelta, re, im). Ours stay as written,
-fold exact numbers, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side.
+fold fractions, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side. Other
+constants are left to the kernel: to tell which of two sums of roots is larger can take SymPy for ever.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class absolute(_Real):
     @classmethod
     def eval(cls, x):
         """Fold a number."""
-        return sp.Abs(x) if x.is_number and x.is_real else None
+        return sp.Abs(x) if x.is_Rational else None
 
     def fdiff(self, argindex=1):
         """Almost everywhere."""
@@ -41,7 +42,7 @@ class sign(_Real):
     @classmethod
     def eval(cls, x):
         """Fold a number."""
-        return sp.sign(x) if x.is_number and x.is_real else None
+        return sp.sign(x) if x.is_Rational else None
 
     def fdiff(self, argindex=1):
         """Almost everywhere."""
@@ -56,7 +57,7 @@ class floor(_Real):
     @classmethod
     def eval(cls, x):
         """Fold a number."""
-        return sp.floor(x) if x.is_number and x.is_real else None
+        return sp.floor(x) if x.is_Rational else None
 
     def fdiff(self, argindex=1):
         """Almost everywhere."""
@@ -71,7 +72,7 @@ class minimum(_Real):
     @classmethod
     def eval(cls, x, y):
         """Fold numbers."""
-        return sp.Min(x, y) if all(a.is_number and a.is_real for a in (x, y)) else None
+        return sp.Min(x, y) if x.is_Rational and y.is_Rational else None
 
     def fdiff(self, argindex=1):
         """Almost everywhere; half of each side where they are equal."""
@@ -87,7 +88,7 @@ class maximum(_Real):
     @classmethod
     def eval(cls, x, y):
         """Fold numbers."""
-        return sp.Max(x, y) if all(a.is_number and a.is_real for a in (x, y)) else None
+        return sp.Max(x, y) if x.is_Rational and y.is_Rational else None
 
     def fdiff(self, argindex=1):
         """Almost everywhere; half of each side where they are equal."""

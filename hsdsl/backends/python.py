@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.kernel import Routine, Vector
 from hsdsl.program import Program, Routines
 
@@ -26,10 +26,10 @@ class PythonMode:
     flow: Routine
     surfaces: Routine
     magnitudes: Routine
-    gradients: Callable[..., tuple[Vector, ...]]
-    rates: Routine
-    conditions: Callable[..., tuple[bool, ...]]
     outputs: Routine
+    gradients: tuple[Routine, ...]
+    rates: tuple[Routine, ...]
+    conditions: tuple[Callable[..., tuple[bool, ...]], ...]
     resets: tuple[Routine, ...]
     spreads: tuple[Routine, ...]
 
@@ -54,11 +54,18 @@ class PythonKernel:
         if mode not in self._modes:
             self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
-        edges = range(len(self._program.modes[mode].edges))
+        program = self._program.modes[mode]
+        edges, surfaces = len(program.edges), len(program.edges) + len(program.walls)
         return PythonMode(
             **{name: bound[name] for name in PLAIN},
-            resets=tuple(bound[f"reset_{k}"] for k in edges),
-            spreads=tuple(bound[f"spread_{k}"] for k in edges),
+            gradients=tuple(bound[f"gradient_{k}"] for k in range(surfaces)),
+            rates=tuple(bound[f"rate_{k}"] for k in range(surfaces)),
+            conditions=tuple(
+                conjunction([bound[name] for name in routines.names if name.startswith(f"condition_{k}_")])
+                for k in range(edges)
+            ),
+            resets=tuple(bound[f"reset_{k}"] for k in range(edges)),
+            spreads=tuple(bound[f"spread_{k}"] for k in range(edges)),
         )
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
@@ -68,7 +75,27 @@ class PythonKernel:
         return tuple(zip(program.expressions, functions, strict=True))
 
 
-PLAIN = ("flow", "surfaces", "magnitudes", "gradients", "rates", "conditions", "outputs")
+PLAIN = ("flow", "surfaces", "magnitudes", "outputs")
+
+
+def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..., tuple[bool, ...]]:
+    """Make `and` of parts: one that is false decides, whatever another has no value for."""
+    if len(parts) == 1:
+        return parts[0]
+
+    def holds(*arguments: Number) -> tuple[bool, ...]:
+        without_value: Exception | None = None
+        for part in parts:
+            try:
+                if not part(*arguments)[0]:
+                    return (False,)
+            except DOMAIN_ERRORS as error:
+                without_value = error
+        if without_value is not None:
+            raise without_value
+        return (True,)
+
+    return holds
 
 
 def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> Callable[..., tuple[Routine, ...]]:
@@ -76,7 +103,7 @@ def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> C
 
     Floats are written into the text as literals (the interpreter is fastest on those); other numbers are names.
     """
-    namespace: dict[str, Any] = {"__builtins__": {}, **arithmetic.functions}
+    namespace: dict[str, Any] = {"__builtins__": {}, "inf": float("inf"), **arithmetic.functions}
     literal = arithmetic.name == "float64"
 
     def replace(match: re.Match[str]) -> str:

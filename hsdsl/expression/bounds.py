@@ -12,8 +12,10 @@ import sympy as sp
 
 LARGEST_EXPONENT = 1000
 MOST_BITS = 6_000  # of one exact number: the product of two must still print as a decimal (4,300 digits)
+MOST_BITS_WITHIN = 1_000_000  # of the numbers SymPy meets when it brings sums to a common denominator
 MOST_NODES = 100_000
-MOST_LEVELS = 150  # Python compiles no more than 200 nested parentheses
+MOST_LEVELS = 100  # SymPy's time grows with the cube of it
+LARGEST_NUMBER = 2**1024  # no float is as large
 
 
 def bits(expr: Any) -> int:
@@ -30,6 +32,12 @@ def bits(expr: Any) -> int:
 def _constant_part(exponent: Any) -> int:
     constant = exponent if exponent.is_Rational else exponent.as_coeff_Add()[0]
     return int(abs(constant)) + 1 if constant.is_Rational else 1
+
+
+def beyond_floats(expr: Any) -> bool:
+    """Whether a term of an expression has a coefficient that no float holds."""
+    coefficients: list[Any] = [term.as_coeff_Mul()[0] for term in sp.Add.make_args(expr)]
+    return any(c.is_Rational and abs(c.p) >= LARGEST_NUMBER * c.q for c in coefficients)
 
 
 def sum_bits(terms: list[Any]) -> int:

@@ -53,6 +53,8 @@ class Value:
         The states it was written with.
     size, depth : int
         Its nodes, and how deep its parentheses are nested, written out in full.
+    bits : int
+        How long exact numbers get when its products and powers are multiplied out.
     """
 
     expr: Any
@@ -61,6 +63,7 @@ class Value:
     uses: frozenset[str] = frozenset()
     size: int = 1
     depth: int = 0
+    bits: int = 0
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class _Builder:
         match tree:
             case Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
-                return Value(expr, numeric.of_rational(expr), True)
+                return Value(expr, numeric.of_rational(expr), True, bits=bounds.bits(expr))
             case Name():
                 return self.name(tree)
             case Negative():
@@ -167,7 +167,7 @@ class _Builder:
         """A value made of parts, checked."""
         constant = all(part.constant for part in parts)
         expr = _with_our_kinks(expr)
-        if _not_real(expr):
+        if _not_real(expr) or bounds.beyond_floats(expr):
             raise self.not_finite(tree)
         if bounds.bits(expr) > bounds.MOST_BITS:
             raise self.too_long(tree)
@@ -180,10 +180,14 @@ class _Builder:
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+        within = _bits_within(tree, parts)
+        if within > bounds.MOST_BITS_WITHIN:
+            message = "the exact numbers in the expression grow too long once its powers are multiplied out"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
         if depth > bounds.MOST_LEVELS:
             message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
             raise ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
-        return Value(expr, number, constant, uses, size, depth)
+        return Value(expr, number, constant, uses, size, depth, within)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
@@ -230,6 +234,15 @@ def _levels(tree: Tree, expr: Any, parts: list[Value]) -> int:
     if isinstance(tree, Product) and not expr.is_Add:
         return max(part.depth + part.expr.is_Add for part in parts)
     return max(part.depth for part in parts)
+
+
+def _bits_within(tree: Tree, parts: list[Value]) -> int:
+    if isinstance(tree, Call) and tree.function != "sqrt":
+        return 0
+    if isinstance(tree, Power):
+        exponent = parts[1].expr
+        return parts[0].bits * max(1, abs(int(exponent))) if exponent.is_Rational else 0
+    return sum(part.bits for part in parts)
 
 
 def _not_real(expr: Any) -> bool:

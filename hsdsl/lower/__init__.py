@@ -15,6 +15,7 @@ from hsdsl import program as lowered
 from hsdsl.expression.stack import deep_stack
 from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
 
 _NAN = sp.Symbol("nan", real=True)
@@ -150,14 +151,17 @@ def _expressions(mode: Mode):
         yield f"the flow of {state}, {text}", expression
     for edge in mode.edges:
         yield f"the guard of {edge.name}, {edge.surface.text}", edge.surface.residual
+        if edge.condition is not None:
+            yield f"the condition of {edge.name}", edge.condition
     for wall in mode.walls:
         yield f"the domain's {wall.text}", wall.residual
 
 
 def _diagnosis(mode: Mode, names: Names):
     mapping = names.mapping(mode.states)
+    done: dict[sp.Basic, sp.Basic] = {}
     for k, (_, expression) in enumerate(_expressions(mode)):
-        result = sp.sympify(expression).xreplace(mapping)
+        result = replaced(sp.sympify(expression), mapping, done)
         yield Definition(f"expression_{k}", (TIME, *names.of_states(mode.states)), (result,))
 
 
@@ -165,36 +169,40 @@ def _mode_routines(mode: Mode, names: Names):
     states = names.of_states(mode.states)
     mapping = names.mapping(mode.states)
     arguments = (TIME, *states)
+    done: dict[sp.Basic, sp.Basic] = {}
 
     def place(expressions):
-        return tuple(sp.sympify(e).xreplace(mapping) for e in expressions)
+        return tuple(replaced(sp.sympify(e), mapping, done) for e in expressions)
 
     surfaces = [edge.surface for edge in mode.edges] + list(mode.walls)
     flow = place(mode.flow)
     residuals = place(s.residual for s in surfaces)
     sides = place(absolute(s.left) + absolute(s.right) for s in surfaces)
-    gradients = tuple(tuple(r.diff(a) for a in arguments) for r in residuals)
-    rates = tuple(sp.Add(g[0], *(d * f for d, f in zip(g[1:], flow, strict=True))) for g in gradients)
     outputs = place(_NAN if output is None else output for output in mode.outputs)
 
     yield Definition("flow", arguments, flow)
     yield Definition("surfaces", arguments, residuals)
     yield Definition("magnitudes", arguments, sides)
-    yield Definition("gradients", arguments, gradients)
-    yield Definition("rates", arguments, rates)
     yield Definition("outputs", arguments, outputs)
-    yield Definition(
-        "conditions",
-        arguments,
-        place(sp.true if edge.condition is None else edge.condition for edge in mode.edges),
-    )
+    for k, residual in enumerate(residuals):
+        slope = Gradient((residual,), arguments)
+        row = slope.rows[0]
+        rate = sp.Add(row[0], *(d * f for d, f in zip(row[1:], flow, strict=True)))
+        yield Definition(f"gradient_{k}", arguments, row, slope.statements)
+        yield Definition(f"rate_{k}", arguments, (rate,), slope.statements)
+    for k, edge in enumerate(mode.edges):
+        condition = sp.true if edge.condition is None else edge.condition
+        for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
+            yield Definition(f"condition_{k}_{i}", arguments, place([part]))
     scales = names.of_states(mode.states, "s")
     for k, edge in enumerate(mode.edges):
         reset = place(edge.reset)
         yield Definition(f"reset_{k}", arguments, reset)
-        yield Definition(f"spread_{k}", (*arguments, *scales), tuple(_spread(r, states, scales) for r in reset))
+        changes = Gradient(reset, states)
+        spreads = tuple(_spread(r, row, states, scales) for r, row in zip(reset, changes.rows, strict=True))
+        yield Definition(f"spread_{k}", (*arguments, *scales), spreads, changes.statements)
 
 
-def _spread(value: sp.Expr, states, scales):
-    parts = sp.Add(*(absolute(value.diff(x)) * s for x, s in zip(states, scales, strict=True)))
+def _spread(value: sp.Expr, slopes, states, scales):
+    parts = sp.Add(*(absolute(slope) * s for slope, s in zip(slopes, scales, strict=True)))
     return parts if value in states else maximum(absolute(value), parts)

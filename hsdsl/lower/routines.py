@@ -12,20 +12,32 @@ from dataclasses import dataclass
 import sympy as sp
 
 from hsdsl.lower.printer import KernelPrinter
+from hsdsl.lower.straight import Cut, Statement, in_order
 from hsdsl.program import Routines
 
 
 @dataclass(frozen=True)
 class Definition:
-    """A routine before printing: its name, arguments and (possibly nested) tuple of results."""
+    """A routine before printing: its name, arguments and (possibly nested) tuple of results.
+
+    ``statements`` are the names that the results use besides the arguments, and what they stand for.
+    """
 
     name: str
     arguments: tuple[sp.Symbol, ...]
     results: tuple
+    statements: Sequence[Statement] = ()
 
-
-def _take_out_common(expressions):
-    return sp.cse(expressions, symbols=sp.numbered_symbols("w", real=True), list=False)
+    def written_out(self, results) -> tuple[list[Statement], tuple]:
+        """Cut down statements and results, and take out what is common to them."""
+        cut = Cut("v", powers=True)
+        given = [(symbol, cut.down(expr)) for symbol, expr in self.statements]
+        small = [cut.down(expr) for expr in sp.sympify(results)]
+        known = [*given, *cut.statements]
+        common, reduced = sp.cse([*(e for _, e in known), *small], symbols=sp.numbered_symbols("w", real=True))
+        last = tuple(reduced)[len(known) :]
+        named = zip((symbol for symbol, _ in known), reduced, strict=False)
+        return in_order([*common, *named], sp.Tuple(*last)), last
 
 
 def text_of(definition: Definition) -> str:
@@ -35,7 +47,7 @@ def text_of(definition: Definition) -> str:
         definition.results,
         modules=[{}],
         printer=KernelPrinter(),
-        cse=_take_out_common,
+        cse=definition.written_out,
         docstring_limit=0,
     )
     return inspect.getsource(function).replace("def _lambdifygenerated", f"def {definition.name}", 1)

@@ -1,0 +1,137 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
+"""Expressions cut into statements that are each small, and derivatives of such statements by the chain rule.
+
+SymPy's expressions are graphs, but it walks, differentiates and prints them as trees: what is written in a few lines
+(a product of a thousand factors, a name of `let` that uses the one before it twice, twenty times) can have a
+derivative or a text without end. After the cut every one of these costs as much as the graph has nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate, count
+
+import sympy as sp
+
+from hsdsl.lower.printer import LARGEST_PRODUCT
+
+LARGEST = 80  # nodes of one statement
+WIDEST = 16  # terms or factors of one statement
+Statement = tuple[sp.Symbol, sp.Basic]
+
+
+def replaced(expr: sp.Basic, mapping: dict, done: dict) -> sp.Basic:
+    """Replace symbols, visiting every shared part once; ``done`` is kept between calls with one mapping."""
+    if expr in mapping:
+        return mapping[expr]
+    if not expr.args:
+        return expr
+    if expr not in done:
+        args = tuple(replaced(a, mapping, done) for a in expr.args)
+        done[expr] = expr if args == expr.args else expr.func(*args)
+    return done[expr]
+
+
+class Cut:
+    """Expressions cut down to statements of bounded size, in the order of computation.
+
+    With ``powers`` the base of a power that is printed as a product is a name, which can be repeated at no cost.
+    """
+
+    def __init__(self, letter: str, powers: bool = False) -> None:
+        self._powers = powers
+        self.statements: list[Statement] = []
+        self._letter = letter
+        self._numbers: Iterator[int] = count()
+        self._done: dict[sp.Basic, tuple[sp.Basic, int]] = {}
+
+    def name(self, expr: sp.Basic) -> sp.Basic:
+        """Give an expression a name of its own, unless it is a name or a number."""
+        if expr.is_Atom:
+            return expr
+        real = {"real": True} if isinstance(expr, sp.Expr) else {}
+        symbol = sp.Symbol(f"{self._letter}{next(self._numbers)}", **real)
+        self.statements.append((symbol, expr))
+        return symbol
+
+    def down(self, expr: sp.Basic) -> sp.Basic:
+        """Return the same expression with names for what is too large to be written out."""
+        return self._cut(expr)[0]
+
+    def _cut(self, expr: sp.Basic) -> tuple[sp.Basic, int]:
+        if expr.is_Atom or not expr.args:
+            return expr, 1
+        if expr not in self._done:
+            self._done[expr] = self._node(expr)
+        return self._done[expr]
+
+    def _node(self, expr: sp.Basic) -> tuple[sp.Basic, int]:
+        parts = [self._cut(a) for a in expr.args]
+        if self._powers and expr.is_Pow and expr.exp.is_Integer and abs(expr.exp) <= LARGEST_PRODUCT:
+            parts = [(self.name(part), 1) if abs(expr.exp) > 1 else (part, size) for part, size in parts]
+        if isinstance(expr, sp.Tuple):
+            return sp.Tuple(*(part for part, _ in parts), sympify=False), 1
+        if 1 + sum(size for _, size in parts) > LARGEST:
+            parts = [(self.name(part), 1) if size > LARGEST // 4 else (part, size) for part, size in parts]
+        if isinstance(expr, (sp.Add, sp.Mul, sp.And, sp.Or)):
+            parts = self._narrow(expr.func, parts)
+        args = tuple(part for part, _ in parts)
+        if args == expr.args:
+            return expr, 1 + sum(size for _, size in parts)
+        return expr.func(*args), 1 + sum(size for _, size in parts)
+
+    def _narrow(self, operation: type, parts: list[tuple[sp.Basic, int]]) -> list[tuple[sp.Basic, int]]:
+        """Name the first operands together, as often as what is left is too wide or too large."""
+        while len(parts) > WIDEST or (len(parts) > 2 and sum(size for _, size in parts) > LARGEST):
+            sizes = accumulate(size for _, size in parts[:WIDEST])
+            fit = max(2, sum(size < LARGEST for size in sizes))
+            parts = [(self.name(operation(*(part for part, _ in parts[:fit]))), 1), *parts[fit:]]
+        return parts
+
+
+class Gradient:
+    """First derivatives of expressions, and the statements that they are written with.
+
+    Attributes
+    ----------
+    rows : tuple of tuple of sympy.Expr
+        For each expression its derivative by each argument.
+    statements : list of (symbol, expression)
+        What the rows name, in the order of computation; nothing where the expressions are small.
+    """
+
+    def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> None:
+        self._arguments = arguments
+        self._cut = Cut("g")
+        small = [self._cut.down(e) for e in expressions]
+        self._slopes: dict[sp.Symbol, dict[sp.Symbol, sp.Expr]] = {}
+        for symbol, expr in tuple(self._cut.statements):
+            row = self._row(expr)
+            self._slopes[symbol] = {a: self._cut.name(d) for a, d in zip(arguments, row, strict=True) if d != 0}
+        self.rows = tuple(self._row(e) for e in small)
+        self.statements = self._cut.statements
+
+    def _row(self, expr: sp.Expr) -> tuple[sp.Expr, ...]:
+        direct = {a: expr.diff(a) for a in self._arguments}
+        through = expr.free_symbols & self._slopes.keys()
+        for symbol in sorted(through, key=lambda s: s.name):
+            slope = self._cut.name(expr.diff(symbol))
+            for argument, inner in self._slopes[symbol].items():
+                direct[argument] += slope * inner
+        return tuple(direct[a] for a in self._arguments)
+
+
+def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:
+    """The statements that the results need, each behind those it uses."""
+    known = dict(statements)
+    ordered: dict[sp.Symbol, sp.Basic] = {}
+
+    def visit(expr: sp.Basic) -> None:
+        for symbol in sorted(expr.free_symbols & known.keys(), key=lambda s: s.name):
+            if symbol not in ordered:
+                visit(known[symbol])
+                ordered[symbol] = known[symbol]
+
+    visit(results)
+    return list(ordered.items())

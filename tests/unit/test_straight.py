@@ -1,0 +1,87 @@
+"""Large expressions cut into small statements: the same numbers, the right derivatives, in little time."""
+
+import time
+
+import mpmath
+import pytest
+import sympy as sp
+
+from hsdsl.arithmetic import FLOAT64, multiprecision
+from hsdsl.backends.python import PythonKernel
+from hsdsl.elaborate import elaborate
+from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient
+from hsdsl.model import Model
+
+MANY = multiprecision(60)
+X, Y = sp.symbols("x y", real=True)
+
+
+def doubling(last: str, step: str, levels: int) -> str:
+    """A `let` whose every name uses the one before it more than once, and what stands at its end."""
+    names = ["l0: x/3 + v/5"] + [f"l{i}: {step.replace('L', f'l{i - 1}')}" for i in range(1, levels)]
+    return "{" + ", ".join(f'"{n.split(": ")[0]}": "{n.split(": ")[1]}"' for n in names) + "}\n" + last
+
+
+# guard, let
+LARGE = {
+    "nested roots": ("sqrt(1 + " * 60 + "x + v" + ")" * 60, "{}"),
+    "nested minima": ("min(v + 0.1, " * 60 + "x" + ")" * 60, "{}"),
+    "nested quotients": ("1/(1.1 + " * 60 + "x*v" + ")" * 60, "{}"),
+    "a product": ("*".join(f"(1 + sin(x*{i} + v)/{i}0)" for i in range(1, 100)), "{}"),
+    "a sum of products": ("+".join(f"sin(x/{i})*cos(v*{i})" for i in range(1, 100)), "{}"),
+    "squares of squares": ("l14", doubling("", "L**2/2 + 0.3", 15)),
+    "doubling": ("l9", doubling("", "sin(L)*cos(L) + 0.4", 10)),
+}
+
+
+def bound(guard: str, lets: str, arithmetic):
+    text = f"""
+hsdsl: 1
+let: {lets}
+modes:
+  m:
+    flow: {{x: v, v: "{guard}"}}
+    transitions: [{{when: "{guard} >= 100", to: m, reset: {{x: "{guard}"}}}}]
+initial: {{mode: m, x: 0, v: 0}}
+experiment: {{until: 1}}
+"""
+    return PythonKernel(Model(elaborate("large.yaml", text=text.encode())).program, arithmetic).bind(0, [])
+
+
+@pytest.mark.parametrize("case", LARGE.values(), ids=LARGE.keys())
+def test_large_expressions_are_lowered_soon_and_differentiated_rightly(case):
+    began = time.perf_counter()
+    exact = bound(*case, MANY)
+    assert time.perf_counter() - began < 20  # seconds; trees instead of graphs take hours
+    at = [MANY.zero + mpmath.mpf(p) for p in ("0.0", "0.61", "0.37")]
+    h = mpmath.mpf(10) ** -25
+    for i, slope in enumerate(exact.gradients[0](*at)):
+        up, down = list(at), list(at)
+        up[i], down[i] = at[i] + h, at[i] - h
+        difference = (exact.surfaces(*up)[0] - exact.surfaces(*down)[0]) / (2 * h)
+        assert abs(difference - slope) <= 1e-30 * (1 + abs(slope))
+    value = exact.surfaces(*at)[0] + 100
+    assert abs(exact.flow(*at)[1] - value) < 1e-50 * (1 + abs(value))
+    quick = bound(*case, FLOAT64)
+    assert quick.flow(0.0, 0.61, 0.37)[1] == pytest.approx(float(value), rel=1e-9)
+
+
+def test_small_expressions_stay_whole():
+    gradient = Gradient([sp.sin(X * Y) + X / Y], (X, Y))
+    assert gradient.statements == []
+    assert gradient.rows == (((sp.sin(X * Y) + X / Y).diff(X), (sp.sin(X * Y) + X / Y).diff(Y)),)
+
+
+def test_every_statement_is_small_and_uses_earlier_ones_only():
+    expr = sp.Add(*(sp.sin(X + i) * sp.cos(Y * i) ** i for i in range(2, 200)))
+    cut = Cut("g")
+    result = cut.down(expr)
+    known = {X, Y}
+    for symbol, part in cut.statements:
+        assert part.free_symbols <= known
+        assert len(part.args) <= WIDEST
+        assert sum(1 for _ in sp.preorder_traversal(part)) <= LARGEST
+        known.add(symbol)
+    for symbol, part in reversed(cut.statements):
+        result = result.xreplace({symbol: part})
+    assert sp.expand(result - expr) == 0
