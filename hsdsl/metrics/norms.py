@@ -150,8 +150,8 @@ def _direction(
 def _room(values: Array, steps: Array) -> Array:
     """The part of a step that keeps values positive."""
     falling = steps < 0
-    share = cast(Array, np.where(falling, -values / np.where(falling, steps, 1.0), np.inf))
-    return np.minimum(1.0, REACH * share.min(axis=1, initial=np.inf))
+    share = -values / np.where(falling, steps, -1.0)
+    return np.minimum(1.0, REACH * np.where(falling, share, np.inf).min(axis=1, initial=np.inf))
 
 
 def _room_in_balls(vectors: list[Array], steps: list[Array]) -> Array:
@@ -161,8 +161,8 @@ def _room_in_balls(vectors: list[Array], steps: list[Array]) -> Array:
         a, b = np.einsum("bi,bi->b", dy, dy), np.einsum("bi,bi->b", y, dy)
         c = np.maximum(1 - np.einsum("bi,bi->b", y, y), 0)
         root = np.sqrt(b * b + a * c)
-        share = np.where(b > 0, c / np.maximum(b + root, 1e-300), (root - b) / np.maximum(a, 1e-300))
-        room = np.minimum(room, share)
+        inwards, outwards = (root - b) / np.maximum(a, 1e-300), c / np.maximum(np.abs(b) + root, 1e-300)
+        room = np.minimum(room, cast(Array, np.where(b > 0, outwards, inwards)))
     return np.minimum(1.0, REACH * room)
 
 

@@ -14,7 +14,9 @@ import numpy as np
 from hsdsl.metrics.chain import chain_of
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import INFINITE, ZERO, Interval
+from hsdsl.metrics.local import search_locally
 from hsdsl.metrics.many import Pairs, around_guards, search_many
+from hsdsl.metrics.routes import straight_inside
 from hsdsl.metrics.search import HOPS, End, Found, search
 
 ROUNDING = 16 * 2.0**-53  # relative to the size of the numbers
@@ -96,8 +98,11 @@ def distance(
     if space.components[a.mode] != space.components[b.mode]:
         return PointDistance(INFINITE, (), "certified: no edges connect the modes")
     strip = _along_strip(p, q, a, b, relaxation)
-    most = HOPS if hops is None else hops
-    return _answer(space, search(space, starts, ends, relaxation or 0.0, most, strip), a, b, most)
+    most, toll = HOPS if hops is None else hops, relaxation or 0.0
+    found = search(space, starts, ends, toll, most, strip)
+    if not space.affine:
+        found = _beyond_affine(space, starts, ends, toll, most, strip, found)
+    return _answer(space, found, a, b, most)
 
 
 def distances(
@@ -133,7 +138,11 @@ def distances(
 
 def _one_by_one(pairs: Pairs, relaxation: float | None) -> None:
     names = pairs.space.modes[pairs.source], pairs.space.modes[pairs.target]
+    least = pairs.least()
     for k, (p, q) in enumerate(zip(pairs.p.tolist(), pairs.q.tolist(), strict=True)):
+        if pairs.source == pairs.target and straight_inside(pairs.space, pairs.source, pairs.p[k], pairs.q[k]):
+            pairs.lower[k] = least[k]  # the straight line is a path; what shortens it is not looked for here
+            continue
         found = distance(pairs.space, _place(pairs.space, names[0], p), _place(pairs.space, names[1], q), relaxation)
         pairs.lower[k], pairs.upper[k] = found.interval.lower, found.interval.upper
 
@@ -210,9 +219,35 @@ def _along_strip(p: Place, q: Place, a: End, b: End, relaxation: float | None) -
     return float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
 
 
+def _beyond_affine(
+    space: Space, starts: list[End], ends: list[End], toll: float, hops: int, strip: float, outer: Found
+) -> Found:
+    """Keep what the affine part bounds from below, and find a path.
+
+    The search through polyhedra is a relaxation of every path without a curved guard; paths through one are bounded by
+    what no passage changes.
+    """
+    lower = min(outer.lower, outer.upper, outer.cut)
+    if space.curved_gates:
+        least = min(
+            unchanged(space, a.mode, a.x, b.mode, b.x) + max(0.0, a.cost + b.cost) for a in starts for b in ends
+        )
+        lower = min(lower, least + (0.0 if any(a.bound is not None for a in (*starts, *ends)) else toll))
+    found = search_locally(space, starts, ends, toll, hops, strip, lower)
+    found.lower, found.local = lower, True
+    return found
+
+
+def unchanged(space: Space, mode_p: int, p: Array, mode_q: int, q: Array) -> float:
+    """The distance in the coordinates that no passage changes."""
+    if space.kept is None:
+        return 0.0
+    return float(np.linalg.norm(p[list(space.kept[mode_p])] - q[list(space.kept[mode_q])]))
+
+
 def _answer(space: Space, found: Found, a: End, b: End, hops: int) -> PointDistance:
     upper, lower = found.upper, min(found.lower, found.upper)
-    if upper == np.inf and found.cut == np.inf and not found.ended_early:
+    if upper == np.inf and not found.local and found.cut == np.inf and not found.ended_early:
         return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
     rounding = ROUNDING * float(np.abs(a.x).sum() + np.abs(b.x).sum() + 2 * (0 if upper == np.inf else upper))
     interval = Interval(max(0.0, lower - rounding), upper + rounding)
@@ -220,6 +255,10 @@ def _answer(space: Space, found: Found, a: End, b: End, hops: int) -> PointDista
 
 
 def _sentence(found: Found, hops: int) -> str:
+    if found.local and found.upper == np.inf:
+        return "lower end certified; no path was found, though one may exist"
+    if found.local and found.upper > found.lower * (1 + 1e-9):
+        return "upper end: the best path that local solves found; lower end certified, not tight"
     if found.ended_early:
         return "certified, with a wide gap: the search ended early"
     if found.cut < np.inf:
@@ -230,6 +269,9 @@ def _sentence(found: Found, hops: int) -> str:
 def _path(space: Space, found: Found) -> tuple[Piece, ...]:
     if found.start is None or found.end is None:
         return ()
+    if found.legs:
+        passed = [*found.route, (None, True)]
+        return tuple(_piece(space, *leg, *by) for leg, by in zip(found.legs, passed, strict=True))
     at, mode = found.start.x, found.start.mode
     pieces: list[Piece] = []
     if found.sequence:

@@ -44,6 +44,9 @@ class Found:
     start: End | None = None
     end: End | None = None
     ended_early: bool = False
+    local: bool = False
+    route: list[tuple[str, bool]] = field(default_factory=list[tuple[str, bool]])
+    legs: list[tuple[int, Array, Array]] = field(default_factory=list[tuple[int, Array, Array]])
 
 
 def search(space: Space, starts: list[End], ends: list[End], relaxation: float, hops: int, limit: float) -> Found:

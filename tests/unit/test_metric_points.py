@@ -1,0 +1,222 @@
+"""Distances between points: closed forms, the solver against Clarabel, many pairs against one pair."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.metrics.chain import Problem
+from hsdsl.metrics.cones import solve
+from hsdsl.metrics.interval import INFINITE, ZERO
+from hsdsl.metrics.norms import minimise
+from hsdsl.metrics.points import Place, distance, distances, quick_bounds
+from hsdsl.metrics.space import make_space
+
+MODELS = Path(__file__).parents[2] / "models"
+QUADRANTS = {"D0": (-1, -1), "D1": (-1, 1), "D2": (1, -1), "D3": (1, 1)}
+OSCILLATOR = "oscillator-with-stop-1"
+
+
+def space_of(name, *parameters):
+    system = hsdsl.load(MODELS / f"{name}.yaml").system
+    return make_space(system, parameters or [float(p.value) for p in system.parameters])
+
+
+@pytest.fixture(scope="module")
+def oscillator():
+    return space_of(OSCILLATOR)
+
+
+@pytest.fixture(scope="module")
+def quadrants():
+    return space_of("digital-control")
+
+
+# In the plane with the line x = 14 glued by v -> -0.9 v: at the stop, the way along the image is shorter by a tenth.
+AT_THE_STOP = [
+    ((14, 10), (14, 20), 9.0),
+    ((14, 10), (14, -20), 11.0),
+    ((14, -5), (14, 4.5), 0.95),
+    ((14, 7), (14, -6.3), 0.0),
+    ((14, 0), (14, 1), 0.9),
+    ((14, 0), (14, -1), 1.0),
+    ((3, 2), (6, -2), 5.0),
+]
+
+
+@pytest.mark.parametrize(("p", "q", "expected"), AT_THE_STOP)
+def test_oscillator_distances_at_the_stop(oscillator, p, q, expected):
+    found = distance(oscillator, Place("free", p), Place("free", q))
+    assert expected in found.interval
+    assert found.interval.width <= 1e-9 * max(expected, 1e-3)
+    assert found.certified == "certified"
+
+
+@pytest.mark.parametrize(("p", "q", "expected"), AT_THE_STOP)
+def test_passages_of_the_relaxed_space_cost_the_relaxation(oscillator, p, q, expected):
+    found = distance(oscillator, Place("free", p), Place("free", q), relaxation=1e-3)
+    passages = sum(piece.edge is not None for piece in found.path)
+    assert expected + 1e-3 * passages in found.interval
+
+
+def test_path_is_a_path_of_the_length_it_claims(oscillator):
+    found = distance(oscillator, Place("free", (13, 5)), Place("free", (13, -4)))
+    first, second = found.path
+    assert first.edge == "impact" and first.end[0] == pytest.approx(14)
+    assert second.start == pytest.approx((14, -0.9 * first.end[1]))
+    length = sum(np.hypot(*np.subtract(piece.start, piece.end)) for piece in found.path)
+    assert length == pytest.approx(found.interval.upper, rel=1e-12)
+
+
+def test_digital_control_is_the_plane(quadrants):
+    rng = np.random.default_rng(7)
+    for mode, signs in QUADRANTS.items():
+        for other, other_signs in QUADRANTS.items():
+            p, q = np.abs(rng.normal(size=2)) * signs, np.abs(rng.normal(size=2)) * other_signs
+            found = distance(quadrants, Place(mode, tuple(p)), Place(other, tuple(q)))
+            assert np.hypot(*(p - q)) in found.interval
+            assert found.interval.width < 1e-8
+            assert found.certified == "certified"
+
+
+@pytest.mark.parametrize("d", [1e-1, 1e-3, 1e-6])
+def test_distances_of_the_digital_control_runs_at_their_end(quadrants, d):
+    y, z = Place("D3", (1 - d, 1 - 0.2 * d)), Place("D3", (1 - 0.3 * d, 1 - d))
+    expected = np.hypot(0.7, 0.8)  # 1.063015 d
+    assert distance(quadrants, y, z).interval.middle / d == pytest.approx(expected, rel=1e-6 if d > 1e-6 else 1e-5)
+
+
+def strip(v, depth):
+    return Place("free", (14, v), "impact", depth)
+
+
+STRIPS = [
+    (strip(5, 2e-4), strip(5, 7e-4), 5e-4),  # inside the strip
+    (strip(5, 2e-4), strip(6, 7e-4), 0.9 + 11e-4),  # on to the image, where the way is shorter, and back
+    (strip(0.001, 2e-4), strip(0.002, 2e-4), 1e-3),  # inside: two more strips' ends would cost more than they save
+    (strip(5, 3e-4), Place("free", (13, 5)), 1 + 3e-4),  # back out
+    (strip(5, 3e-4), Place("free", (14, -4.5)), 7e-4),  # on
+    (strip(5, 3e-4), Place("free", (14, 6)), 0.9 + 7e-4 + 1e-3),  # on, along the image, and back through a whole strip
+]
+
+
+@pytest.mark.parametrize(("p", "q", "expected"), STRIPS)
+def test_points_of_strips(oscillator, p, q, expected):
+    for found in (distance(oscillator, p, q, relaxation=1e-3), distance(oscillator, q, p, relaxation=1e-3)):
+        assert expected in found.interval
+        assert found.interval.width < 1e-9
+
+
+def test_on_the_quotient_a_point_of_a_strip_counts_as_its_guard_point(oscillator):
+    found = distance(oscillator, strip(5, 3e-4), Place("free", (14, -4.5)))
+    assert 0.0 in found.interval and found.interval.upper < 1e-12
+
+
+def test_same_point_and_no_path(tmp_path, oscillator):
+    assert distance(oscillator, Place("free", (1, 2)), Place("free", (1, 2))).interval == ZERO
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "hsdsl: 1\nmodes:\n  a: {flow: {x: 1}}\n  b: {flow: {x: 1}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n"
+    )
+    space = make_space(hsdsl.load(model).system, [])
+    assert distance(space, Place("a", (0,)), Place("b", (0,))).interval == INFINITE
+    lower, upper = distances(space, "a", np.zeros((3, 1)), "b", np.zeros((3, 1)))
+    assert np.all(lower == np.inf) and np.all(upper == np.inf)
+
+
+def test_guard_on_time_makes_time_a_coordinate(tmp_path):
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 2, to: b}]\n"
+        "  b: {flow: {x: -1}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 3}\n"
+    )
+    space = make_space(hsdsl.load(model).system, [])
+    assert space.timed
+    found = distance(space, Place("a", (0,), t=1.0), Place("b", (3,), t=5.0))
+    assert 5.0 in found.interval and found.interval.width < 1e-9
+    with pytest.raises(ValueError, match="time is a coordinate"):
+        distance(space, Place("a", (0,)), Place("b", (3,), t=5.0))
+
+
+@pytest.mark.parametrize(
+    ("condition", "expected"),
+    [("y >= 1", np.hypot(1, 2) * 2 - 0), ("y >= -1 and y <= 1", 2.0), ("y >= 2 or y <= -1", 2 * np.hypot(1, 1))],
+)
+def test_condition_says_which_part_of_the_surface_is_the_guard(tmp_path, condition, expected):
+    if condition == "y >= 1":
+        expected = 2 * np.hypot(1, 1)
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1, y: 0}\n"
+        f"    transitions: [{{when: x >= 0, if: {condition}, to: b}}]\n"
+        "  b: {flow: {x: 1, y: 0}}\ninitial: {mode: a, x: -1, y: 0}\nexperiment: {until: 3}\n"
+    )
+    space = make_space(hsdsl.load(model).system, [])
+    found = distance(space, Place("a", (-1, 0)), Place("b", (1, 0)))
+    assert expected in found.interval and found.interval.width < 1e-9
+
+
+@pytest.mark.parametrize("relaxation", [None, 1e-3])
+@pytest.mark.parametrize(("name", "modes"), [(OSCILLATOR, ("free", "free")), ("digital-control", ("D0", "D3"))])
+def test_many_pairs_at_once_are_the_pairs_one_by_one(name, modes, relaxation):
+    space, rng = space_of(name), np.random.default_rng(11)
+    p, q = rng.normal(size=(40, 2)), rng.normal(size=(40, 2))
+    if name == OSCILLATOR:
+        p, q = (np.column_stack([14 - np.abs(x[:, 0]), 6 * x[:, 1]]) for x in (p, q))
+    else:
+        p, q = -np.abs(p), np.abs(q)
+    lower, upper = distances(space, modes[0], p, modes[1], q, relaxation)
+    quick_lower, quick_upper = quick_bounds(space, modes[0], p, modes[1], q, relaxation)
+    assert np.all(upper - lower <= 1e-8 * upper)
+    assert np.all(quick_lower <= upper) and np.all(quick_upper >= lower)
+    for k in range(len(p)):
+        alone = distance(space, Place(modes[0], tuple(p[k])), Place(modes[1], tuple(q[k])), relaxation).interval
+        assert alone.lower <= upper[k] and lower[k] <= alone.upper
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_own_solver_agrees_with_the_conic_solver(seed):
+    rng = np.random.default_rng(seed)
+    unknowns, legs, count = int(rng.integers(2, 6)), int(rng.integers(3, 6)), 8
+    matrices = [rng.normal(size=(2, unknowns)) for _ in range(legs)]
+    offsets = [rng.normal(size=(count, 2)) * 10 ** rng.uniform(-3, 2) for _ in range(legs)]
+    normals = rng.normal(size=(int(rng.integers(1, 5)), unknowns))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    levels = np.abs(rng.normal(size=len(normals))) * rng.integers(0, 2)
+    lower, upper, s = minimise(matrices, offsets, normals, levels)
+    assert np.all(s @ normals.T <= levels + 1e-12 * (1 + np.abs(s).max()))
+    for k in range(count):
+        below, above, _ = solve(Problem(tuple(matrices), tuple(o[k] for o in offsets), normals, levels))
+        assert above - below <= 1e-9 * above + 1e-13 * np.abs(np.hstack(offsets)).max()
+        assert lower[k] <= above * (1 + 1e-12) and below <= upper[k] * (1 + 1e-12)
+        assert upper[k] - lower[k] <= 1e-9 * upper[k] + 1e-13 * np.abs(np.hstack(offsets)).max()
+
+
+def test_runner_through_a_curved_guard_in_a_slice():
+    # In the slice x = 0, th = w = 0 both legs touch down together, at z = cos(pi/5).
+    space = space_of("pronking-runner", 1, 1, 30, 1, 1, 9.81, float(np.pi / 5))
+    ahead = 0.5 + np.sin(np.pi / 5)
+    p, q = Place("aerial", (0, 1, 0, 0, -1, 0)), Place("left", (0, 0.85, 0, 0, -1, 0, ahead - 0.1))
+    found = distance(space, p, q)
+    touchdown = np.cos(np.pi / 5)
+    direct = (1 - touchdown) + np.hypot(0.85 - touchdown, 0.1)  # through the guard's point of the slice
+    assert found.interval.lower == pytest.approx(0.15, rel=1e-9)  # what no passage changes
+    assert found.interval.lower <= found.interval.upper <= direct * (1 + 1e-9)
+    assert "lower end certified" in found.certified
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        (Place("fre", (1, 2)), "no mode 'fre'"),
+        (Place("free", (1,)), "coordinates x, v"),
+        (Place("free", (14, 2), "impact", 2.0), "depth"),
+        (Place("free", (14, 2), "bounce", 0.0), "no edge 'bounce'"),
+    ],
+)
+def test_places_that_do_not_fit_are_refused(oscillator, place, message):
+    with pytest.raises(ValueError, match=message):
+        distance(oscillator, place, Place("free", (1, 2)), relaxation=1e-3)
