@@ -75,6 +75,10 @@ def _float_constant(value: Fraction) -> float:
         return math.inf if value > 0 else -math.inf
 
 
+# mpmath numbers have no largest one, so a blow-up would go on for ever: bounds on exponents of two, of any number and
+# of arguments whose functions grow beyond it
+LARGEST_EXPONENT = 2**12
+LARGEST_ARGUMENT = {"exp": 13, "sinh": 13, "cosh": 13, "log": LARGEST_EXPONENT, "sqrt": LARGEST_EXPONENT}
 _TRIGONOMETRIC = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2")
 _HYPERBOLIC = ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
 _MATH = (*_TRIGONOMETRIC, *_HYPERBOLIC, "exp", "log", "sqrt", "pow")
@@ -111,8 +115,13 @@ def multiprecision(digits: int) -> Arithmetic:
     def heaviside(x: Any) -> Any:
         return (1 + context.sign(x)) / 2
 
-    def real(function: Callable[..., Any]) -> Callable[..., Any]:
+    def isfinite(value: Any) -> bool:
+        return bool(context.isfinite(value)) and context.mag(value) < LARGEST_EXPONENT
+
+    def real(function: Callable[..., Any], largest: int) -> Callable[..., Any]:
         def checked(*arguments: Any) -> Any:
+            if any(context.mag(a) > largest for a in arguments):
+                raise OverflowError("an argument beyond all numbers")
             value = function(*arguments)
             if not isinstance(value, context.mpf):  # mpmath leaves the reals where math raises
                 raise ValueError("no real value")
@@ -125,8 +134,11 @@ def multiprecision(digits: int) -> Arithmetic:
         digits=digits,
         unit=context.ldexp(1, -context.prec),
         constant=lambda value: context.mpf(value.numerator) / context.mpf(value.denominator),
-        isfinite=context.isfinite,
-        functions={name: real(getattr(context, "power" if name == "pow" else name)) for name in _MATH}
+        isfinite=isfinite,
+        functions={
+            name: real(getattr(context, "power" if name == "pow" else name), LARGEST_ARGUMENT.get(name, 4096))
+            for name in _MATH
+        }
         | {
             "abs": abs,
             "sign": context.sign,

@@ -63,10 +63,10 @@ class ModeProgram:
     flow           n derivatives
     surfaces       m values r
     magnitudes     m values |L| + |R|, the part of the round-off bound that r alone cannot show
-    gradients      m tuples (dr/dt, dr/dx0, ...) of n + 1
-    rates          m values L_f r = dr/dt + grad r . f
-    conditions     as many booleans as edges, true where there is no `if`
     outputs        k values, NaN where the mode lacks a state the output needs
+    gradient_K     n + 1 slopes (dr/dt, dr/dx0, ...) of surface K
+    rate_K         one value, L_f r = dr/dt + grad r . f of surface K
+    condition_K_I  one boolean, part I of the `if` of edge K, which holds where all its parts do
     reset_K        values of edge K's target states
     spread_K       the size max(|R_i|, sum |dR_i/dx_k| s_k) of the numbers each target state is
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's

@@ -24,7 +24,7 @@ def fractions(text: str) -> Vector:
     return tuple(Fraction(word) for word in text.split())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ButcherTableau:
     """An explicit Runge-Kutta method.
 

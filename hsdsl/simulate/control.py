@@ -15,6 +15,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.simulate.settings import Settings
 
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
+MOST_REJECTIONS = 10_000
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
 
@@ -27,6 +28,8 @@ class Control:
     order: int
     largest: Number
     power: Callable[[Number, Number], Number] | None
+    accepted: int = 0
+    rejected: int = 0
 
     def ratio(self, error: State, x: State, z: State) -> Number:
         """Error ratio of a step; at most 1 is acceptable."""
@@ -44,12 +47,19 @@ class Control:
 
     def accept(self, taken: Number, ratio: Number) -> None:
         """Learn from an accepted, unhalved step; one cut short by a boundary never shrinks the next."""
+        self.accepted += 1
         proposed = taken * self.factor(ratio)
         self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
 
     def reject(self, taken: Number, ratio: Number) -> None:
         """Shrink after a rejected, unhalved step."""
+        self.rejected += 1
         self.h = taken * min(1, self.factor(ratio))
+
+    @property
+    def struggles(self) -> bool:
+        """Whether rejections keep pace with steps and have done so for long: the flow jumps, and no step fits it."""
+        return self.rejected > MOST_REJECTIONS and 4 * self.rejected > self.accepted
 
 
 def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:

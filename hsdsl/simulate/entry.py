@@ -9,8 +9,9 @@ from __future__ import annotations
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
+from hsdsl.program import EdgeProgram
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.run import Here, Run, choose, reset, show
+from hsdsl.simulate.run import Here, Run, reset, show
 from hsdsl.simulate.surfaces import Crossing
 
 
@@ -35,27 +36,34 @@ def enter(
             )
         visited.add((mode, x))
         try:
-            values, noise = here.kernel.surfaces(t, *x), here.surfaces.noise(t, x)
+            values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
+            outside = here.surfaces.enter(t, x, values)
         except DOMAIN_ERRORS:
             return not_finite(run, here, t, (x,))
         if not finite:
             return not_finite(run, here, t, (x,))
         edges = here.mode.edges
-        beyond = [k for k, edge in enumerate(edges) if not edge.conditional and values[k] > noise[k]]
+        beyond = [k for k in outside if k < len(edges) and not edges[k].conditional]
         if not beyond:
-            walls = [k for k in range(len(edges), len(values)) if values[k] > noise[k]]
+            walls = [k for k in outside if k >= len(edges)]
             return left_domain(here, walls[0], t, "was entered outside it") if walls else here
         if stop := run.limit_reached(t):
             return stop
         zero = run.arithmetic.zero
-        chosen, alternatives = choose(edges, [Crossing(k, zero, t, x, zero) for k in beyond], zero)
+        chosen, alternatives = choose_entry(edges, [Crossing(k, zero, t, x, zero) for k in beyond])
         outcome = reset(here, chosen, tuple(max(abs(a), s) for a, s in zip(x, scale, strict=True)), run)
         if isinstance(outcome, Stop):
             return outcome
         run.record(here, chosen, t, outcome[0], alternatives, entry=True)
         edge = edges[chosen.edge]
         before, mode, states, (x, scale) = here, edge.target, edge.target_states, outcome
+
+
+def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tuple[Crossing, tuple[str, ...]]:
+    """Choose among surfaces that the state is beyond: the highest priority, then the file's order."""
+    chosen = min(beyond, key=lambda c: (-edges[c.edge].priority, c.edge))
+    return chosen, tuple(edges[c.edge].name for c in beyond if c is not chosen)
 
 
 def left_domain(here: Here, surface: int, t: Number, how: str) -> Stop:

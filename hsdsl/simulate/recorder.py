@@ -69,9 +69,9 @@ class Recorder:
         self.arcs.append(arc)
         return arc
 
-    def strip(self, arc: OpenArc, rows: list[tuple[Number, Number]], q: State) -> None:
+    def strip(self, arc: OpenArc, rows: list[tuple[Number, Number]], q: State, outputs: Outputs | None) -> None:
         """Write a strip behind ``arc``: the state waits at q while the depth grows; rows are (time, depth)."""
-        strip = self.begin(arc.mode, arc.states, "strip", arc.outputs, rows[0][0], q)
+        strip = self.begin(arc.mode, arc.states, "strip", outputs, rows[0][0], q)
         for t, _ in rows[1:]:
             strip.append(t, q, ())
         strip.depths = [depth for _, depth in rows]

@@ -58,6 +58,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
     t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
+    stood_on = here.surfaces.stood_on
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
@@ -69,8 +70,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             found, z, stages, end = attempt(t, h, t1, x, slope)
             if estimate and end is not None and not isinstance(found, Obstacle):
                 ratio = control.ratio(estimate(h, stages, end), x, z)
-                if ratio > 1:
-                    found = TOO_WRONG
+                found = assess(here, found, ratio, Trial(t, h, t1, x, slope, z, stages, here.kernel.flow, method))
             if not isinstance(found, Obstacle):
                 break
             obstacle = found
@@ -79,14 +79,16 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
                 h = control.h
             else:
                 h, halvings = h / 2, halvings + 1
-            if halvings > most_halvings or (found is TOO_WRONG and not t + h > t):
+            if halvings > most_halvings or (found is TOO_WRONG and (control.struggles or not t + h > t)):
                 return stuck(run, here.moved(t, x), found, slope)
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found or end is None:
-            return Landing(*choose(here.mode.edges, found, run.tie(t)), t1, sizes(x, z, here))
-        if halvings and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
+            return Landing(*choose(here, found, run), t1, sizes(x, z))
+        if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
+        if stood_on:
+            here.surfaces.leave(t1, z)
         arc.times.append(t1)
         arc.values.append(z)
         if curved:
@@ -123,6 +125,13 @@ def attempts(run: Run, here: Here) -> Attempt:
     return attempt
 
 
+def assess(here: Here, found: Found, ratio: Number, trial: Trial) -> Found:
+    """Look again at an adaptive step that ended where it may: its error, and whether it left the domain on the way."""
+    if ratio > 1:
+        return TOO_WRONG
+    return found or here.surfaces.excursion(trial) or ()
+
+
 def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
     """Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14)."""
     crossing, epsilon, until = landing.crossing, run.settings.relaxation, run.settings.until
@@ -131,18 +140,18 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
         here.arc.append(t, q, crossing.piece)
     if stop := run.limit_reached(t):
         return stop
+    outcome = reset(here, crossing, landing.scale, run)
     resumed = landing.t1 + (epsilon - depth)
     edge = here.mode.edges[crossing.edge]
     if resumed > until + run.tie(until):
         depth_at_end = depth + (until - landing.t1)
-        run.recorder.strip(here.arc, [(t, depth * 0), (landing.t1, depth), (until, depth_at_end)], q)
+        run.wait(here, [(t, depth * 0), (landing.t1, depth), (until, depth_at_end)], q)
         run.record(here, crossing, None, None, landing.alternatives)
         return Stop("until", until, f"reached t = {show(until)} inside the strip of {edge.name}, mode unchanged")
-    resumed = min(resumed, until)
-    run.recorder.strip(here.arc, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
-    outcome = reset(here, crossing, landing.scale, run)
     if isinstance(outcome, Stop):
         return outcome
+    resumed = min(resumed, until)
+    run.wait(here, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
     run.record(here, crossing, resumed, after, landing.alternatives)
     return enter(run, edge.target, edge.target_states, resumed, after, scale, here)
@@ -156,13 +165,13 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
         scale = here.surfaces.scale
         if run.timeline.at(t).jump:
             return enter(run, mode, here.mode.states, t, x, scale)
-        return run.place(mode, here.mode.states, t, x, scale)
+        return run.place(mode, here.mode.states, t, x, scale, stood_on=here.surfaces.stood_on)
     standing = standing_on(run, here)
     if standing and (stop := run.limit_reached(t)):
         return stop
     if standing:
-        chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
-        run.recorder.strip(here.arc, [(t, run.arithmetic.zero)], x)
+        chosen, alternatives = choose(here, standing, run)
+        run.wait(here, [(t, run.arithmetic.zero)], x)
         run.record(here, chosen, None, None, alternatives)
         name = here.mode.edges[chosen.edge].name
         return Stop("until", t, f"reached t = {show(t)} inside the strip of {name} (on its guard), mode unchanged")
@@ -170,43 +179,32 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:
-    """Guards that the state stands on, with the flow pointing out and `if` true.
-
-    On the guard means to round-off, or within TIE of the time passed: sums of steps are no more exact than that.
-    """
+    """Guards that the state stands on, to round-off or a tie relative to the time passed."""
     t, x, zero = here.t, here.x, run.arithmetic.zero
-    try:
-        values, noise = here.kernel.surfaces(t, *x), here.surfaces.noise(t, x)
-        rates, conditions = here.kernel.rates(t, *x), here.kernel.conditions(t, *x)
-    except DOMAIN_ERRORS:
-        return []
-    return [
-        Crossing(k, zero, t, x, zero)
-        for k in range(len(here.mode.edges))
-        if abs(values[k]) <= max(noise[k], rates[k] * TIE * t) and rates[k] > 0 and conditions[k]
-    ]
+    return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, TIE * t)]
 
 
 def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | Stop:
     """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
     t, x = here.t, here.x
-    if obstacle.kind in ("wall", "deep", "flat", "inward") and (standing := standing_on(run, here)):
-        chosen, alternatives = choose(here.mode.edges, standing, run.arithmetic.zero)
-        return Landing(chosen, alternatives, t, sizes(x, x, here))
+    if obstacle.kind in ("wall", "deep", "flat", "inward", "not finite") and (standing := standing_on(run, here)):
+        chosen, alternatives = choose(here, standing, run)
+        return Landing(chosen, alternatives, t, sizes(x, x))
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
-    if obstacle.kind == "not finite":
+    grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
+    if obstacle.kind == "not finite" or (obstacle.kind in ("error", "creeping") and grown):
         h = run.control.h
         ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
         return not_finite(run, here, t, ahead)
     why = {
-        "error": "the error estimate stays above the tolerance",
+        "error": "the error estimate stays above the tolerance, as where a flow jumps",
         "creeping": "steps had to be cut below a thousandth thousands of times in a row",
         "flat": "the gradient of a guard's surface vanishes on it",
     }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
 
 
-def sizes(x: State, z: State, here: Here) -> State:
-    """Return the sizes of the numbers that a point between x and z was computed from, since the mode was entered."""
-    return tuple(max(abs(a), abs(b), s) for a, b, s in zip(x, z, here.surfaces.scale, strict=True))
+def sizes(x: State, z: State) -> State:
+    """Return the sizes of the numbers that a point between x and z is computed from."""
+    return tuple(max(abs(a), abs(b)) for a, b in zip(x, z, strict=True))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.kernel import Kernel, ModeKernel
-from hsdsl.program import EdgeProgram, ModeProgram, Program
+from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate.control import Control
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.settings import Settings
@@ -71,6 +71,7 @@ class Run:
         x: State,
         scale: State,
         before: Here | None = None,
+        stood_on: set[int] | None = None,
     ) -> Here:
         """Enter a mode: bind its routines to the input segment of this time and open an arc.
 
@@ -82,7 +83,17 @@ class Run:
         if outputs is None and before is not None and before.mode.states == states:
             outputs = before.kernel.outputs
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
-        return Here(program, kernel, Surfaces(kernel, program.edges, scale, self.arithmetic), segment, arc, t, x)
+        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(stood_on or ()))
+        return Here(program, kernel, surfaces, segment, arc, t, x)
+
+    def wait(self, here: Here, rows: list[tuple[Number, Number]], q: State) -> None:
+        """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""
+        mode = self.program.modes.index(here.mode)
+
+        def outputs(t: Number, *x: Number) -> State:
+            return self.kernel.bind(mode, self.timeline.at(t).data).outputs(t, *x)
+
+        self.recorder.strip(here.arc, rows, q, outputs if rows[-1][0] > here.segment.end else here.arc.outputs)
 
     def limit_reached(self, t: Number) -> Stop | None:
         """Stop where one more transition would exceed what the run may make."""
@@ -121,34 +132,44 @@ class Run:
         )
 
 
-def choose(
-    edges: tuple[EdgeProgram, ...], crossings: Sequence[Crossing], tie: Number
-) -> tuple[Crossing, tuple[str, ...]]:
+def choose(here: Here, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
     """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
 
-    Returns the chosen crossing and the names of those tied with it.
+    Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. Returns the
+    crossing and the names of those tied with it.
     """
-    first = min(c.time for c in crossings)
-    tied = [c for c in crossings if c.time - first <= tie]
-    chosen = min(tied, key=lambda c: (-edges[c.edge].priority, c.edge))
-    return chosen, tuple(edges[c.edge].name for c in tied if c is not chosen)
+    edges, first = here.mode.edges, min(crossings, key=lambda c: c.time)
+    since = run.tie(first.time)
+    tied = {c.edge: c for c in crossings if c.time - first.time <= since}
+    for k in here.surfaces.standing(first.time, first.state, since):
+        tied.setdefault(k, first)
+    edge = min(tied, key=lambda k: (-edges[k].priority, k))
+    chosen = replace(first, edge=edge, depth=tied[edge].depth)
+    return chosen, tuple(edges[k].name for k in sorted(tied) if k != edge)
 
 
 def reset(here: Here, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
     """Apply a reset to the values before the jump; also the sizes of the numbers the new state came from."""
     k, t, q = crossing.edge, crossing.time, crossing.state
-    edge = here.mode.edges[k]
+    edge, isfinite = here.mode.edges[k], run.arithmetic.isfinite
     try:
         after = here.kernel.resets[k](t, *q)
+    except DOMAIN_ERRORS:
+        after = (run.arithmetic.functions["nan"],)
+    if not all(map(isfinite, after)):
+        texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))
+        return Stop("not_finite", t, f"the reset of {edge.name} ({texts}) has no finite value at t = {show(t)}")
+    try:
         spread = here.kernel.spreads[k](t, *q, *scale)
     except DOMAIN_ERRORS:
-        after = spread = (run.arithmetic.functions["nan"],)
-    if all(map(run.arithmetic.isfinite, after)):
-        return after, spread
-    texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))
-    return Stop("not_finite", t, f"the reset of {edge.name} ({texts}) has no finite value at t = {show(t)}")
+        spread = ()
+    sizes = tuple(abs(v) for v in after)  # where a reset is infinitely steep, no more is known
+    return after, spread if spread and all(map(isfinite, spread)) else sizes
 
 
 def show(x: Any) -> str:
     """Write a number for a person."""
-    return f"{float(x):.10g}"
+    try:
+        return f"{float(x):.10g}"
+    except OverflowError:
+        return f"{x!s:.24}"

@@ -7,7 +7,7 @@ the step's interpolant, never on the flow.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -113,33 +113,110 @@ def roundoff(unit: Number, magnitude: Number, gradient: Vector, x: State, scale:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """A mode's surfaces with what is needed to judge a point: routines, edges, entry scale, number type."""
+    """A mode's surfaces with what is needed to judge a point.
+
+    ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
+    ``stood_on``, on which the state stood then, until it has left them.
+    """
 
     kernel: ModeKernel
     edges: tuple[EdgeProgram, ...]
     scale: State
     arithmetic: Arithmetic
+    stood_on: set[int] = field(default_factory=set[int])
 
-    def noise(self, t: Number, x: State) -> list[Number]:
-        """Round-off of every surface at a point."""
-        magnitudes, gradients = self.kernel.magnitudes(t, *x), self.kernel.gradients(t, *x)
-        unit = self.arithmetic.unit
-        return [roundoff(unit, m, g, x, self.scale) for m, g in zip(magnitudes, gradients, strict=True)]
+    def noise(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
+        """Round-off of surface k at a point; where its gradient has no value only the sides count."""
+        magnitude, unit = self.kernel.magnitudes(t, *x)[k], self.arithmetic.unit
+        try:
+            gradient = self.kernel.gradients[k](t, *x)
+            if not self.arithmetic.isfinite(sum(gradient)):
+                raise ValueError("a surface as steep as a wall")
+        except DOMAIN_ERRORS:
+            return ROUNDOFF_UNITS * unit * magnitude
+        scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
+        return roundoff(unit, magnitude, gradient, x, scale)
+
+    def enter(self, t: Number, x: State, values: Vector) -> list[int]:
+        """Look at the surfaces on entry: return those the state is beyond, and note those it stands on."""
+        beyond: list[int] = []
+        for k, r in enumerate(values):
+            noise = self.noise(k, t, x, entry=True)
+            if r > noise:
+                beyond.append(k)
+            elif r >= -noise:
+                self.stood_on.add(k)
+        return beyond
+
+    def leave(self, t: Number, x: State) -> None:
+        """Forget the surfaces that the state stood on and has left inwards."""
+        values = self.kernel.surfaces(t, *x)
+        self.stood_on.difference_update([k for k in self.stood_on if values[k] < -self.noise(k, t, x)])
 
     def norm(self, t: Number, x: State, surface: int) -> Number:
         """|grad r| in (t, x)."""
         total = self.arithmetic.zero
-        for g in self.kernel.gradients(t, *x)[surface]:
+        for g in self.kernel.gradients[surface](t, *x):
             total = total + g * g
         return self.arithmetic.sqrt(total)
+
+    def standing(self, t: Number, x: State, since: Number) -> list[int]:
+        """Edges on whose guards the state stands, with the flow pointing out and `if` true.
+
+        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
+        """
+        found: list[int] = []
+        for k in range(len(self.edges)):
+            try:
+                r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
+                near = abs(r) <= max(self.noise(k, t, x), rate * since)
+                if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
+                    found.append(k)
+            except DOMAIN_ERRORS:
+                continue
+        return found
+
+    def excursion(self, trial: Trial) -> Obstacle | None:
+        """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
+
+        Only where the flow points out of a surface at the step's start and back in at its end; asked of adaptive steps,
+        whose length nobody chose.
+        """
+        if trial.end is None:
+            return None
+        for k, gradient in enumerate(self.kernel.gradients):
+            try:
+                out = self._rate(gradient(trial.t, *trial.x), trial.slope)
+                back = self._rate(gradient(trial.t1, *trial.z), trial.end)
+                if out > 0 >= back and self._beyond_within(trial, k):
+                    return Obstacle("deep", k)
+            except DOMAIN_ERRORS:
+                continue
+        return None
+
+    def _rate(self, gradient: Vector, flow: State) -> Number:
+        total = gradient[0]
+        for g, f in zip(gradient[1:], flow, strict=True):
+            total = total + g * f
+        return total
+
+    def _beyond_within(self, trial: Trial, k: int) -> bool:
+        if self.kernel.surfaces(trial.t, *trial.x)[k] > self.noise(k, trial.t, trial.x):
+            return False  # transparent, and beyond already
+        for i in range(1, SCAN):
+            s = (self.arithmetic.zero + i) / SCAN
+            t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
+            if self.kernel.surfaces(t, *x)[k] > self.noise(k, t, x):
+                return k >= len(self.edges) or bool(self.kernel.conditions[k](t, *x)[0])
+        return False
 
     def judge(self, trial: Trial, values: Vector, epsilon: Number) -> list[Crossing] | Obstacle:
         """Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
 
         Raises one of ``DOMAIN_ERRORS`` where a surface or condition has no finite value on the way.
         """
-        noise = self.noise(trial.t1, trial.z)
-        beyond = [k for k, r in enumerate(values) if not r <= noise[k]]
+        noise = {k: self.noise(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
+        beyond = [k for k in noise if not values[k] <= noise[k]]
         for k in beyond:
             if k >= len(self.edges):
                 return Obstacle("wall", k)
@@ -154,30 +231,32 @@ class Surfaces:
                 crossings.append(found)
         return crossings
 
-    def _too_deep(self, trial: Trial, values: Vector, noise: list[Number], k: int, epsilon: Number) -> Obstacle | None:
+    def _too_deep(
+        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
+    ) -> Obstacle | None:
         norm = self.norm(trial.t1, trial.z, k)
         if not norm > 0:
             return Obstacle("flat", k)
         return None if values[k] <= epsilon * norm + noise[k] else Obstacle("deep", k)
 
     def _crossing(
-        self, trial: Trial, values: Vector, noise: list[Number], k: int, epsilon: Number
+        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
     ) -> Crossing | Obstacle | None:
         """Find the last up-crossing of surface k on the interpolant; None where the surface is transparent there."""
         piece = trial.piece
-        found = self._on(trial, piece, noise[k], k)
+        found = self._on(trial, piece, k)
         if found is None:
             return None
         norm = self.norm(trial.t1, trial.z, k)
         inward = self._inward(trial, found, noise[k], k)
         if inward and inward <= epsilon * norm:
             piece = trial.cubic()
-            found = self._on(trial, piece, noise[k], k) or found
+            found = self._on(trial, piece, k) or found
             inward = self._inward(trial, found, noise[k], k)
         if inward:
             return Obstacle("inward", k)
         theta, time, q = found
-        if not self.kernel.conditions(time, *q)[k]:
+        if not self.kernel.conditions[k](time, *q)[0]:
             return None
         if obstacle := self._too_deep(trial, values, noise, k, epsilon):
             return obstacle
@@ -186,18 +265,23 @@ class Surfaces:
     def _inward(self, trial: Trial, found: tuple[Number, Number, State], noise: Number, k: int) -> Number:
         """How far the flow at q would take r back inside over this step; 0 when not beyond round-off."""
         _, time, q = found
-        back = -self.kernel.rates(time, *q)[k] * trial.h
+        back = -self.kernel.rates[k](time, *q)[0] * trial.h
         return back if back > noise else self.arithmetic.zero
 
-    def _on(self, trial: Trial, piece: Polynomial, noise: Number, k: int) -> tuple[Number, Number, State] | None:
+    def _smallest(self, trial: Trial, k: int) -> Number:
+        """How close to zero a crossing of this step can be told: round-off of its own numbers, no older ones."""
+        sizes = tuple(max(abs(a), abs(b)) for a, b in zip(trial.x, trial.z, strict=True))
+        return self.noise(k, trial.t1, sizes) * ROOT_SHARE
+
+    def _on(self, trial: Trial, piece: Polynomial, k: int) -> tuple[Number, Number, State] | None:
         """Return (theta, time, state) of the last up-crossing on ``piece``; None if r was beyond all along."""
 
         def value(theta: Number) -> Number:
             return self.kernel.surfaces(trial.t + theta * trial.h, *at(trial.x, piece, theta))[k]
 
-        theta = last_up_crossing(value, noise * ROOT_SHARE, self.arithmetic)
+        theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
         if theta is None:
-            if self.edges[k].conditional and value(self.arithmetic.zero) > self.noise(trial.t, trial.x)[k]:
+            if self.edges[k].conditional and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
                 return None
             theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
         if theta == 0:
