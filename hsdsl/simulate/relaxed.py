@@ -84,7 +84,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found or end is None:
-            return Landing(*choose(here, found, run), t1, sizes(x, z))
+            return Landing(*choose(here, found, run), t1, sizes(x, z, here))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
         if stood_on:
@@ -189,7 +189,7 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
     t, x = here.t, here.x
     if obstacle.kind in ("wall", "deep", "flat", "inward", "not finite") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Landing(chosen, alternatives, t, sizes(x, x))
+        return Landing(chosen, alternatives, t, sizes(x, x, here))
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
     grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
@@ -205,6 +205,11 @@ def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | S
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
 
 
-def sizes(x: State, z: State) -> State:
-    """Return the sizes of the numbers that a point between x and z is computed from."""
-    return tuple(max(abs(a), abs(b)) for a, b in zip(x, z, strict=True))
+def sizes(x: State, z: State, here: Here) -> State:
+    """Return the sizes of the numbers that a point between x and z is computed from.
+
+    A state that has not moved since the mode was entered still carries the sizes that it came in with.
+    """
+    entered = zip(here.arc.values[0], here.surfaces.scale, strict=True)
+    still = [s if b == first else abs(b) for b, (first, s) in zip(z, entered, strict=True)]
+    return tuple(max(abs(a), abs(b), s) for a, b, s in zip(x, z, still, strict=True))
