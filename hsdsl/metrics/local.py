@@ -20,7 +20,11 @@ from hsdsl.metrics.search import End, Found
 MOST_SEQUENCES = 6
 MORE_HOPS = 1  # than the shortest sequence has
 STARTS = 3
-ITERATIONS = 150
+ITERATIONS = 250
+MANY = 14  # unknowns, from which on one start and fewer iterations must do
+ITERATIONS_OF_MANY = 100
+# Room for inequalities: a reset may land on a boundary everywhere, and no solver bears that as a constraint.
+MARGINS = (1e-8, 1e-10)
 STEPS = 12  # of Newton's method back onto a surface
 
 
@@ -65,13 +69,17 @@ def _try(space: Space, sequence: tuple[Crossing, ...], start: End, end: End, rel
             _keep(found, value, (), start, end, [])
         return
     route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
+    size = 1e3 * (1 + float(max(np.abs(start.x).max(initial=0), np.abs(end.x).max(initial=0))))
     for guess in _guesses(space, sequence, start, end):
-        s = _solve(route, guess)
-        if s is None or not np.all(np.isfinite(s)):
-            continue
-        value = route.length(s) + toll
-        if value < found.upper and route.allowed(s):
-            _keep(found, value, sequence, start, end, route.legs(s))
+        for margin in MARGINS:
+            s = _solve(route, guess, margin * (1 + float(np.abs(guess).max(initial=0))))
+            if s is None or not np.abs(s).max(initial=0) <= size:
+                continue  # a solve that ran away: so far out its rounding alone would pass for a path
+            value = route.length(s) + toll
+            if route.allowed(s):
+                if value < found.upper:
+                    _keep(found, value, sequence, start, end, route.legs(s))
+                break
 
 
 def _keep(
@@ -98,16 +106,16 @@ def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End)
             a = from_p.get(name, from_q.get(name, 0.0))
             middle.append(a + share * (from_q.get(name, a) - a))
     guess = np.array(middle)
-    spread = np.random.default_rng(0).normal(size=(STARTS - 1, len(guess)))
-    width = 0.3 * (0.1 + float(np.abs(guess).max(initial=0)))
+    spread = np.random.default_rng(0).normal(size=((STARTS - 1) * (len(guess) < MANY), len(guess)))
+    width = 0.1 * (0.1 + float(np.abs(guess).max(initial=0)))
     return [guess, *(guess + width * row for row in spread)]
 
 
-def _solve(route: Route, guess: Array) -> Array | None:
+def _solve(route: Route, guess: Array, margin: float) -> Array | None:
     minimise: Any = import_module("scipy.optimize").minimize
-    constraints = [
+    constraints: list[dict[str, Any]] = [
         {"type": "eq", "fun": route.surfaces},
-        {"type": "ineq", "fun": route.room},
+        {"type": "ineq", "fun": lambda s: route.room(s) + margin},  # pyright: ignore[reportUnknownLambdaType, reportUnknownArgumentType]
     ]
     with np.errstate(all="ignore"):
         try:
@@ -116,7 +124,7 @@ def _solve(route: Route, guess: Array) -> Array | None:
                 guess,
                 method="SLSQP",
                 constraints=constraints,
-                options={"maxiter": ITERATIONS, "ftol": 1e-13},
+                options={"maxiter": ITERATIONS if len(guess) < MANY else ITERATIONS_OF_MANY, "ftol": 1e-13},
             )
         except (ValueError, np.linalg.LinAlgError):
             return None

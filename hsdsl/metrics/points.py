@@ -189,7 +189,7 @@ def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) 
     if not 0 <= place.depth <= relaxation:
         raise ValueError(f"the depth in a strip lies between 0 and {relaxation}, not {place.depth}")
     gates = [i for i, g in enumerate(space.gates) if g.edge == place.edge and g.source == mode]
-    if not gates:
+    if not gates and not any(c.edge == place.edge and c.source == mode for c in space.curved_gates):
         raise ValueError(f"mode {place.mode} has no edge '{place.edge}' with a guard")
     on = [End(mode, x, -place.depth, 2 * i + is_end) for i in gates]
     return [End(mode, x, place.depth), *on]

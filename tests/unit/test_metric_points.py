@@ -220,3 +220,44 @@ def test_runner_through_a_curved_guard_in_a_slice():
 def test_places_that_do_not_fit_are_refused(oscillator, place, message):
     with pytest.raises(ValueError, match=message):
         distance(oscillator, place, Place("free", (1, 2)), relaxation=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("height", "shift"), [(0.85, 0.1), (0.9, 0.3), (0.83, 0.2)])
+def test_runner_against_another_optimiser_from_two_hundred_starts(height, shift):
+    from scipy.optimize import minimize
+
+    psi = np.pi / 5
+    space = space_of("pronking-runner", 1, 1, 30, 1, 1, 9.81, float(psi))
+    foot = 0.5 + np.sin(psi) - shift
+    p, q = np.array([0, 1, 0, 0, -1, 0.0]), np.array([0, height, 0, 0, -1, 0, foot])
+
+    def foot_height(x, side):
+        return x[1] + side * 0.5 * np.sin(x[2]) - np.cos(psi + x[2])
+
+    def beyond_aerial(x):
+        return -min(foot_height(x, 1), foot_height(x, -1))
+
+    def beyond_left(x):
+        leg = np.hypot(x[0] + 0.5 * np.cos(x[2]) - x[6], x[1] + 0.5 * np.sin(x[2]))
+        return max(leg - 1, -foot_height(x, -1))
+
+    def length(free):
+        # z is where the left foot touches down, th <= 0 since the right one does so later.
+        x, vx, vz, w = free[:4]
+        th = -(free[4] ** 2)
+        z = np.cos(psi + th) - 0.5 * np.sin(th)
+        hip = x + 0.5 * np.cos(th)
+        guard = np.array([x, z, th, vx, vz, w])
+        image = np.array([*guard, hip + np.sin(psi + th)])
+        rate = vz + w * (0.5 * np.cos(th) + np.sin(psi + th))  # of the left foot's height: not upwards
+        pieces = [(p + share * (guard - p), image + share * (q - image)) for share in np.linspace(0, 1, 17)]
+        outside = max(max(beyond_aerial(a), beyond_left(b)) for a, b in pieces)
+        return np.linalg.norm(guard - p) + np.linalg.norm(image - q) + 1e3 * (max(rate, 0.0) + max(outside, 0.0))
+
+    rng = np.random.default_rng(0)
+    starts = rng.normal(size=(200, 5)) * (0.3, 0.3, 0.3, 0.3, 0.5) + (0, 0, -1, 0, 0)
+    best = min(minimize(length, start, method="Powell", options={"xtol": 1e-9, "ftol": 1e-12}).fun for start in starts)
+    found = distance(space, Place("aerial", tuple(p)), Place("left", tuple(q)))
+    assert found.interval.upper <= best * (1 + 1e-6)
+    assert found.interval.lower <= best
