@@ -148,10 +148,7 @@ class Model:
         mode, states, x = initial_state(values, initial or {})
         if request.method is None:
             chosen = replace(chosen, one_stop=one_stop(values, x))
-        try:
-            execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch)
-        except ValueError as error:
-            raise UsageError(str(error)) from error
+        execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch)
         return replace(execution, title=self.system.title, seconds={**self._seconds, **execution.seconds})
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from hsdsl.arithmetic import Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.errors import UsageError
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program, SampledInput
 
@@ -42,7 +43,7 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
 
     Raises
     ------
-    ValueError
+    UsageError
         An input's sample times do not increase, or a sample is not finite.
     """
     samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
@@ -68,12 +69,15 @@ def _samples(
     if given.times is not None and given.values is not None:
         times, values = (tuple(map(kernel.arithmetic.constant, column)) for column in (given.times, given.values))
     else:
-        both = kernel.constant(f"input_{index}", parameters)
+        try:
+            both = kernel.constant(f"input_{index}", parameters)
+        except DOMAIN_ERRORS:
+            raise UsageError(f"input {given.name} has a sample that is not finite") from None
         times, values = both[: len(both) // 2], both[len(both) // 2 :]
     if not all(map(kernel.arithmetic.isfinite, (*times, *values))):
-        raise ValueError(f"input {given.name} has a sample that is not finite")
+        raise UsageError(f"input {given.name} has a sample that is not finite")
     if any(not a < b for a, b in pairwise(times)):
-        raise ValueError(f"the sample times of input {given.name} do not increase")
+        raise UsageError(f"the sample times of input {given.name} do not increase")
     return times, values
 
 
