@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hsdsl.errors import Diagnostic
+from hsdsl.names import visible
 
 _WIDEST = 120
 
@@ -29,7 +30,7 @@ def render(diagnostic: Diagnostic) -> str:
     where = f"{span.path}:{span.line}:{span.column}: " if span else ""
     lines = [f"{where}error {diagnostic.code}: {diagnostic.message}"]
     if span and diagnostic.text is not None:
-        lines += _pointed(diagnostic.text, span.column - 1, span.length)
+        lines += _pointed(visible(diagnostic.text), span.column - 1, span.length)
     if diagnostic.hint:
         lines.append(f"  hint: {diagnostic.hint}")
     return "\n".join(lines)

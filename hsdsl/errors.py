@@ -60,17 +60,27 @@ class UsageError(Exception):
         self.hint = hint
 
 
+MOST_DIAGNOSTICS = 500
+
+
 @dataclass
 class Findings:
     """The diagnostics of reading one file, gathered so that all are reported and not the first alone."""
 
     path: str = ""
-    diagnostics: list[Diagnostic] = field(default_factory=list[Diagnostic])
+    diagnostics: dict[Diagnostic, None] = field(default_factory=dict[Diagnostic, None])
 
     def add(self, diagnostic: Diagnostic) -> None:
-        """Keep a diagnostic, once."""
-        if diagnostic not in self.diagnostics:
-            self.diagnostics.append(diagnostic)
+        """Keep a diagnostic, once.
+
+        Raises
+        ------
+        ModelError
+            When there are :data:`MOST_DIAGNOSTICS`: nobody reads on.
+        """
+        self.diagnostics[diagnostic] = None
+        if len(self.diagnostics) >= MOST_DIAGNOSTICS:
+            self.raise_if_any()
 
     def raise_if_any(self) -> None:
         """Raise everything found so far, in source order, other files last.

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import re
 import unicodedata
 from collections.abc import Iterable
 
 LOOKALIKES = "·²³"  # Unicode lets some of them stand in names; in mathematics they are operators
+# controls, line ends that are none in YAML, marks of direction, and what has no width
+INVISIBLE = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"
+)
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
+_MOST_TO_COMPARE = 300
 
 
 def normalised(name: str) -> str:
@@ -29,6 +35,8 @@ def closest(name: str, candidates: Iterable[str]) -> str | None:
     for candidate in names:
         if candidate.lower() == name.lower() and candidate != name:
             return candidate
+    if len(names) > _MOST_TO_COMPARE:
+        return None
     found = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return found[0] if found else None
 
@@ -44,7 +52,12 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
     return None
 
 
+def visible(text: str) -> str:
+    """A text without characters that would steer a terminal or hide from a reader."""
+    return INVISIBLE.sub("\ufffd", text)
+
+
 def shown(text: str, limit: int = 60) -> str:
     """A text cut to what a sentence can carry."""
-    text = " ".join(text.split())
+    text = " ".join(visible(text).split())
     return text if len(text) <= limit else text[: limit - 3] + "..."

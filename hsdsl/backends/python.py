@@ -1,6 +1,6 @@
 """The Python kernel: a program's routines executed as Python functions, over any number type.
 
-The text comes from `lower` (SymPy's `lambdify` with common subexpressions taken out); it names states, parameters and
+The text comes from `lower`; it names states, parameters and
 constants only by number, so nothing a model file says reaches the interpreter as code.
 """
 

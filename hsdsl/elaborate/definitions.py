@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from hsdsl.elaborate.world import World, later
+from collections import ChainMap
+
+from hsdsl.elaborate.world import Values, World, in_turn
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.schema import ParameterEntry
 from hsdsl.source import Scalar
@@ -14,18 +16,15 @@ _ONLY_PARAMETERS = "a parameter is an expression of earlier parameters"
 
 def define_parameters(world: World) -> tuple[Parameter, ...]:
     """Every parameter; what its name means goes to ``world.values``."""
-    names = [str(key) for key in world.document.parameters]
-    base = world.scope((), _ONLY_PARAMETERS).values
+    refused: Values = {}
+    earlier: Values = {}
+    scope = Scope(ChainMap(refused, earlier, world.scope((), _ONLY_PARAMETERS).values))  # pyright: ignore[reportArgumentType]
     found: list[Parameter] = []
-    for position, (name, entry) in enumerate(world.document.parameters.items()):
-        earlier = {n: world.values.get(n) for n in names[:position]}
-        scope = Scope({**base, **later(names, position, "parameters"), **earlier})
+    for name in in_turn(world.document.parameters, "parameters", refused):
+        entry = world.document.parameters[name]
         scalar = entry.value if isinstance(entry, ParameterEntry) else entry
         value = world.reader.number(scalar, scope, finite_now=True)
-        if value is not None:
-            world.values[name] = Value(symbol(name), value.number)
-        else:
-            world.values[name] = None
+        world.values[name] = earlier[name] = None if value is None else Value(symbol(name), value.number)
         extra = _extra(world, entry, scope) if isinstance(entry, ParameterEntry) else {}
         if value is not None:
             _check_bounds(world, name, scalar, value, extra)
@@ -65,9 +64,9 @@ def _number(value: Value) -> str:
 
 def define_lets(world: World) -> None:
     """The meaning of every top-level `let`, in ``world.values``: it may use states, and says which it used."""
-    names = [str(key) for key in world.document.let]
     base = world.scope(("time", "parameters", "inputs", "states"), "").values
-    for position, (name, scalar) in enumerate(world.document.let.items()):
-        earlier = {n: world.values[n] for n in names[:position]}
-        scope = Scope({**base, **later(names, position, "`let` names"), **earlier})
-        world.values[name] = world.reader.number(scalar, scope)
+    refused: Values = {}
+    earlier: Values = {}
+    scope = Scope(ChainMap(refused, earlier, base))  # pyright: ignore[reportArgumentType]
+    for name in in_turn(world.document.let, "`let` names", refused):
+        world.values[name] = earlier[name] = world.reader.number(world.document.let[name], scope)

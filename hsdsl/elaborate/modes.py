@@ -8,8 +8,8 @@ from collections import ChainMap
 from hsdsl.elaborate.edges import elaborate_edges, surface
 from hsdsl.elaborate.outputs import outputs_of
 from hsdsl.elaborate.reader import all_of
-from hsdsl.elaborate.world import KINDS, World, later
-from hsdsl.expression.scope import Refusal, Scope, Value
+from hsdsl.elaborate.world import KINDS, Values, World, in_turn
+from hsdsl.expression.scope import Scope, Value
 from hsdsl.schema import Mode as ModeDocument
 from hsdsl.source import Key
 from hsdsl.system import Mode
@@ -53,15 +53,13 @@ def mode_scope(world: World, name: Key, document: ModeDocument) -> Scope:
     """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
     states = frozenset(world.states[name])
     place = f"the mode '{name}'"
-    own: dict[str, Value | Refusal | None] = {}
-    base = ChainMap(own, world.values)  # pyright: ignore[reportArgumentType]
-    names = [str(key) for key in document.let]
-    for position, (key, scalar) in enumerate(document.let.items()):
+    own: Values = {}
+    refused: Values = {}
+    scope = Scope(ChainMap(refused, own, world.values), states, place)  # pyright: ignore[reportArgumentType]
+    for key in in_turn(document.let, "`let` names", refused):
         kind = world.names.get(key)
         if kind not in (None, "let"):
             message = f"'{key}' is a `let` name of {place}, and also {KINDS[kind]}"
             world.reader.add(key.place, "HS301", message, "give one of them another name")
-        waiting = later(names, position, "`let` names")
-        scope = Scope(ChainMap(waiting, own, world.values), states, place)  # pyright: ignore[reportArgumentType]
-        own[str(key)] = world.reader.number(scalar, scope)
-    return Scope(base, states, place)
+        own[key] = world.reader.number(document.let[key], scope)
+    return scope

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -95,10 +96,15 @@ def _refused(name: str, kind: str, sentence: str) -> Refusal:
     return Refusal("HS117", f"'{name}' is {kind}; {sentence}")
 
 
-def later(names: list[str], position: int, kind: str) -> Values:
-    """Refusals for the name at a position, and for those after it, of definitions that may use earlier ones only."""
-    own = names[position]
-    refused: Values = {own: Refusal("HS302", f"'{own}' is defined by itself")}
-    for name in names[position + 1 :]:
-        refused[name] = Refusal("HS302", f"'{name}' is defined below; {kind} use earlier ones only", "move it up")
-    return refused
+def in_turn(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
+    """The names of definitions that may use earlier ones only.
+
+    ``refused`` holds, while a name's turn lasts, refusals of it and of those below, and in the end nothing.
+    """
+    keys = list(keys)
+    for key in keys:
+        refused[key] = Refusal("HS302", f"'{key}' is defined below; {kind} use earlier ones only", "move it up")
+    for key in keys:
+        refused[key] = Refusal("HS302", f"'{key}' is defined by itself")
+        yield key
+        del refused[key]

@@ -1,10 +1,9 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
-"""Expressions -> the text of routines, through SymPy's `lambdify` with common subexpressions taken out."""
+"""Expressions -> the text of routines: statements in order, with common subexpressions taken out."""
 
 from __future__ import annotations
 
-import inspect
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from hsdsl.program import Routines
 
 @dataclass(frozen=True)
 class Definition:
-    """A routine before printing: its name, arguments and (possibly nested) tuple of results.
+    """A routine before printing: its name, arguments and tuple of results.
 
     ``statements`` are the names that the results use besides the arguments, and what they stand for.
     """
@@ -28,11 +27,11 @@ class Definition:
     results: tuple
     statements: Sequence[Statement] = ()
 
-    def written_out(self, results) -> tuple[list[Statement], tuple]:
+    def written_out(self) -> tuple[list[Statement], tuple]:
         """Cut down statements and results, and take out what is common to them."""
         cut = Cut("v", powers=True)
         given = [(symbol, cut.down(expr)) for symbol, expr in self.statements]
-        small = [cut.down(expr) for expr in sp.sympify(results)]
+        small = [cut.down(expr) for expr in map(sp.sympify, self.results)]
         known = [*given, *cut.statements]
         common, reduced = sp.cse([*(e for _, e in known), *small], symbols=sp.numbered_symbols("w", real=True))
         last = tuple(reduced)[len(known) :]
@@ -42,15 +41,12 @@ class Definition:
 
 def text_of(definition: Definition) -> str:
     """Print one routine as a Python function."""
-    function = sp.lambdify(
-        definition.arguments,
-        definition.results,
-        modules=[{}],
-        printer=KernelPrinter(),
-        cse=definition.written_out,
-        docstring_limit=0,
-    )
-    return inspect.getsource(function).replace("def _lambdifygenerated", f"def {definition.name}", 1)
+    printer = KernelPrinter()
+    statements, results = definition.written_out()
+    lines = [f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):"]
+    lines += [f"    {symbol.name} = {printer.doprint(expr)}" for symbol, expr in statements]
+    lines += [f"    return ({''.join(printer.doprint(expr) + ', ' for expr in results)})"]
+    return "\n".join(lines) + "\n"
 
 
 def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol]) -> Routines:

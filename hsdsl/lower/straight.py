@@ -113,8 +113,9 @@ class Gradient:
         self.statements = self._cut.statements
 
     def _row(self, expr: sp.Expr) -> tuple[sp.Expr, ...]:
-        direct = {a: expr.diff(a) for a in self._arguments}
-        through = expr.free_symbols & self._slopes.keys()
+        present = expr.free_symbols
+        direct = {a: expr.diff(a) if a in present else sp.S.Zero for a in self._arguments}
+        through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
             slope = self._cut.name(expr.diff(symbol))
             for argument, inner in self._slopes[symbol].items():

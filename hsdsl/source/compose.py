@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from hsdsl.errors import Diagnostic, Findings, ModelError, Span
-from hsdsl.names import normalised, shown
+from hsdsl.names import INVISIBLE, normalised, shown
 from hsdsl.source.commas import rejoined_entries, rejoined_items
 from hsdsl.source.faults import explain
 from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence, absent
@@ -19,6 +19,7 @@ from hsdsl.source.text import Text
 
 DEEPEST = 64
 MOST_NODES = 200_000
+MOST_ENTRIES = 1_000
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -99,6 +100,11 @@ class _Composer:
     def _scalar(self, event: Any) -> Scalar:
         if event.tag is not None:
             return absent(self._place(event))
+        hidden = INVISIBLE.search(event.value)
+        if hidden:
+            message = f"the escape here stands for the invisible character U+{ord(hidden.group()):04X}"
+            self.findings.add(self._place(event).diagnostic("HS002", message, "remove it"))
+            return Scalar(INVISIBLE.sub("", event.value), False, self._place(event))
         return Scalar(event.value, event.style is None or event.style == "", self._place(event))
 
     def _sequence(self, event: Any) -> tuple[Node, int, int]:
@@ -120,6 +126,9 @@ class _Composer:
             key, more_keys, _ = self.node()
             value, more, tall = self.node()
             entries.append((key, value))
+            if len(entries) > MOST_ENTRIES:
+                message = f"a mapping has at most {MOST_ENTRIES:,} entries, and here one has more"
+                self._stop(key.place.diagnostic("HS003", message))
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
         if event.flow_style:

@@ -112,7 +112,7 @@ class Mapping:
 
 
 Node = Scalar | Sequence | Mapping
-ABSENT = "\0"  # the value of a scalar that stands for one already reported; no file can contain it
+ABSENT = "\0"  # the value of a scalar that stands for one already reported; no text can contain it, written or escaped
 
 
 def absent(place: Place) -> Scalar:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
+from hsdsl.names import INVISIBLE
 
 LARGEST_FILE = 1 << 20  # bytes
 _BREAK = re.compile("\r\n|\r|\n")
-_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -76,6 +76,7 @@ def decode(path: str, data: bytes) -> Text:
     ModelError
         When it is too large, not UTF-8, or has characters that no model may have.
     """
+    data = data.removeprefix(b"\xef\xbb\xbf")
     if len(data) > LARGEST_FILE:
         raise _refused(path, "HS003", "the file is larger than 1 MiB", "keep data in CSV files and name them in inputs")
     if data.startswith(_OTHER_ENCODINGS):
@@ -100,7 +101,7 @@ def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
 
 def _first_of_each(content: str) -> list[re.Match[str]]:
     first: dict[str, re.Match[str]] = {}
-    for match in _FORBIDDEN.finditer(content):
+    for match in INVISIBLE.finditer(content):
         first.setdefault(match.group(), match)
     return list(first.values())
 
@@ -108,10 +109,6 @@ def _first_of_each(content: str) -> list[re.Match[str]]:
 def _forbidden(text: Text, match: re.Match[str]) -> Diagnostic:
     before = _BREAK.split(text.content[: match.start()])
     span = text.span(len(before), len(before[-1]) + 1)
-    if match.group() == "\ufeff" and match.start() == 0:
-        return text.diagnostic(
-            "HS002", "the file begins with a byte order mark", span, "save it as UTF-8 without a byte order mark"
-        )
     return text.diagnostic(
         "HS002", f"the invisible character U+{ord(match.group()):04X} is not allowed in a model", span, "remove it"
     )

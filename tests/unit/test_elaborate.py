@@ -251,3 +251,17 @@ def test_large_models_are_read_quickly():
     made = system("".join(lines))
     assert len(made.modes) == side**2
     assert time.perf_counter() - began < 20
+
+
+def test_nobody_reads_more_than_five_hundred_errors():
+    parameters = "".join(f"  p{i}: q{i}\n" for i in range(900))
+    modes = "modes: {A: {flow: {x: 1, v: 1}}}\n"
+    assert codes(f"{HEAD}parameters:\n{parameters}{modes}{TAIL}") == ["HS111"] * 500
+
+
+@pytest.mark.parametrize("before", ["\ufeff", "# comment\n", "---\n", "%YAML 1.2\n---\n"])
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("end", ["", "\n", "\n...\n", "\n\n# comment"])
+def test_ways_to_write_a_file(before, line_end, end):
+    text = f"{before}{HEAD}modes: {{A: {{flow: {{x: v, v: -x}}}}}}\n{TAIL.strip()}{end}"
+    assert system(text.replace("\n", line_end)).modes[0].states == ("x", "v")
