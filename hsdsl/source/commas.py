@@ -8,13 +8,15 @@ from __future__ import annotations
 from hsdsl.errors import Findings
 from hsdsl.source.nodes import Node, Place, Scalar
 
+_MOST_PIECES = 100  # of one expression
+
 
 def rejoined_items(items: list[Node], findings: Findings) -> list[Node]:
     """The items of a list in brackets, with what a comma inside parentheses cut apart in one piece."""
     joined: list[Node] = []
     at = 0
     while at < len(items):
-        run = _run(items[at:])
+        run = _run(items[at : at + _MOST_PIECES])
         joined.append(_one(run, findings))
         at += len(run)
     return joined
@@ -27,7 +29,7 @@ def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> li
     while at < len(entries):
         key, value = entries[at]
         pieces: list[Node] = [value]
-        for name, rest in entries[at + 1 :]:
+        for name, rest in entries[at + 1 : at + _MOST_PIECES]:
             if not (isinstance(rest, Scalar) and rest.plain and rest.value == ""):
                 break
             pieces.append(name)

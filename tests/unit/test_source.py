@@ -1,5 +1,7 @@
 """YAML to nodes: the core rules of 1.2, places, caps."""
 
+import time
+
 import pytest
 
 from hsdsl.errors import Findings, ModelError, UsageError
@@ -127,3 +129,9 @@ def test_files_that_cannot_be_read(tmp_path):
     for path in (tmp_path / "no.yaml", tmp_path, "x" * 5000, "a\0b"):
         with pytest.raises(UsageError):
             read_bytes(path)
+
+
+def test_pieces_that_never_close_are_read_in_no_time():
+    began = time.perf_counter()
+    root("a: [" + "min(1, " * 20_000 + "2]")
+    assert time.perf_counter() - began < 5
