@@ -1,0 +1,117 @@
+"""A whole program as one C file: every routine once, and the tables that `runtime/c/hs.h` declares.
+
+Modes of a large model often have the same routines up to their names; equal texts become one function.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Sequence
+from itertools import count
+from textwrap import dedent
+
+from hsdsl.backends.c.printer import function_body
+from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines
+
+_DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
+_HEAD = """\
+/* Generated from a model; see hs.h for what the tables mean. */
+
+#include "hs.h"
+#include "hs_math.h"
+
+"""
+_FUNCTION = """\
+static int {name}(const double *restrict p, double t, const double *restrict x, double *restrict out) {{
+  int bad = 0;
+  (void)p, (void)t, (void)x, (void)out;
+{body}
+  return bad;
+}}
+"""
+
+
+def model_source(program: Program) -> str:
+    """Write a program as C99, to be compiled together with the headers of `hsdsl/runtime/c`."""
+    writer = _Writer(program)
+    modes = [writer.mode(k, mode) for k, mode in enumerate(program.modes)]
+    table = writer.table("hs_mode", "modes", modes)
+    model = (
+        f"extern const hs_model hs_the_model;\n"
+        f"HS_EXPORT const hs_model hs_the_model = {{{len(modes)}, {width(program)}, "
+        f"{max(len(m.edges) + len(m.walls) for m in program.modes)}, {max(len(m.edges) for m in program.modes)}, "
+        f"{len(program.outputs)}, {len(writer.data)}, {table}}};\n"
+    )
+    return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
+
+
+def width(program: Program) -> int:
+    """How many states the largest mode has; one without a flow has those it is entered with."""
+    entered = (len(edge.target_states) for mode in program.modes for edge in mode.edges)
+    return max((len(program.initial_states), *(len(mode.states) for mode in program.modes), *entered))
+
+
+class _Writer:
+    def __init__(self, program: Program) -> None:
+        names = [f"p{i}" for i in range(len(program.parameters))]
+        names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
+        self.data = {name: f"p[{i}]" for i, name in enumerate(names)}
+        self.functions: dict[str, str] = {}  # by the routine's text
+        self.tables: list[str] = []
+        self._names: dict[str, str] = {}
+        self._tables: dict[tuple[str, str], str] = {}
+        self._count = count()
+
+    def mode(self, index: int, mode: ModeProgram) -> str:
+        routine = self.routines(mode.routines)
+        surfaces = range(len(mode.edges) + len(mode.walls))
+        edges = [self.edge(k, edge, mode, routine) for k, edge in enumerate(mode.edges)]
+        fields = [
+            *map(str, (len(mode.states), len(mode.edges), len(surfaces), int(mode.final))),
+            *(routine[name] for name in ("flow", "surfaces", "magnitudes", "outputs")),
+            self.pointers(routine[f"gradient_{k}"] for k in surfaces),
+            self.pointers(routine[f"rate_{k}"] for k in surfaces),
+            self.table("hs_edge", f"edges_{index}", edges),
+        ]
+        return f"{{{', '.join(fields)}}}"
+
+    def edge(self, k: int, edge: EdgeProgram, mode: ModeProgram, routine: dict[str, str]) -> str:
+        parts = [routine[name] for name in mode.routines.names if name.startswith(f"condition_{k}_")]
+        numbers = (edge.target, len(edge.target_states), int(edge.conditional), edge.priority, len(parts))
+        return (
+            f"{{{', '.join(map(str, numbers))}, {self.pointers(parts)}, "
+            f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}}}"
+        )
+
+    def pointers(self, names: Iterable[str]) -> str:
+        return self.table("hs_routine *", "routines", list(names))
+
+    def table(self, kind: str, name: str, rows: Sequence[str]) -> str:
+        """Write a constant array, once for each content; C has no empty ones."""
+        if not rows:
+            return "0"
+        key = kind, ",\n  ".join(rows)
+        if key not in self._tables:
+            self._tables[key] = f"{name}_{next(self._count)}"
+            kind = "hs_routine *const" if kind == "hs_routine *" else f"const {kind}"
+            self.tables.append(f"static {kind} {self._tables[key]}[] = {{\n  {key[1]}}};\n")
+        return self._tables[key]
+
+    def routines(self, routines: Routines) -> dict[str, str]:
+        """Write a mode's routines; returns their names in C."""
+        return {name: self.function(text) for name, text in _DEFINITION.findall(routines.source)}
+
+    def function(self, text: str) -> str:
+        if text not in self.functions:
+            self._names[text] = name = f"routine_{len(self.functions)}"
+            definition = ast.parse(dedent(f"    def routine{text}")).body[0]
+            assert isinstance(definition, ast.FunctionDef)
+            body = function_body(definition, self.data | _arguments(definition))
+            self.functions[text] = _FUNCTION.format(name=name, body=body)
+        return self._names[text]
+
+
+def _arguments(definition: ast.FunctionDef) -> dict[str, str]:
+    time, *others = (argument.arg for argument in definition.args.args)
+    return {time: time} | {name: f"x[{i}]" for i, name in enumerate(others)}

@@ -1,0 +1,54 @@
+/* Where generated code meets the hand-written runtime.
+
+   A model is generated as straight-line routines and constant tables of them; this header is all that either side
+   knows of the other. A routine has a value (0 is returned and `out` is written) or it has none (anything else is
+   returned), exactly where the Python kernel raises. `p` holds parameter values, then (a, b, c) of each sampled input's
+   segment; `x` the states, in a spread routine followed by their sizes; `out` must not overlap them. */
+
+#ifndef HS_H
+#define HS_H
+
+#if defined(_WIN32)
+#define HS_EXPORT __declspec(dllexport)
+#else
+#define HS_EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef int hs_routine(const double *p, double t, const double *x, double *out);
+
+typedef struct {
+  int target;           /* index of the target mode */
+  int target_dimension; /* number of states it is entered with */
+  int conditional;      /* whether it has an `if` */
+  int priority;
+  int parts; /* of the condition, which holds where all parts do */
+  hs_routine *const *condition;
+  hs_routine *reset;
+  hs_routine *spread;
+} hs_edge;
+
+typedef struct {
+  int dimension;
+  int edges;
+  int surfaces; /* edges first, then walls */
+  int final;
+  hs_routine *flow;
+  hs_routine *values; /* of the surfaces */
+  hs_routine *magnitudes;
+  hs_routine *outputs;
+  hs_routine *const *gradients;
+  hs_routine *const *rates;
+  const hs_edge *edge;
+} hs_mode;
+
+typedef struct {
+  int modes;
+  int width;    /* states of the largest mode */
+  int surfaces; /* of the mode with most */
+  int edges;    /* of the mode with most */
+  int outputs;
+  int data; /* numbers in `p` */
+  const hs_mode *mode;
+} hs_model;
+
+#endif

@@ -1,0 +1,84 @@
+"""The C compiler: ``CC``, else `cc`, `gcc` or `clang`, else the one inside the package `ziglang`."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+NAMES = ("cc", "gcc", "clang")
+EXACT = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",  # no a*b + c in one rounding
+    "-fno-math-errno",
+    *(f"-fno-builtin-{name}" for name in (*EXACT, "exp", "log", "pow", "atan2")),  # those of the library, as Python's
+    "-fPIC",
+    "-fvisibility=hidden",
+    "-shared",
+)
+
+
+class NoCompiler(Exception):
+    """There is no C compiler, or it does not do its work; the message says which."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A command that compiles C, and what tells it from another one."""
+
+    command: tuple[str, ...]
+    identity: str
+
+    def build(self, sources: Sequence[Path], includes: Sequence[Path], target: Path) -> None:
+        """Compile sources to a shared library.
+
+        Raises
+        ------
+        NoCompiler
+            It fails; the message holds the first line of what it says.
+        """
+        command = [*self.command, *FLAGS, *(f"-I{folder}" for folder in includes), "-o", str(target)]
+        command += [*map(str, sources), "-lm"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        except OSError as error:
+            raise NoCompiler(f"{self.command[0]} cannot be run: {error.strerror}") from None
+        if done.returncode:
+            said = next(iter(done.stderr.strip().splitlines()), f"exit code {done.returncode}")
+            raise NoCompiler(f"{' '.join(self.command)} failed: {said}")
+
+
+def find_compiler() -> Compiler:
+    """Return the compiler that is used here.
+
+    Raises
+    ------
+    NoCompiler
+        None was found, or ``CC`` names none.
+    """
+    if given := shlex.split(os.environ.get("CC", "")):
+        path = shutil.which(given[0])
+        if path is None:
+            raise NoCompiler(f"CC is {given[0]}, which is not there")
+        return Compiler(tuple(given), _identity(path, given[1:]))
+    for name in NAMES:
+        if path := shutil.which(name):
+            return Compiler((path,), _identity(path))
+    if spec := importlib.util.find_spec("ziglang"):
+        return Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(str(spec.origin)))
+    raise NoCompiler("no C compiler was found (cc, gcc, clang, or the package ziglang: pip install 'hsdsl[compiler]')")
+
+
+def _identity(path: str, arguments: Sequence[str] = ()) -> str:
+    """Tell a compiler from another by its file: to ask it for its version would start a process in every run."""
+    file = Path(path).resolve()
+    status = file.stat()
+    return f"{file} {status.st_size} {status.st_mtime_ns} {' '.join(arguments)}"

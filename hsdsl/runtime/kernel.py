@@ -1,0 +1,116 @@
+"""A program's compiled routines as a `Kernel`: what the Python loop takes in place of the Python kernel.
+
+A call goes through ctypes and costs more than the Python routine would; this kernel is here to tell a fault of the code
+generator from one of the compiled loop. Constants and diagnoses are evaluated by the Python kernel in every engine.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+
+from hsdsl.arithmetic import FLOAT64, Number
+from hsdsl.backends.c import model_source
+from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
+from hsdsl.kernel import Routine, Vector
+from hsdsl.program import Program
+from hsdsl.runtime.library import load
+
+Address = int | None
+Double = ctypes.c_double
+Doubles = ctypes.POINTER(ctypes.c_double)
+RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Doubles)
+
+
+class EdgeTable(ctypes.Structure):
+    """``hs_edge``."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("target", "target_dimension", "conditional", "priority", "parts")),
+        ("condition", ctypes.POINTER(ctypes.c_void_p)),
+        ("reset", ctypes.c_void_p),
+        ("spread", ctypes.c_void_p),
+    )
+
+
+class ModeTable(ctypes.Structure):
+    """``hs_mode``."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("dimension", "edges", "surfaces", "final")),
+        *((name, ctypes.c_void_p) for name in ("flow", "values", "magnitudes", "outputs")),
+        ("gradients", ctypes.POINTER(ctypes.c_void_p)),
+        ("rates", ctypes.POINTER(ctypes.c_void_p)),
+        ("edge", ctypes.POINTER(EdgeTable)),
+    )
+
+
+class ModelTable(ctypes.Structure):
+    """``hs_model``."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data")),
+        ("mode", ctypes.POINTER(ModeTable)),
+    )
+
+
+class CompiledModel:
+    """A program compiled to a library: ``table`` is its ``hs_model``."""
+
+    def __init__(self, program: Program) -> None:
+        sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
+        self._library = load(repr((sizes, program.modes)), lambda: model_source(program))
+        self.table = ModelTable.in_dll(self._library, "hs_the_model")
+
+
+class CompiledKernel:
+    """A compiled program, for the Python loop."""
+
+    def __init__(self, program: Program, compiled: CompiledModel) -> None:
+        self.arithmetic = FLOAT64
+        self._program, self._compiled = program, compiled
+        self._python = PythonKernel(program, FLOAT64)
+
+    def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
+        """Evaluate one of ``Program.constants``' routines at parameter values."""
+        return self._python.constant(name, parameters)
+
+    def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
+        """Return a mode's expressions one by one, named for a person."""
+        return self._python.expressions(mode, data)
+
+    def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
+        """Bind a mode to parameter values and input segments."""
+        table, outputs = self._compiled.table.mode[mode], len(self._program.outputs)
+        n, m = table.dimension, table.surfaces
+        numbers = (Double * max(1, len(data)))(*data)
+        edges = [table.edge[k] for k in range(table.edges)]
+
+        def bound(address: Address, results: int, arguments: int = n) -> Routine:
+            return _routine(address, numbers, arguments, results)
+
+        return PythonMode(
+            flow=bound(table.flow, n),
+            surfaces=bound(table.values, m),
+            magnitudes=bound(table.magnitudes, m),
+            outputs=bound(table.outputs, outputs),
+            gradients=tuple(bound(table.gradients[k], n + 1) for k in range(m)),
+            rates=tuple(bound(table.rates[k], 1) for k in range(m)),
+            conditions=tuple(conjunction([bound(e.condition[i], 1) for i in range(e.parts)]) for e in edges),
+            resets=tuple(bound(e.reset, e.target_dimension) for e in edges),
+            spreads=tuple(bound(e.spread, e.target_dimension, 2 * n) for e in edges),
+        )
+
+
+def _routine(address: Address, data: ctypes.Array[Double], arguments: int, results: int) -> Routine:
+    assert address is not None
+    function = RoutinePointer(address)
+    given, found = (Double * max(1, arguments)), (Double * max(1, results))
+
+    def call(t: Number, *x: Number) -> Vector:
+        out = found()
+        if function(data, t, given(*x), out):
+            raise ValueError("no finite value")
+        return tuple(out[:results])
+
+    return call

@@ -1,0 +1,105 @@
+"""The compiled kernel against the Python kernel, to the bit: the same values, and none at the same points."""
+
+from __future__ import annotations
+
+import ast
+from itertools import product
+
+import pytest
+from engines import needs_compiler, outcome
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.backends.c.printer import function_body
+from hsdsl.backends.python import PythonKernel
+from hsdsl.elaborate import elaborate
+from hsdsl.functions import FUNCTIONS
+from hsdsl.kernel import ModeKernel
+from hsdsl.model import Model
+from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+
+pytestmark = needs_compiler
+SPECIAL = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, 3.0, 710.0, -746.0, 1e-310, 1e200, -1e308, float("inf"), float("nan")]
+NUMBERS = st.one_of(st.sampled_from([*SPECIAL, -SPECIAL[-2]]), st.floats())
+ONE = [name for name, (_, least, most) in FUNCTIONS.items() if most == 1]
+TWO = [name for name, (_, least, most) in FUNCTIONS.items() if least == 2]
+LEAVES = st.sampled_from(["x", "v", "a", "t", "u", "1/3", "0.7", "2", "pi", "1e300"])
+
+
+def _grown(inner):
+    return st.one_of(
+        st.builds("{}({})".format, st.sampled_from(ONE), inner),
+        st.builds("{}({}, {})".format, st.sampled_from(TWO), inner, inner),
+        st.builds("({}) {} ({})".format, inner, st.sampled_from(["+", "-", "*", "/", "**"]), inner),
+        st.builds("({})**{}".format, inner, st.sampled_from(["2", "3", "8", "9", "-1", "-2", "0.5", "1.5", "-0.5"])),
+        st.builds("-({})".format, inner),
+    )
+
+
+EXPRESSIONS = st.recursive(LEAVES, _grown, max_leaves=6)
+CONDITIONS = st.builds(
+    "{} > {} {} {} <= 1/{}".format, EXPRESSIONS, LEAVES, st.sampled_from(["and", "or"]), LEAVES, LEAVES
+)
+
+
+def kernels(flow: str, guard: str, condition: str) -> tuple[ModeKernel, ModeKernel] | None:
+    text = f"""
+hsdsl: 1
+parameters: {{a: 0.35}}
+inputs: {{u: {{times: [0, 10], values: [1, 3], hold: linear}}}}
+modes:
+  m:
+    flow: {{x: "{flow}", v: "1 - x*v/4"}}
+    transitions: [{{when: "{guard} >= v/3", if: "{condition}", to: m, reset: {{x: "{flow}", v: x}}}}]
+outputs: {{y: "{flow}"}}
+initial: {{mode: m, x: 0, v: 0}}
+experiment: {{until: 1}}
+"""
+    try:
+        program = Model(elaborate("random.yaml", text=text.encode())).program
+    except Exception:  # the language refuses what has no value anywhere, such as 1/0
+        return None
+    data = [0.35, 1.0, 0.2, 0.0]
+    both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
+    return both[0].bind(0, data), both[1].bind(0, data)
+
+
+def routines(mode: ModeKernel) -> list:
+    several = (*mode.gradients, *mode.rates, *mode.conditions, *mode.resets)
+    return [mode.flow, mode.surfaces, mode.magnitudes, mode.outputs, *several]
+
+
+@settings(max_examples=40, deadline=None)
+@given(EXPRESSIONS, EXPRESSIONS, CONDITIONS, st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=20, max_size=20))
+def test_random_routines_agree_at_any_point(flow, guard, condition, points):
+    both = kernels(flow, guard, condition)
+    if both is None:
+        return
+    for python, compiled in zip(*map(routines, both), strict=True):
+        for point in points:
+            assert outcome(compiled, *point) == outcome(python, *point), point
+    for point in points:
+        sizes = tuple(abs(x) for x in point[1:])
+        assert outcome(both[1].spreads[0], *point, *sizes) == outcome(both[0].spreads[0], *point, *sizes)
+
+
+ALONE = [*(f"{name}(x)" for name in ONE), *(f"{name}(x, v)" for name in TWO)]
+ALONE += ["x**v", "x/v", "x**9", "x**-3", "x**0.5", "x**-1.5", "v - -x", "-x*v", "sin(x)/cos(x)", "exp(2.0) + sin(2)*x"]
+
+
+@pytest.mark.parametrize("text", ALONE)
+def test_each_function_and_its_slopes_agree_at_special_points(text):
+    both = kernels(text, text, "x > 0 or v > 0")
+    assert both is not None
+    for python, compiled in zip(*map(routines, both), strict=True):
+        for x, v in product(SPECIAL, SPECIAL):
+            assert outcome(compiled, 0.25, x, v) == outcome(python, 0.25, x, v), (x, v)
+
+
+@pytest.mark.parametrize("text", ["import os", "return (x,)", "return (open(t), )", "return (x.y, )", "return (q_1, )"])
+def test_what_is_no_routine_is_refused(text):
+    definition = ast.parse(f"def routine(t):\n    {text}").body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    with pytest.raises(ValueError):
+        function_body(definition, {"t": "t"})
