@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
+
+Severity = Literal["error", "warning", "note"]
+Decided = Literal["symbolic", "interval", "sampled"]
 
 
 @dataclass(frozen=True, order=True)
@@ -15,14 +19,23 @@ class Span:
     length: int = 1
 
 
+@dataclass(frozen=True, order=True)
+class Edit:
+    """A change of a text: the characters from ``start`` to ``end`` give way to ``replacement``."""
+
+    start: int
+    end: int
+    replacement: str = ""
+
+
 @dataclass(frozen=True)
 class Diagnostic:
-    """One error in a model.
+    """One error in a model, or one finding about it.
 
     Attributes
     ----------
     code : str
-        A stable code, a key of :data:`CODES`.
+        A stable code: a key of :data:`CODES`, or of a lint rule.
     message : str
         One sentence.
     span : Span or None
@@ -31,6 +44,12 @@ class Diagnostic:
         What to write instead, when that is known.
     text : str or None
         The source line that ``span`` points into, for the caret.
+    severity : {"error", "warning", "note"}
+        An error makes the model unusable; warnings and notes are what lint rules find.
+    decided : {"symbolic", "interval", "sampled"} or None
+        How a lint rule came to know.
+    fix : tuple of Edit
+        Changes of the text that remedy it without changing what the model means.
     """
 
     code: str
@@ -38,9 +57,12 @@ class Diagnostic:
     span: Span | None = None
     hint: str | None = None
     text: str | None = field(default=None, compare=False)
+    severity: Severity = "error"
+    decided: Decided | None = None
+    fix: tuple[Edit, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.code not in CODES:
+        if self.severity == "error" and self.code not in CODES:
             raise ValueError(f"unregistered diagnostic code {self.code}")
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,42 @@ from hsdsl.errors import Findings, ModelError, UsageError
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
-from hsdsl.schema import read
-from hsdsl.source import compose, decode, read_bytes
+from hsdsl.schema import Model, read
+from hsdsl.source import Node, Text, compose, decode, read_bytes
 from hsdsl.system import HybridSystem
 
-__all__ = ["elaborate", "parameter_expression"]
+__all__ = ["Reading", "elaborate", "elaborate_with_places", "parameter_expression"]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A hybrid system beside what it was made from, where every part of it has its place.
+
+    The parts correspond by their order: ``system.modes[i].edges[k]`` is the k-th of the transitions of the i-th of
+    ``document.modes``, and likewise for walls, flows and outputs.
+
+    Attributes
+    ----------
+    system : HybridSystem
+        The mathematics.
+    document : Model
+        Keys and scalars as they stand in the file, each with its place.
+    root : Node
+        The nodes of the file, whose mappings and lists have places too.
+    text : Text
+        The file.
+    scopes : dict of str to Scope
+        What names mean in the expressions of each mode.
+    top : Scope
+        What names mean outside the modes.
+    """
+
+    system: HybridSystem
+    document: Model
+    root: Node
+    text: Text
+    scopes: dict[str, Scope]
+    top: Scope
 
 
 def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
@@ -51,11 +83,20 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
     UsageError
         The file cannot be read.
     """
+    return elaborate_with_places(path, text=text).system
+
+
+def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = None) -> Reading:
+    """The hybrid system that a model file describes, beside the places its parts have there.
+
+    Parameters and errors are those of :func:`elaborate`.
+    """
     shown_path = os.fspath(path)
     data = read_bytes(path) if text is None else text
     findings = Findings(shown_path)
     source = decode(shown_path, data)
-    document = read(compose(source, findings), findings)
+    root = compose(source, findings)
+    document = read(root, findings)
     world = World.of(document, Reader(findings), Path(path).parent, shown_path)
     with deep_stack():
         parts = _parts(world)
@@ -63,9 +104,11 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
     digest = hashlib.sha256(b"".join((data, *world.files))).hexdigest()
     title, about = world.text(document.title), world.text(document.source)
     try:
-        return HybridSystem(path=shown_path, digest=digest, title=title, source=about, **parts)
+        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, **parts)
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
+    top = world.scope(("time", "parameters", "inputs", "states", "let"), "")
+    return Reading(system, document, root, source, world.scopes, top)
 
 
 def _parts(world: World) -> dict[str, Any]:

@@ -30,7 +30,7 @@ def _mode(world: World, name: Key, document: ModeDocument, outputs: dict[str, Va
         message = f"the final mode '{name}' has no states of its own, and so neither a domain nor transitions"
         world.reader.add(name.place, "HS315", message, "give it a `flow`, or leave them out")
         return None
-    scope = mode_scope(world, name, document)
+    scope = world.scopes[str(name)] = mode_scope(world, name, document)
     flow = all_of([world.reader.number(scalar, scope) for scalar in (document.flow or {}).values()])
     walls = all_of([surface(world.reader, scalar, scope, "domain") for scalar in document.domain])
     edges = all_of(elaborate_edges(world, name, document, scope))

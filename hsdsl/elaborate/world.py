@@ -29,6 +29,8 @@ class World:
         What each of those names that is defined so far means; ``t`` is there from the start.
     states : dict
         The states of each mode in file order; empty for a final mode without a flow.
+    scopes : dict
+        What names mean in each mode, once it is elaborated.
     files : list of bytes
         The data files that were read.
     """
@@ -40,6 +42,7 @@ class World:
     names: dict[str, str] = field(default_factory=dict)
     values: Values = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    scopes: dict[str, Scope] = field(default_factory=dict)
     files: list[bytes] = field(default_factory=list)
 
     @classmethod

@@ -1,15 +1,14 @@
-"""Diagnostics for a person, as text with a caret, and for a program, as JSON."""
+"""Diagnostics for a person: text with the line and a caret."""
 
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable
-from typing import Any
 
 from hsdsl.errors import Diagnostic
 from hsdsl.names import visible
 
 _WIDEST = 120
+_DECIDED = {None: "", "symbolic": "", "interval": " (decided by intervals)", "sampled": " (decided by samples)"}
 
 
 def render(diagnostic: Diagnostic) -> str:
@@ -24,39 +23,17 @@ def render(diagnostic: Diagnostic) -> str:
     -------
     str
         ``path:line:column: error HS012: sentence``, the source line, a caret under the place, and the hint;
-        without a line break at the end.
+        without a line break at the end. A finding that is known by bounds or from samples says so.
     """
     span = diagnostic.span
     where = f"{span.path}:{span.line}:{span.column}: " if span else ""
-    lines = [f"{where}error {diagnostic.code}: {diagnostic.message}"]
+    decided = _DECIDED[diagnostic.decided]
+    lines = [f"{where}{diagnostic.severity} {diagnostic.code}: {diagnostic.message}{decided}"]
     if span and diagnostic.text is not None:
         lines += _pointed(visible(diagnostic.text), span.column - 1, span.length)
     if diagnostic.hint:
         lines.append(f"  hint: {diagnostic.hint}")
     return "\n".join(lines)
-
-
-def as_json(diagnostics: Iterable[Diagnostic]) -> dict[str, list[dict[str, Any]]]:
-    """The object that ``--json`` prints for a model with errors.
-
-    Returns
-    -------
-    dict
-        ``{"errors": [{"code", "path", "line", "column", "message", "hint"}]}``; what is not known is None.
-    """
-    return {"errors": [_entry(diagnostic) for diagnostic in diagnostics]}
-
-
-def _entry(diagnostic: Diagnostic) -> dict[str, Any]:
-    span = diagnostic.span
-    return {
-        "code": diagnostic.code,
-        "path": span.path if span else None,
-        "line": span.line if span else None,
-        "column": span.column if span else None,
-        "message": diagnostic.message,
-        "hint": diagnostic.hint,
-    }
 
 
 def _pointed(line: str, start: int, length: int) -> list[str]:

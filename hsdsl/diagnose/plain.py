@@ -1,0 +1,43 @@
+"""Diagnostics for a program: plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from hsdsl.errors import Diagnostic
+
+
+def as_json(diagnostics: Iterable[Diagnostic]) -> dict[str, list[dict[str, Any]]]:
+    """The object that ``--json`` prints for a model with errors.
+
+    Returns
+    -------
+    dict
+        ``{"errors": [{"code", "path", "line", "column", "length", "message", "hint"}]}``; what is not known is None.
+    """
+    return {"errors": [entry(diagnostic) for diagnostic in diagnostics]}
+
+
+def entry(diagnostic: Diagnostic) -> dict[str, Any]:
+    """One error as plain data."""
+    span = diagnostic.span
+    return {
+        "code": diagnostic.code,
+        "path": span.path if span else None,
+        "line": span.line if span else None,
+        "column": span.column if span else None,
+        "length": span.length if span else None,
+        "message": diagnostic.message,
+        "hint": diagnostic.hint,
+    }
+
+
+def finding(diagnostic: Diagnostic) -> dict[str, Any]:
+    """One finding of a lint rule as plain data."""
+    return {
+        **entry(diagnostic),
+        "severity": diagnostic.severity,
+        "decided": diagnostic.decided,
+        "fixable": bool(diagnostic.fix),
+    }

@@ -1,0 +1,67 @@
+"""Lint: what is legal in a model and still probably not meant, or worth knowing before it is trusted.
+
+`lint` reads a model, lets every selected rule of `hsdsl.lint.rules` look at it, and sorts out what comments in the
+file ask to ignore.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from hsdsl.elaborate import elaborate_with_places
+from hsdsl.errors import Diagnostic
+from hsdsl.expression.stack import deep_stack
+from hsdsl.lint.finding import Finding
+from hsdsl.lint.ignores import Ignored, sift
+from hsdsl.lint.rules import RULES
+from hsdsl.lint.selection import Selection, configured
+from hsdsl.lint.subject import Subject
+
+__all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "configured", "lint"]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found in one model, in source order, and what its comments ask to ignore."""
+
+    path: str
+    findings: tuple[Diagnostic, ...]
+    ignored: tuple[Ignored, ...]
+
+
+def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, text: bytes | None = None) -> Report:
+    """Let rules look at a model.
+
+    Parameters
+    ----------
+    path : path
+        The model file.
+    selection : Selection, optional
+        The rules to use; all unless given.
+    text : bytes, optional
+        The file's content, where it is not to be read from ``path``.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; rules look only at models without.
+    UsageError
+        The file cannot be read.
+    """
+    subject = Subject(elaborate_with_places(path, text=text))
+    codes = (selection or Selection.of()).codes
+    with deep_stack():
+        found = [diagnostic for code in codes for diagnostic in _findings(subject, code)]
+    findings, ignored = sift(subject, found, codes)
+    return Report(os.fspath(path), findings, ignored)
+
+
+def _findings(subject: Subject, code: str) -> list[Diagnostic]:
+    rule, lines = RULES[code], subject.reading.text.lines
+    if rule.check is None:
+        return []
+    return [
+        Diagnostic(code, f.message, f.span, f.hint, lines[f.span.line - 1], rule.severity, f.decided, f.fix)
+        for f in dict.fromkeys(rule.check(subject))
+    ]

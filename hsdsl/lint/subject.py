@@ -1,0 +1,122 @@
+# pyright: basic
+"""What a rule sees: a model as mathematics, beside the places its parts have in the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from hsdsl import schema
+from hsdsl.elaborate import Reading
+from hsdsl.expression import symbolic
+from hsdsl.expression.scope import symbol
+from hsdsl.expression.syntax import Tree
+from hsdsl.lint.uses import Definition, unused
+from hsdsl.lint.written import Written, written
+from hsdsl.source import Key, Mapping, Node, Sequence
+from hsdsl.system import Edge, HybridSystem, Mode
+
+
+@dataclass(frozen=True)
+class EdgePart:
+    """A transition as mathematics and as written; ``index`` is its position in its mode."""
+
+    edge: Edge
+    document: schema.Transition
+    index: int
+
+
+@dataclass(frozen=True)
+class ModePart:
+    """A mode as mathematics and as written; ``key`` is its name in the file, with its place."""
+
+    mode: Mode
+    document: schema.Mode
+    key: Key
+    edges: tuple[EdgePart, ...]
+
+
+class Subject:
+    """A model to look at. What is derived from it is computed once, and shared by all rules.
+
+    Attributes
+    ----------
+    system : HybridSystem
+        The mathematics; parameters are symbols, `let` and expression inputs are substituted.
+    document : Model
+        Keys and scalars as they stand in the file, each with its place.
+    root : Node
+        The nodes of the file.
+    """
+
+    def __init__(self, reading: Reading) -> None:
+        self.reading = reading
+        self.system: HybridSystem = reading.system
+        self.document: schema.Model = reading.document
+        self.root: Node = reading.root
+
+    @cached_property
+    def modes(self) -> tuple[ModePart, ...]:
+        """Every mode, in file order."""
+        found: list[ModePart] = []
+        for mode, (key, document) in zip(self.system.modes, self.document.modes.items(), strict=True):
+            pairs = zip(mode.edges, document.transitions, strict=True)
+            edges = tuple(EdgePart(edge, transition, i) for i, (edge, transition) in enumerate(pairs))
+            found.append(ModePart(mode, document, key, edges))
+        return tuple(found)
+
+    @cached_property
+    def expressions(self) -> tuple[Written, ...]:
+        """Every expression of the file."""
+        return tuple(written(self.document))
+
+    @cached_property
+    def unused(self) -> frozenset[Definition]:
+        """The parameters, inputs and `let` names that nothing depends on."""
+        return unused(self.document, self.expressions)
+
+    @cached_property
+    def starts(self) -> tuple[str, ...]:
+        """The modes in which runs of this file start: the initial one, and those that a `reference` sets."""
+        set_by = (reference.settings.get("initial.mode") for reference in self.document.reference)  # pyright: ignore
+        names = (self.system.initial.mode, *(scalar.value for scalar in set_by if scalar is not None))
+        return tuple(dict.fromkeys(names))
+
+    @cached_property
+    def reachable(self) -> frozenset[str]:
+        """The modes that transitions lead to from where runs start, taking every transition to be possible."""
+        targets = {mode.name: {edge.target for edge in mode.edges} for mode in self.system.modes}
+        found: set[str] = set()
+        waiting = list(self.starts)
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                waiting.extend(targets[name])
+        return frozenset(found)
+
+    @cached_property
+    def constants(self) -> dict[Any, Any]:
+        """The value of each parameter in this file, exact where it is written exactly: ``expr.subs(constants)``."""
+        found: dict[Any, Any] = {}
+        for parameter in self.system.parameters:
+            found[symbol(parameter.name)] = parameter.value.subs(found)
+        return found
+
+    def value(self, expression: Written, node: Tree | None = None) -> Any:
+        """The SymPy expression of a part of an expression, `let` and inputs substituted."""
+        scope = self.reading.top if expression.mode is None else self.reading.scopes[expression.mode]
+        return symbolic.number(expression.tree if node is None else node, scope, expression.scalar.value).expr
+
+    def node(self, *path: str | int) -> Node | None:
+        """The node that keys and indices lead to, such as ``node("modes", "free", "transitions", 0)``."""
+        node: Node | None = self.root
+        for step in path:
+            if isinstance(node, Mapping) and step in node.entries:
+                node = node.entries[str(step)][1]
+            elif isinstance(node, Sequence) and isinstance(step, int) and step < len(node.items):
+                node = node.items[step]
+            else:
+                return None
+        return node

@@ -1,0 +1,131 @@
+"""The expressions of a model as they are written: what each is for, its tree, and the place of every part of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from hsdsl.errors import Span
+from hsdsl.expression import Wanted, parse
+from hsdsl.expression.syntax import Name, Tree, walk
+from hsdsl.schema import InputFile, InputSamples, Mode, Model, ParameterEntry, Reference
+from hsdsl.source import Scalar
+
+Role = Literal[
+    "parameter",  # the value, or a bound, of the parameter `name`
+    "input",  # the input `name`, or one of its samples
+    "let",  # the named subexpression `name`, of `mode` or of the whole model
+    "flow",  # the derivative of the state `name` in `mode`
+    "domain",  # a wall of `mode`
+    "when",  # the surface of a transition
+    "if",  # its condition
+    "reset",  # its new value of the state `name`
+    "output",  # the output `name`
+    "initial",  # the initial value of the state `name`
+    "experiment",  # the setting `name`
+    "reference",  # a number in `reference`
+]
+_WANTED: dict[Role, Wanted] = {"domain": "inequality", "when": "inequality", "if": "condition"}
+
+
+@dataclass(frozen=True)
+class Written:
+    """One expression of a file.
+
+    Attributes
+    ----------
+    role : str
+        What the expression is for, one of :data:`Role`.
+    scalar : Scalar
+        Its text and place.
+    name : str
+        What it defines; empty for walls, surfaces and conditions.
+    mode : str or None
+        The mode it belongs to.
+    index : int
+        Of `domain`, `when`, `if` and `reset`: which wall or which transition of the mode.
+    """
+
+    role: Role
+    scalar: Scalar
+    name: str = ""
+    mode: str | None = None
+    index: int = -1
+
+    @cached_property
+    def tree(self) -> Tree:
+        """The expression, every node of it with the characters it stands for."""
+        text = self.scalar.value.lower() if self.scalar.kind == "boolean" else self.scalar.value
+        return parse(text, _WANTED.get(self.role, "number"))
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Every name in it."""
+        return frozenset(node.name for node in walk(self.tree) if isinstance(node, Name))
+
+    def span(self, node: Tree | None = None) -> Span:
+        """The place of the expression, or of one node of its tree."""
+        if node is None:
+            return self.scalar.place.span
+        return self.scalar.span(node.start, node.end)
+
+
+def written(document: Model) -> Iterator[Written]:
+    """Every expression of a model, in the order of the language's sections."""
+    for name, entry in document.parameters.items():
+        values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
+        yield from _each("parameter", values, name)
+    for name, entry in document.inputs.items():
+        if isinstance(entry, InputSamples):
+            yield from _each("input", (*entry.times, *entry.values), name)
+        elif not isinstance(entry, InputFile):
+            yield Written("input", entry, name)
+    for name, scalar in document.let.items():
+        yield Written("let", scalar, name)
+    for name, mode in document.modes.items():
+        yield from _of_mode(str(name), mode)
+    for name, scalar in document.outputs.items():
+        yield Written("output", scalar, name)
+    for name, scalar in document.initial.__pydantic_extra__.items():
+        yield Written("initial", scalar, name)
+    experiment = document.experiment
+    for name in ("until", "step", "tolerance", "relaxation", "max_transitions"):
+        yield from _each("experiment", (getattr(experiment, name),), name)
+    samples = experiment.samples
+    yield from _each("experiment", samples if isinstance(samples, list) else (samples,), "samples")
+    for reference in document.reference:
+        yield from _each("reference", _of_reference(reference), "")
+
+
+def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[Written]:
+    return (Written(role, scalar, name) for scalar in scalars if scalar is not None)
+
+
+def _of_mode(name: str, mode: Mode) -> Iterator[Written]:
+    for key, scalar in mode.let.items():
+        yield Written("let", scalar, key, name)
+    for key, scalar in (mode.flow or {}).items():
+        yield Written("flow", scalar, key, name)
+    for index, scalar in enumerate(mode.domain):
+        yield Written("domain", scalar, "", name, index)
+    for index, transition in enumerate(mode.transitions):
+        yield Written("when", transition.when, "", name, index)
+        if transition.condition is not None:
+            yield Written("if", transition.condition, "", name, index)
+        for key, scalar in transition.reset.items():
+            yield Written("reset", scalar, key, name, index)
+
+
+def _of_reference(reference: Reference) -> Iterator[Scalar | None]:
+    words = ("initial.mode", "experiment.scheme", "experiment.method")
+    yield from (scalar for key, scalar in reference.settings.items() if key not in words)
+    yield reference.trust
+    for event in reference.transitions:
+        if isinstance(event, Scalar):
+            yield event
+        else:
+            yield from (event.time, *event.before.values(), *event.after.values())
+    for state in reference.states:
+        yield from (state.time, *state.__pydantic_extra__.values())
