@@ -195,8 +195,10 @@ def integrator_page() -> str:
     ]
     for name, method in methods.items():
         between = INTERPOLANTS[method.interpolant].format(order=method.dense_order)
-        error = f"; embedded method of order {method.order - 1}" if method.adaptive else ""
-        parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.\n\n")
+        error = f"; embedded method of order {method.estimated_order}" if method.adaptive else ""
+        error += f", and a coarser one of order {method.estimated_order - 2}" if method.coarse else ""
+        known = "" if method.digits is None else f" Coefficients of {method.digits} digits."
+        parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.{known}\n\n")
         parts.append(f"Source: {method.source}.\n\n{tableau(method)}")
     return "".join(parts)
 
@@ -205,11 +207,18 @@ def tableau(method: ButcherTableau) -> str:
     """Write a Butcher tableau, and the dense output's weights where there are any."""
     stages = [f"k{i + 1}" for i in range(method.stages)]
     triangle = zip(method.c, method.a, strict=True)
-    rows = [weights(f"**{c}**", row) + [""] * (method.stages - len(row)) for c, row in triangle]
+    rows = [weights(f"**{node(c)}**", row) + [""] * (method.stages - len(row)) for c, row in triangle]
     rows.append(weights("**b**", method.b))
     if method.embedded is not None:
         rows.append(weights("**b̂**", method.embedded))
+    if method.coarse is not None:
+        rows.append(weights("**coarser**", method.coarse))
     text = table(["c", *stages], rows)
+    if method.extra:
+        extended = [f"k{i + 1}" for i in range(len(method.rows))]
+        text += f"{extended[method.stages]} is the flow at the step's end. For the dense output only:\n\n"
+        text += table(["c", *extended], [weights(f"**{node(sum(row))}**", row) for row in method.extra])
+        stages = extended
     if method.dense is not None:
         text += "Dense output: each stage's weight as a polynomial in s = (t - t_k)/h.\n\n"
         powers = [f"s^{m + 1}" for m in range(len(method.dense[0]))]
@@ -217,9 +226,14 @@ def tableau(method: ButcherTableau) -> str:
     return text
 
 
+def node(value: Any) -> str:
+    """Write a fraction, or a decimal where a fraction would be long."""
+    return str(value) if value.denominator < 10**20 else f"{float(value):.17g}"
+
+
 def weights(label: str, row: Iterable[Fraction]) -> list[str]:
     """Make a table row of exact weights."""
-    return [label, *(str(value) for value in row)]
+    return [label, *(node(value) for value in row)]
 
 
 PAGES: dict[str, Callable[[], str]] = {

@@ -31,14 +31,15 @@ class Stepper:
         ``step(flow, t, h, x, slope) -> (z, stages)``; ``slope = flow(t, *x)`` is the first stage. A last stage that is
         the flow at the step's end is not evaluated.
     piece : callable
-        ``piece(h, x, z, stages, slope, end) -> (c_1, ...)`` with ``end = flow(t + h, *z)``: the interpolant.
+        ``piece(flow, t, h, x, z, stages, slope, end) -> (c_1, ...)`` with ``end = flow(t + h, *z)``: the interpolant.
+        The flow is asked only where the dense output has stages of its own.
     error : callable or None
         ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
     """
 
     table: ButcherTableau
     step: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]]
-    piece: Callable[[Number, State, State, Stages, State, State], Polynomial]
+    piece: Callable[[Flow, Number, Number, State, State, Stages, State, State], Polynomial]
     error: Callable[[Number, Stages, State], State] | None
 
 
@@ -62,12 +63,25 @@ def hermite(h: Number, x: State, z: State, slope: State, end: State) -> Polynomi
     return first, second, third
 
 
+def sharpened(fine: Number, coarse: Number, sqrt: Callable[[Number], Number]) -> Number:
+    """One error estimate of two: e**2 / sqrt(e**2 + c**2 / 100) (Hairer, Norsett, Wanner, II.10)."""
+    square = fine * fine
+    total = square + coarse * coarse / 100
+    return square / sqrt(total) if total > 0 else square
+
+
 class _Writer:
     def __init__(self, table: ButcherTableau, dimension: int, arithmetic: Arithmetic) -> None:
         self.table, self.arithmetic = table, arithmetic
         self.states = range(dimension)
-        self.namespace: dict[str, Any] = {"__builtins__": {}, "hermite": hermite}
+        self.namespace: dict[str, Any] = {
+            "__builtins__": {},
+            "hermite": hermite,
+            "sharpened": sharpened,
+            "sqrt": arithmetic.sqrt,
+        }
         self.evaluated = table.stages - table.last_is_next
+        self.smallest = 0 if table.digits is None else Fraction(1, 10**table.digits)
 
     def compile(self, name: str, lines: list[str]) -> Any:
         exec(compile("\n    ".join(lines) + "\n", f"<hsdsl {self.table.name} {name}>", "exec"), self.namespace)
@@ -90,7 +104,7 @@ class _Writer:
         return " + ".join(terms) or self.number(Fraction(0))
 
     def stage(self, i: int, state: int) -> str:
-        return f"g{state}" if i >= self.evaluated else f"k{i}_{state}"
+        return f"g{state}" if i == self.evaluated else f"k{i}_{state}"
 
     def row(self, letter: str) -> str:
         return self.tuple(f"{letter}{s}" for s in self.states)
@@ -108,16 +122,20 @@ class _Writer:
         if self.states:
             lines += [f"{self.row('x')} = x", f"{self.row('k0_')} = k0"]
         for i in range(1, self.evaluated):
-            c = self.table.c[i]
-            time = "t + h" if c == 1 else f"t + {self.number(c)}*h"
-            at = [f"x{s} + h*({self.weighted(self.table.a[i], s)})" for s in self.states]
-            lines.append(f"k{i} = flow({', '.join([time, *at])})")
-            lines += [f"{self.row(f'k{i}_')} = k{i}"] if self.states else []
+            lines += self.evaluation(i, self.table.a[i])
         z = self.tuple(f"x{s} + h*({self.weighted(self.table.b, s)})" for s in self.states)
         return [*lines, f"return {z}, {self.tuple(f'k{i}' for i in range(self.evaluated))}"]
 
+    def evaluation(self, i: int, row: tuple[Fraction, ...]) -> list[str]:
+        """Write the evaluation of one stage."""
+        c = sum(row, Fraction(0))
+        time = "t + h" if abs(c - 1) <= self.smallest else f"t + {self.number(c)}*h"
+        at = [f"x{s} + h*({self.weighted(row, s)})" for s in self.states]
+        unpack = [f"{self.row(f'k{i}_')} = k{i}"] if self.states else []
+        return [f"k{i} = flow({', '.join([time, *at])})", *unpack]
+
     def piece(self) -> list[str]:
-        lines = ["def piece(h, x, z, k, f, g):"]
+        lines = ["def piece(flow, t, h, x, z, k, f, g):"]
         if self.table.interpolant == "hermite":
             return [*lines, "return hermite(h, x, z, f, g)"]
         if self.table.dense is None:
@@ -125,6 +143,9 @@ class _Writer:
             return [*lines, *unpack, f"return ({self.tuple(f'z{s} - x{s}' for s in self.states)},)"]
         if self.states:
             lines += [*self.unpack(range(self.evaluated)), f"{self.row('g')} = g"]
+            lines += [f"{self.row('x')} = x"] if self.table.extra else []
+        for i, row in enumerate(self.table.extra, self.evaluated + 1):
+            lines += self.evaluation(i, row)
         powers = [
             self.tuple(f"h*({self.weighted(weights, s)})" for s in self.states)
             for weights in zip(*self.table.dense, strict=True)
@@ -135,6 +156,14 @@ class _Writer:
         lines = ["def error(h, k, g):"]
         if self.states:
             lines += [*self.unpack(range(self.evaluated)), f"{self.row('g')} = g"]
-        assert self.table.embedded is not None
-        difference = tuple(b - e for b, e in zip(self.table.b, self.table.embedded, strict=True))
-        return [*lines, f"return {self.tuple(f'h*({self.weighted(difference, s)})' for s in self.states)}"]
+        fine, coarse = self.differences(self.table.embedded), self.differences(self.table.coarse)
+        if coarse:
+            fine = [f"sharpened({e}, {c}, sqrt)" for e, c in zip(fine, coarse, strict=True)]
+        return [*lines, f"return {self.tuple(fine)}"]
+
+    def differences(self, embedded: tuple[Fraction, ...] | None) -> list[str]:
+        """Write the method less an embedded one, for each state."""
+        if embedded is None:
+            return []
+        weights = tuple(b - e for b, e in zip(self.table.b, embedded, strict=True))
+        return [f"h*({self.weighted(weights, s)})" for s in self.states]

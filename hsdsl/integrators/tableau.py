@@ -2,25 +2,27 @@
 
 The order conditions (one for each rooted tree, Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*,
 II.2, doi:10.1007/978-3-540-78862-1) are evaluated in exact arithmetic, for the method, its embedded method and its
-dense output. A wrong digit does not survive import.
+dense output. A wrong digit does not survive import. A table whose coefficients are known as decimals only says to how
+many digits its conditions hold; it is checked to those.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement
 from math import prod
-from typing import Literal
+from typing import Any, Literal
 
 Vector = tuple[Fraction, ...]
 Tree = tuple["Tree", ...]  # a rooted tree is the multiset of its root's subtrees
 
 
 def fractions(text: str) -> Vector:
-    """Read a row of a table: fractions between blanks."""
+    """Read a row of a table: fractions or decimals between blanks."""
     return tuple(Fraction(word) for word in text.split())
 
 
@@ -33,17 +35,27 @@ class ButcherTableau:
     name, title : str
         Short name for models and the command line; a line for people.
     order : int
-        Order of ``b``, checked up to order 5.
+        Order of ``b``, checked.
     a : tuple of Vector
         Strictly lower triangle: row i has i entries.
     b : Vector
         Weights, one a stage.
     embedded : Vector or None
-        Weights of the embedded method, of order ``order - 1``; with it the method is adaptive.
+        Weights of the embedded method; with it the method is adaptive.
+    embedded_order : int
+        Order of the embedded method, checked; 0 stands for ``order - 1``.
+    coarse : Vector or None
+        Weights of a second embedded method, two orders below the first. With e and c the differences of the two to the
+        method, the error estimate is then e**2 / sqrt(e**2 + c**2 / 100), of order ``order``.
     dense : tuple of Vector or None
         Row i are the coefficients of s, s**2, ... in the weight b_i(s) of the dense output.
     dense_order : int
         Order of the dense output, checked.
+    extra : tuple of Vector
+        Further rows of a, for stages that the dense output alone uses. Before them stands the flow at the step's end,
+        so the first has one entry more than there are stages.
+    digits : int or None
+        Decimal digits to which the conditions hold; None for exact fractions.
     source : str
         Where the table comes from.
 
@@ -60,29 +72,47 @@ class ButcherTableau:
     b: Vector
     source: str
     embedded: Vector | None = None
+    embedded_order: int = 0
+    coarse: Vector | None = None
     dense: tuple[Vector, ...] | None = None
     dense_order: int = 0
+    extra: tuple[Vector, ...] = ()
+    digits: int | None = None
 
     def __post_init__(self) -> None:
-        if [len(row) for row in self.a] != list(range(self.stages)):
+        if [len(row) for row in self.rows] != list(range(len(self.rows))):
             raise ValueError(f"{self.name}: a must be a strictly lower triangle of {self.stages} rows")
-        self._check("b", (self.b,), self.order)
-        if self.embedded is not None:
-            self._check("embedded", (self.embedded,), self.order - 1)
-        if self.dense is not None:
-            self._check("dense", tuple(zip(*self.dense, strict=True)), self.dense_order)
+        with localcontext(Context(prec=(self.digits or 0) + 20)):
+            weights = _Weights(self.rows, self.digits)
+            self._check("b", (self.b,), self.order, weights)
+            if self.embedded is not None:
+                self._check("embedded", (self.embedded,), self.estimated_order, weights)
+            if self.coarse is not None:
+                self._check("coarse", (self.coarse,), self.estimated_order - 2, weights)
+            if self.dense is not None:
+                self._check("dense", tuple(zip(*self.dense, strict=True)), self.dense_order, weights)
 
-    def _check(self, what: str, powers: tuple[Vector, ...], order: int) -> None:
+    def _check(self, what: str, powers: tuple[Vector, ...], order: int, weights: _Weights) -> None:
         """Check weights sum_m s**m powers[m-1]: at s = 1 alone if there is one power, else for every s."""
-        if any(len(row) != self.stages for row in powers):
+        if any(len(row) != (self.stages if len(powers) == 1 else len(self.rows)) for row in powers):
             raise ValueError(f"{self.name}: {what} must have {self.stages} weights")
+        rows = [weights.numbers(row) for row in powers]
         for size in range(1, order + 1):
             for tree in trees(size):
-                weights = self.elementary_weights(tree)
-                for m, row in enumerate(powers, 1):
+                for m, row in enumerate(rows, 1):
                     wanted = Fraction(1, density(tree)) if len(powers) == 1 or m == size else Fraction(0)
-                    if sum(w * g for w, g in zip(row, weights, strict=True)) != wanted:
+                    if not weights.satisfy(row, tree, wanted):
                         raise ValueError(f"{self.name}: {what} fails the order condition of tree {tree}")
+
+    @property
+    def rows(self) -> tuple[Vector, ...]:
+        """All rows of a: of the stages, and behind them of what the dense output evaluates besides."""
+        return (*self.a, self.b, *self.extra) if self.extra else self.a
+
+    @property
+    def estimated_order(self) -> int:
+        """Order of the embedded method."""
+        return self.embedded_order or self.order - 1
 
     @property
     def stages(self) -> int:
@@ -111,14 +141,43 @@ class ButcherTableau:
             return "dense"
         return "hermite" if self.order > 2 else "secant"
 
-    def elementary_weights(self, tree: Tree) -> Vector:
+    @property
+    def degree(self) -> int:
+        """Degree of the interpolant in s; 0 for the straight line, which needs no coefficients."""
+        if self.dense is not None:
+            return len(self.dense[0])
+        return 3 if self.order > 2 else 0
+
+
+class _Weights:
+    """The elementary weights of rooted trees, in fractions or in decimals of more digits than are asked for."""
+
+    def __init__(self, rows: tuple[Vector, ...], digits: int | None) -> None:
+        self._digits = digits
+        self._rows = tuple(self.numbers(row) for row in rows)
+        self._known: dict[Tree, tuple[Any, ...]] = {}
+
+    def satisfy(self, row: tuple[Any, ...], tree: Tree, wanted: Fraction) -> bool:
+        """Whether sum_i row_i g_i(tree) is what is wanted."""
+        total = sum((w * g for w, g in zip(row, self._of(tree), strict=False)), self._number(Fraction(0)))
+        off = abs(total - self._number(wanted))
+        return off == 0 if self._digits is None else off <= Decimal(10) ** -self._digits
+
+    def _of(self, tree: Tree) -> tuple[Any, ...]:
         """Evaluate the product over subtrees of sum_k a_ik g_k, for each stage i."""
-        below = [self.elementary_weights(subtree) for subtree in tree]
+        if tree not in self._known:
+            zero, one = self._number(Fraction(0)), self._number(Fraction(1))
+            below = [self._of(subtree) for subtree in tree]
+            sums = [[sum((a * g for a, g in zip(row, v, strict=False)), zero) for v in below] for row in self._rows]
+            self._known[tree] = tuple(prod(values, start=one) for values in sums)
+        return self._known[tree]
 
-        def weighted(row: Vector, values: Vector) -> Fraction:
-            return sum((a * g for a, g in zip(row, values, strict=False)), Fraction(0))
+    def _number(self, value: Fraction) -> Any:
+        return value if self._digits is None else Decimal(value.numerator) / Decimal(value.denominator)
 
-        return tuple(prod((weighted(row, values) for values in below), start=Fraction(1)) for row in self.a)
+    def numbers(self, row: Vector) -> tuple[Any, ...]:
+        """Convert a row to the kind of number that is computed with."""
+        return tuple(map(self._number, row))
 
 
 @cache

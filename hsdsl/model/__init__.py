@@ -19,7 +19,7 @@ from hsdsl.integrators import INTEGRATORS
 from hsdsl.lower import lower
 from hsdsl.model.estimate import Estimate, compare, finer_settings
 from hsdsl.model.mechanical import one_stop
-from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
+from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
 from hsdsl.names import did_you_mean
@@ -254,6 +254,7 @@ class Model:
         most = number("max_transitions")
         if most < 0 or most != int(most):
             raise UsageError(f"max_transitions must be a whole number, not {most}")
+        check_digits(request.method, values.kernel.arithmetic)
         return Settings(
             scheme=request.scheme,
             method=request.method,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from hsdsl.arithmetic import Arithmetic
 from hsdsl.errors import UsageError
 from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
 from hsdsl.names import did_you_mean
@@ -127,4 +128,15 @@ def _method(asked: Asked, size_asked: Asked, size: str) -> ButcherTableau:
     raise UsageError(
         f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",
         "give a step, or use method 'auto'",
+    )
+
+
+def check_digits(method: ButcherTableau | None, arithmetic: Arithmetic) -> None:
+    """Refuse a method whose coefficients have fewer digits than a run computes with."""
+    if method is None or method.digits is None or (arithmetic.digits or 0) <= method.digits:
+        return
+    raise UsageError(
+        f"the coefficients of method '{method.name}' are known to {method.digits} digits, too few for a precision of "
+        f"{arithmetic.digits}",
+        f"use method '{AUTO}', whose coefficients are exact",
     )

@@ -37,7 +37,6 @@ from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.timeline import make_timeline
 
 SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed, "paoli-schatzman": paoli_schatzman}
-_DEGREE = {"secant": 0, "hermite": 3, "dense": 4}
 
 __all__ = ["SCHEMES", "Settings", "simulate"]
 
@@ -58,7 +57,7 @@ def simulate(
     An interrupt (Ctrl-C) ends the run with what was computed.
     """
     timeline = make_timeline(program, kernel, parameters, settings.until)
-    degree = _DEGREE[settings.method.interpolant] if settings.method else 0
+    degree = settings.method.degree if settings.method else 0
     recorder = Recorder(kernel.arithmetic, settings.until, degree, len(program.outputs))
     run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
     if watch is not None:

@@ -92,7 +92,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         arc.times.append(t1)
         arc.values.append(z)
         if curved:
-            arc.pieces.append(method.piece(h, x, z, stages, slope, end))
+            arc.pieces.append(method.piece(here.kernel.flow, t, h, x, z, stages, slope, end))
         t, x, slope = t1, z, end
     return here.moved(t, x)
 

@@ -74,7 +74,7 @@ class Trial:
         """The step's interpolant."""
         if self.end is None:
             return (tuple(b - a for a, b in zip(self.x, self.z, strict=True)),)
-        return self.stepper.piece(self.h, self.x, self.z, self.stages, self.slope, self.end)
+        return self.stepper.piece(self.flow, self.t, self.h, self.x, self.z, self.stages, self.slope, self.end)
 
     def cubic(self) -> Polynomial:
         """The cubic Hermite interpolant, whatever the method."""

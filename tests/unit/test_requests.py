@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.errors import UsageError
+from hsdsl.integrators import INTEGRATORS
 from hsdsl.model import split_overrides
-from hsdsl.model.requests import FILE, Source, resolve
+from hsdsl.model.requests import FILE, Source, check_digits, resolve
 
 # (file, --set, call) -> (method, size, its value)
 ACCEPTED = {
@@ -84,3 +86,11 @@ def test_overrides_are_sorted_and_the_last_counts():
 def test_malformed_overrides(pair):
     with pytest.raises(UsageError):
         split_overrides([pair])
+
+
+def test_a_method_known_as_decimals_serves_no_more_digits_than_it_has():
+    check_digits(INTEGRATORS["dop853"], FLOAT64)
+    check_digits(INTEGRATORS["dop853"], multiprecision(25))
+    check_digits(INTEGRATORS["dopri5"], multiprecision(1000))
+    with pytest.raises(UsageError, match="25 digits, too few for a precision of 26"):
+        check_digits(INTEGRATORS["dop853"], multiprecision(26))
