@@ -7,7 +7,8 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.exact.numbers import Number, Vector, mp, number
-from hsdsl.exact.pieces import Lowered, Scene, Stretch, as_execution
+from hsdsl.exact.pieces import Lowered, as_execution
+from hsdsl.exact.scene import Scene, Stretch
 from hsdsl.exact.tails import UNRESOLVED, rest, tail
 from hsdsl.execution import Execution, Verdict
 
@@ -49,7 +50,9 @@ def bouncing_ball(
         if past
         else (f"finitely many bounces, all before the Zeno point t = {float(limit):.10g}",),
     )
-    scene = Scene("bouncing-ball.yaml", "Bouncing ball", SOURCE, ("h", "v"), list(_stretches(h, g, e, end)), verdict, 2)
+    scene = Scene(
+        "bouncing-ball.yaml", "Bouncing ball", SOURCE, {"fly": ("h", "v")}, list(_stretches(h, g, e, end)), verdict, 2
+    )
     return as_execution(scene, of)
 
 

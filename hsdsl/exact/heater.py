@@ -8,11 +8,13 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.exact.numbers import Number, Vector, mp, number
-from hsdsl.exact.pieces import Lowered, Scene, Stretch, as_execution
+from hsdsl.exact.pieces import Lowered, as_execution
+from hsdsl.exact.scene import Scene, Stretch
 from hsdsl.execution import Execution, Verdict
 
 SOURCE = "closed form: exponentials, and logarithms for the times between switches"
 DEGREE = 8
+STATES = {"heating": ("T",), "idle": ("T",)}
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def thermostat(
     slowest = room.rate * min(room.heater - room.high, room.low - room.outside)
     verdict = Verdict("holds", (f"every switch is crossed at a rate of at least {float(slowest):.4g}",))
     found = list(_stretches(room, first, end))
-    scene = Scene("thermostat.yaml", "Thermostat with hysteresis", SOURCE, ("T",), found, verdict, DEGREE)
+    scene = Scene("thermostat.yaml", "Thermostat with hysteresis", SOURCE, STATES, found, verdict, DEGREE)
     return as_execution(scene, of)
 
 

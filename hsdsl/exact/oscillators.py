@@ -8,7 +8,8 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.exact.numbers import Number, Vector, mp
-from hsdsl.exact.pieces import Lowered, Scene, Stretch, as_execution
+from hsdsl.exact.pieces import Lowered, as_execution
+from hsdsl.exact.scene import Scene, Stretch
 from hsdsl.exact.stop import Flight, Motion, exact_example_1, exact_example_2
 from hsdsl.exact.tails import UNRESOLVED, rest, tail
 from hsdsl.execution import Execution, Verdict
@@ -48,7 +49,7 @@ def oscillator(example: int, of: Lowered | None = None) -> Execution:
         name=f"oscillator-with-stop-{example}.yaml",
         title=f"Forced linear oscillator with stop, example {example}",
         source=SOURCE,
-        states=("x", "v"),
+        states={"free": ("x", "v")},
         stretches=stretches(motion),
         verdict=_verdict(motion),
         degree=DEGREE,

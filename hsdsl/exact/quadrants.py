@@ -7,11 +7,13 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.exact.numbers import Number, Vector, mp, number
-from hsdsl.exact.pieces import Lowered, Scene, Stretch, as_execution
+from hsdsl.exact.pieces import Lowered, as_execution
+from hsdsl.exact.scene import Scene, Stretch
 from hsdsl.execution import Execution, Verdict
 
 SOURCE = "closed form: straight lines from axis to axis (Burden et al. 2013, Fig. 1)"
 FIELDS = {"D0": ("1", "1"), "D1": ("1", "0.8"), "D2": ("0.7", "1"), "D3": ("1", "1")}
+STATES = {mode: ("x", "y") for mode in FIELDS}
 EXITS = {"D0": {0: "D2", 1: "D1"}, "D1": {0: "D3"}, "D2": {1: "D3"}, "D3": {}}  # by axis, in the model's order
 
 
@@ -45,7 +47,7 @@ def digital_control(x: Any = -1, y: Any = -1, *, until: Any = 2, of: Lowered | N
     at_once = " at once; either order leads to the same point" if start[0] == start[1] else ", one after the other"
     verdict = Verdict("holds", (f"the axes are crossed at a rate of 1{at_once}",))
     found = list(_stretches(start, end))
-    scene = Scene("digital-control.yaml", "Digital control system", SOURCE, ("x", "y"), found, verdict, 0)
+    scene = Scene("digital-control.yaml", "Digital control system", SOURCE, STATES, found, verdict, 0)
     return as_execution(scene, of)
 
 

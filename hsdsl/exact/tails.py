@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsdsl.exact.numbers import Number, Vector
-from hsdsl.exact.pieces import Stretch
+from hsdsl.exact.scene import Stretch
 
 UNRESOLVED = 2.0**-51  # of the time: with less left of a tail, floats no longer tell its transitions apart
 
