@@ -3,65 +3,69 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, report_usage, say
-from hsdsl.diagnose import as_json, finding, render
-from hsdsl.errors import Diagnostic, ModelError, UsageError
+from hsdsl.cli.gathered import Format, Gathered, counted
+from hsdsl.errors import ModelError, UsageError
+
+if TYPE_CHECKING:
+    from hsdsl.lint import Report, Selection
 
 
 def lint(
     models: Annotated[list[Path], typer.Argument(help="Model files.", metavar="MODEL...")],
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    format: Annotated[
+        Format, typer.Option(help="How to say what is found.", metavar="text|json|sarif|github")
+    ] = Format.text,
+    json: Annotated[bool, typer.Option("--json", help="The same as --format json.")] = False,
     select: Annotated[
         str | None,
         typer.Option(help="Use these rules alone: codes, beginnings of codes, families or names.", metavar="RULE,..."),
     ] = None,
     ignore: Annotated[str | None, typer.Option(help="Do not use these rules.", metavar="RULE,...")] = None,
+    fix: Annotated[bool, typer.Option("--fix", help="Remedy in the files what can be remedied safely.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say only what is found.")] = False,
 ) -> None:
     """Look for what is legal in a model and still probably not meant."""
-    from hsdsl.lint import Ignored, Selection, configured
-    from hsdsl.lint import lint as look
-    from hsdsl.report import dumps
-
-    errors: list[Diagnostic] = []
-    findings: list[Diagnostic] = []
-    ignored: list[Ignored] = []
-    entries: list[dict[str, Any]] = []
-    code = 0
+    gathered = Gathered()
+    format = Format.json if json else format
     for path in models:
         try:
-            given = {"select": _parts(select), "ignore": _parts(ignore)}
-            asked = {**configured(path), **{key: parts for key, parts in given.items() if parts is not None}}
-            report = look(path, Selection.of(**asked))
-        except ModelError as error:
-            errors += error.diagnostics
-            entries.append({"path": str(path), "clean": False})
-            code = max(code, MODEL_ERRORS)
-        except UsageError as error:
-            report_usage(error, json=False)
-            entries.append({"path": str(path), "clean": False, "message": str(error)})
-            code = WRONG_USAGE
+            report, remedied = _look(path, _selection(path, select, ignore), fix)
+        except (ModelError, UsageError) as error:
+            gathered.wrong({"path": str(path), "clean": False}, error)
         else:
-            findings += report.findings
-            ignored += report.ignored
-            entries.append({"path": str(path), "clean": not report.findings})
-            code = max(code, MODEL_ERRORS * bool(report.findings))
-    if json:
-        hidden = [{**finding(i.diagnostic), "reason": i.reason} for i in ignored]
-        print(dumps({"models": entries, **as_json(errors), "findings": [*map(finding, findings)], "ignored": hidden}))
-    else:
-        if errors:
-            say("\n\n".join(map(render, errors)))
-        if findings:
-            print("\n\n".join(map(render, findings)))
-        if not quiet:
-            say(f"{len(errors)} errors, {len(findings)} findings, {len(ignored)} ignored")
-    raise typer.Exit(code)
+            entry = {"path": str(path), "clean": not report.findings, "fixed": remedied}
+            gathered.looked(entry, report.findings, report.ignored)
+            if format is Format.text and not quiet:
+                _sum_up(path, report, remedied)
+    gathered.say(format, lint=True)
+    raise typer.Exit(gathered.code)
 
 
-def _parts(text: str | None) -> list[str] | None:
-    return None if text is None else text.split(",")
+def _selection(path: Path, select: str | None, ignore: str | None) -> Selection:
+    """The rules for a model: what an option says counts before what the configuration says."""
+    from hsdsl.lint import Selection, configured
+
+    given = {key: text.split(",") for key, text in (("select", select), ("ignore", ignore)) if text is not None}
+    return Selection.of(**{**configured(path), **given})
+
+
+def _look(path: Path, selection: Selection, fix: bool) -> tuple[Report, int]:
+    if fix:
+        from hsdsl.lint.fix import fix as remedy
+
+        return remedy(path, selection)
+    from hsdsl.lint import lint as look
+
+    return look(path, selection), 0
+
+
+def _sum_up(path: Path, report: Report, remedied: int) -> None:
+    """Say in a line what became of a model without findings left, or with something remedied or ignored."""
+    parts = [f"{remedied} fixed"] * bool(remedied) + [f"{len(report.ignored)} ignored"] * bool(report.ignored)
+    found = counted(len(report.findings), "finding") if report.findings else "clean"
+    if parts or not report.findings:
+        print(", ".join([f"{path}: {found}", *parts]))

@@ -17,6 +17,7 @@ from hsdsl.lint.ignores import Ignored, sift
 from hsdsl.lint.rules import RULES
 from hsdsl.lint.selection import Selection, configured
 from hsdsl.lint.subject import Subject
+from hsdsl.system import HybridSystem
 
 __all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "configured", "lint"]
 
@@ -25,7 +26,7 @@ __all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "con
 class Report:
     """What was found in one model, in source order, and what its comments ask to ignore."""
 
-    path: str
+    system: HybridSystem
     findings: tuple[Diagnostic, ...]
     ignored: tuple[Ignored, ...]
 
@@ -54,7 +55,7 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     with deep_stack():
         found = [diagnostic for code in codes for diagnostic in _findings(subject, code)]
     findings, ignored = sift(subject, found, codes)
-    return Report(os.fspath(path), findings, ignored)
+    return Report(subject.system, findings, ignored)
 
 
 def _findings(subject: Subject, code: str) -> list[Diagnostic]:

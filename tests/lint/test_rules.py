@@ -18,6 +18,7 @@ import yaml
 from lint.fragments import completed, examples
 
 from hsdsl.lint import RULES, Selection, lint
+from hsdsl.lint.fix import fix
 from hsdsl.lint.rules import FAMILIES, family
 
 FOLDER = Path(__file__).parent
@@ -81,6 +82,15 @@ def test_bad_models(name, number):
         assert expected.get("says", "") in finding.message
         assert finding.decided == expected.get("decided", finding.decided)
         assert finding.span.column + finding.span.length <= len(finding.text) + 1
+
+
+@pytest.mark.parametrize(("name", "number"), [(n, k) for n, k in BAD if "fixed" in CASES[n]["bad"][k]])
+def test_fixes(name, number, tmp_path):
+    case, path = CASES[name]["bad"][number], tmp_path / "model.yaml"
+    path.write_text(completed(case["model"]))
+    report, remedied = fix(path, Selection.of([code_of(name)]))
+    assert path.read_text() == completed(case["fixed"])
+    assert remedied and not report.findings
 
 
 @pytest.mark.parametrize(("name", "number"), GOOD)
