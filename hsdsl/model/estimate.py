@@ -7,7 +7,7 @@ from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Execution, Transition
-from hsdsl.simulate.run import show
+from hsdsl.simulate.stops import show
 
 FINER_TOLERANCE = 32  # a method of order 5 halves its steps
 

@@ -12,8 +12,8 @@ from hsdsl.errors import UsageError
 from hsdsl.expression.stack import deep_stack
 from hsdsl.lower import lower_expressions
 from hsdsl.model.values import Values
-from hsdsl.simulate.run import show
 from hsdsl.simulate.settings import OneStop
+from hsdsl.simulate.stops import show
 from hsdsl.system import Edge, HybridSystem, Mode
 
 HINT = "use scheme 'relaxed'"

@@ -14,7 +14,7 @@ from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
-from hsdsl.simulate.run import show
+from hsdsl.simulate.stops import show
 
 METRICS = ("quotient", "relaxed")
 _ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")

@@ -14,7 +14,7 @@ from hsdsl.errors import UsageError
 from hsdsl.lower import lower_expressions
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
-from hsdsl.simulate.run import show
+from hsdsl.simulate.stops import show
 from hsdsl.system import HybridSystem
 
 

@@ -32,8 +32,9 @@ from hsdsl.simulate.entry import enter
 from hsdsl.simulate.paoli_schatzman import NOTES, paoli_schatzman
 from hsdsl.simulate.recorder import Recorder
 from hsdsl.simulate.relaxed import relaxed
-from hsdsl.simulate.run import Here, Run, show
+from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.stops import interrupted, show
 from hsdsl.simulate.timeline import make_timeline
 
 SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed, "paoli-schatzman": paoli_schatzman}
@@ -70,7 +71,7 @@ def simulate(
     except KeyboardInterrupt:
         if not recorder.arcs:
             raise
-        stop = Stop("interrupted", recorder.now, f"interrupted at t = {show(recorder.now)}; what was computed is kept")
+        stop = interrupted(recorder.now)
     return _execution(run, stop, time.perf_counter() - began)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.run import Here, Run, show
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.stops import show
 
 
 def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop:

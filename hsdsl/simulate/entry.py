@@ -11,7 +11,8 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.run import Here, Run, reset, show
+from hsdsl.simulate.run import Here, Run, reset
+from hsdsl.simulate.stops import endless, entered_final, show
 from hsdsl.simulate.surfaces import Crossing
 
 
@@ -29,11 +30,9 @@ def enter(
     while True:
         here = run.place(mode, states, t, x, scale, before)
         if here.mode.final:
-            return Stop("final", t, f"entered final mode {here.mode.name} at t = {show(t)}")
+            return entered_final(here.mode.name, t)
         if (mode, x) in visited:
-            return Stop(
-                "zeno", t, f"at t = {show(t)} transitions return to the same state in mode {here.mode.name} without end"
-            )
+            return endless(here.mode.name, t)
         visited.add((mode, x))
         try:
             values = here.kernel.surfaces(t, *x)

@@ -21,7 +21,8 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.run import Here, Run, show
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
 
 NOTES = (

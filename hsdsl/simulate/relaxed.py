@@ -17,7 +17,8 @@ from hsdsl.integrators.stepper import Stages, State
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
 from hsdsl.simulate.patience import Patience
-from hsdsl.simulate.run import Here, Run, choose, reset, show
+from hsdsl.simulate.run import Here, Run, choose, reset
+from hsdsl.simulate.stops import reached, reached_in_strip, show
 from hsdsl.simulate.surfaces import TIE, Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
@@ -147,7 +148,7 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
         depth_at_end = depth + (until - landing.t1)
         run.wait(here, [(t, depth * 0), (landing.t1, depth), (until, depth_at_end)], q)
         run.record(here, crossing, None, None, landing.alternatives)
-        return Stop("until", until, f"reached t = {show(until)} inside the strip of {edge.name}, mode unchanged")
+        return reached_in_strip(until, edge.name)
     if isinstance(outcome, Stop):
         return outcome
     resumed = min(resumed, until)
@@ -173,9 +174,8 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
         chosen, alternatives = choose(here, standing, run)
         run.wait(here, [(t, run.arithmetic.zero)], x)
         run.record(here, chosen, None, None, alternatives)
-        name = here.mode.edges[chosen.edge].name
-        return Stop("until", t, f"reached t = {show(t)} inside the strip of {name} (on its guard), mode unchanged")
-    return Stop("until", t, f"reached t = {show(t)}")
+        return reached_in_strip(t, here.mode.edges[chosen.edge].name, on_guard=True)
+    return reached(t)
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:
@@ -186,10 +186,15 @@ def standing_on(run: Run, here: Here) -> list[Crossing]:
 
 def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | Stop:
     """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
-    t, x = here.t, here.x
     if obstacle.kind in ("wall", "deep", "flat", "inward", "not finite") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Landing(chosen, alternatives, t, sizes(x, x, here))
+        return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+    return no_way_on(run, here, obstacle, slope)
+
+
+def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
+    """Stop where no step is short enough, and say why."""
+    t, x = here.t, here.x
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
     grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow

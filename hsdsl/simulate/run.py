@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
@@ -14,6 +13,7 @@ from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate.control import Control
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.stops import limit, reset_not_finite
 from hsdsl.simulate.surfaces import TIE, Crossing, Surfaces
 from hsdsl.simulate.timeline import Segment, Timeline
 
@@ -99,11 +99,7 @@ class Run:
         """Stop where one more transition would exceed what the run may make."""
         if len(self.recorder.transitions) < self.settings.max_transitions:
             return None
-        return Stop(
-            "transition_limit",
-            t,
-            f"made max_transitions = {self.settings.max_transitions} transitions by t = {show(t)}",
-        )
+        return limit(self.settings.max_transitions, t)
 
     def record(
         self,
@@ -157,19 +153,10 @@ def reset(here: Here, crossing: Crossing, scale: State, run: Run) -> tuple[State
     except DOMAIN_ERRORS:
         after = (run.arithmetic.functions["nan"],)
     if not all(map(isfinite, after)):
-        texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))
-        return Stop("not_finite", t, f"the reset of {edge.name} ({texts}) has no finite value at t = {show(t)}")
+        return reset_not_finite(edge, t)
     try:
         spread = here.kernel.spreads[k](t, *q, *scale)
     except DOMAIN_ERRORS:
         spread = ()
     sizes = tuple(abs(v) for v in after)  # where a reset is infinitely steep, no more is known
     return after, spread if spread and all(map(isfinite, spread)) else sizes
-
-
-def show(x: Any) -> str:
-    """Write a number for a person."""
-    try:
-        return f"{float(x):.10g}"
-    except OverflowError:
-        return f"{x!s:.24}"

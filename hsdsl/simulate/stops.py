@@ -1,0 +1,54 @@
+"""How runs end, in sentences: one place for every loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hsdsl.arithmetic import Number
+from hsdsl.execution import Stop
+from hsdsl.program import EdgeProgram
+
+
+def show(x: Any) -> str:
+    """Write a number for a person."""
+    try:
+        return f"{float(x):.10g}"
+    except OverflowError:
+        return f"{x!s:.24}"
+
+
+def reached(t: Number) -> Stop:
+    """The end of the experiment."""
+    return Stop("until", t, f"reached t = {show(t)}")
+
+
+def reached_in_strip(t: Number, edge: str, on_guard: bool = False) -> Stop:
+    """The end of the experiment while the state waits, or as it reaches a guard."""
+    where = f"{edge} (on its guard)" if on_guard else edge
+    return Stop("until", t, f"reached t = {show(t)} inside the strip of {where}, mode unchanged")
+
+
+def entered_final(mode: str, t: Number) -> Stop:
+    """A mode marked final."""
+    return Stop("final", t, f"entered final mode {mode} at t = {show(t)}")
+
+
+def endless(mode: str, t: Number) -> Stop:
+    """Transitions on entry that return to where they began."""
+    return Stop("zeno", t, f"at t = {show(t)} transitions return to the same state in mode {mode} without end")
+
+
+def limit(most: int, t: Number) -> Stop:
+    """As many transitions as the run may make."""
+    return Stop("transition_limit", t, f"made max_transitions = {most} transitions by t = {show(t)}")
+
+
+def reset_not_finite(edge: EdgeProgram, t: Number) -> Stop:
+    """A reset without a value."""
+    texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))
+    return Stop("not_finite", t, f"the reset of {edge.name} ({texts}) has no finite value at t = {show(t)}")
+
+
+def interrupted(t: Number) -> Stop:
+    """Ctrl-C."""
+    return Stop("interrupted", t, f"interrupted at t = {show(t)}; what was computed is kept")
