@@ -13,6 +13,9 @@ from hsdsl.arithmetic import Arithmetic, Number
 
 Vector = tuple[Number, ...]
 Routine = Callable[..., Vector]  # called as routine(t, x0, ..., x{n-1})
+Series = Sequence[Number]  # Taylor coefficients 0, 1, 2, ... in time
+Taylor = Callable[[int, Number, Vector], tuple[tuple[Series, ...], tuple[Series | None, ...]]]
+# called as taylor(order, t, x): the series of the solution through (t, x), and of each smooth surface along it
 
 
 class ModeKernel(Protocol):
@@ -50,6 +53,10 @@ class Kernel(Protocol):
 
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to ``data``: parameter values, then (a, b, c) of each sampled input's segment."""
+        ...
+
+    def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
+        """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
         ...
 
     def expressions(self, mode: int, data: Sequence[Number]) -> Sequence[tuple[str, Routine]]:

@@ -29,6 +29,46 @@ class Routines:
 
 
 @dataclass(frozen=True)
+class Operation:
+    """One line of a tape: what kind of recurrence, of which earlier lines, with which constant.
+
+    With u, v lines and c the constant, ``kind`` is ``constant`` (c), ``add`` (u + v), ``sub`` (u - v), ``neg`` (-u),
+    ``offset`` (u + c), ``scale`` (c u), ``mul`` (u v), ``div`` (u / v), ``under`` (c / u), ``sqrt`` (of u), ``pow``
+    (u**c), ``atan2`` (of lines y, x, with its derivatives by y and by x as lines), or the name of a function of u with
+    its derivative by u as the second line. A derivative may be a later line: coefficient k asks it for those before k.
+    """
+
+    kind: str
+    lines: tuple[int, ...]
+    constant: int | None
+
+
+@dataclass(frozen=True)
+class Tape:
+    """What Taylor coefficients along a mode's flow are computed from.
+
+    Attributes
+    ----------
+    constants : Routines
+        One routine ``constants`` without arguments: the constants' values, from the data that ``bind`` takes.
+    constant_count : int
+        How many there are.
+    operations : tuple of Operation
+        Lines 0 to n are time and the n states, operation i is line n + 1 + i.
+    flow : tuple of int
+        The line of each state's derivative.
+    surfaces : tuple of int or None
+        The line of each surface; None where it is kinked.
+    """
+
+    constants: Routines
+    constant_count: int
+    operations: tuple[Operation, ...]
+    flow: tuple[int, ...]
+    surfaces: tuple[int | None, ...]
+
+
+@dataclass(frozen=True)
 class SampledInput:
     """A sampled input: exact samples, or None where they are expressions of parameters (routine ``input_i``)."""
 
@@ -72,6 +112,9 @@ class ModeProgram:
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
+    ``tape`` gives Taylor coefficients along the flow; None where the flow is kinked (`abs`, `sign`, `min`, `max`,
+    `floor`).
+
     ``diagnosis`` has one routine ``expression_K`` for each of ``expressions`` (flows, surfaces, conditions as a person
     knows them), to tell which of them has no finite value.
     """
@@ -83,6 +126,7 @@ class ModeProgram:
     walls: tuple[str, ...]
     flow_texts: tuple[str, ...]
     routines: Routines
+    tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.kernel import Routine, Vector
+from hsdsl.kernel import Routine, Taylor, Vector
 from hsdsl.program import Program, Routines
 
 _CONSTANT = re.compile(r"\bq_(m?)(\d+)_(\d+)\b")
@@ -41,6 +41,7 @@ class PythonKernel:
         self.arithmetic = arithmetic
         self._program = program
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
 
@@ -67,6 +68,17 @@ class PythonKernel:
             resets=tuple(bound[f"reset_{k}"] for k in range(edges)),
             spreads=tuple(bound[f"spread_{k}"] for k in range(edges)),
         )
+
+    def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
+        """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
+        from hsdsl.backends.taylor import compile_tape  # only runs that ask for it pay for it
+
+        program = self._program.modes[mode]
+        if program.tape is None:
+            return None
+        if mode not in self._tapes:
+            self._tapes[mode] = compile_tape(program.tape, len(program.states), self.arithmetic, f"mode {mode}")
+        return self._tapes[mode](data)
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""

@@ -16,6 +16,7 @@ from hsdsl.expression.stack import deep_stack
 from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.lower.tape import make_tape
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
 
 _NAN = sp.Symbol("nan", real=True)
@@ -141,9 +142,17 @@ def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram
         walls=tuple(wall.text for wall in mode.walls),
         flow_texts=mode.flow_texts,
         routines=print_routines(_mode_routines(mode, names), names.data),
+        tape=_tape(mode, names),
         expressions=tuple(text for text, _ in _expressions(mode)),
         diagnosis=print_routines(_diagnosis(mode, names), names.data),
     )
+
+
+def _tape(mode: Mode, names: Names) -> lowered.Tape | None:
+    mapping, done = names.mapping(mode.states), {}
+    residuals = [edge.surface.residual for edge in mode.edges] + [wall.residual for wall in mode.walls]
+    flow, surfaces = ([replaced(sp.sympify(e), mapping, done) for e in part] for part in (mode.flow, residuals))
+    return make_tape(flow, surfaces, names.of_states(mode.states), names.data)
 
 
 def _expressions(mode: Mode):

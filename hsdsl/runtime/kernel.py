@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.backends.c import model_source
 from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
-from hsdsl.kernel import Routine, Vector
+from hsdsl.kernel import Routine, Taylor, Vector
 from hsdsl.program import Program
 from hsdsl.runtime.library import load
 
@@ -78,6 +78,10 @@ class CompiledKernel:
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
         return self._python.expressions(mode, data)
+
+    def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
+        """Return Taylor coefficients along a mode's flow, by the Python kernel."""
+        return self._python.taylor(mode, data)
 
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""

@@ -1,0 +1,233 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
+"""Expressions -> the tape that Taylor coefficients are computed from: one elementary operation a line.
+
+A function of one argument u is a line of the kind z' = g u', with its derivative g a line of its own (which may use z:
+the coefficient k of z needs g up to k - 1 only). Other kinds have the recurrences of products, quotients and powers.
+See A. Griewank and A. Walther, *Evaluating Derivatives*, Sec. 13.2 (doi:10.1137/1.9780898717761).
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.program import Operation, Tape
+from hsdsl.system import TIME
+
+_ONE = sp.Integer(1)
+
+
+class Kinked(Exception):
+    """An expression has a function without Taylor series everywhere; the message names it."""
+
+
+def make_tape(flow, surfaces, states, data) -> Tape | None:
+    """Write the tape of a mode whose flow and surfaces are expressions of TIME, ``states`` and ``data``.
+
+    Returns None where the flow is kinked (`abs`, `sign`, `min`, `max`, `floor`); a kinked surface has no line.
+    """
+    writer = _Writer(states)
+    try:
+        rows = tuple(writer.line(f) for f in flow)
+    except Kinked:
+        return None
+    lines = tuple(writer.line_or_none(r) for r in surfaces)
+    constants = print_routines([Definition("constants", (), tuple(writer.constants))], data)
+    return Tape(constants, len(writer.constants), tuple(writer.operations), rows, lines)
+
+
+class _Writer:
+    """Lines 0 to n are time and the states; every operation is the next line."""
+
+    def __init__(self, states) -> None:
+        self._known = {TIME: 0} | {s: i for i, s in enumerate(states, 1)}
+        self._moving = set(self._known)
+        self._first = len(self._known)
+        self._numbers: dict[sp.Expr, int] = {}
+        self.constants: list[sp.Expr] = []
+        self.operations: list[Operation] = []
+
+    def line_or_none(self, expr) -> int | None:
+        """The line of an expression; None where it is kinked, with nothing written."""
+        before, known = len(self.operations), dict(self._known)
+        try:
+            return self.line(expr)
+        except Kinked:
+            del self.operations[before:]
+            self._known = known
+            return None
+
+    def line(self, expr) -> int:
+        """The line whose values are the expression's."""
+        if expr not in self._known:
+            self._known[expr] = self._write(expr)
+        return self._known[expr]
+
+    def _write(self, expr) -> int:
+        if self._still(expr):
+            return self._operation("constant", constant=expr)
+        if expr.is_Add:
+            return self._sum(expr)
+        if expr.is_Mul:
+            return self._product(expr)
+        if expr.is_Pow:
+            return self._power(expr.base, expr.exp)
+        name = type(expr).__name__
+        if name not in _DERIVATIVES:
+            raise Kinked(name)
+        return _DERIVATIVES[name](self, *map(self.line, expr.args))
+
+    def _still(self, expr) -> bool:
+        return not (expr.free_symbols & self._moving)
+
+    def _operation(self, kind: str, *lines: int, constant=None) -> int:
+        number = None
+        if constant is not None:
+            if constant not in self._numbers:
+                self._numbers[constant] = len(self.constants)
+                self.constants.append(constant)
+            number = self._numbers[constant]
+        self.operations.append(Operation(kind, lines, number))
+        return self._first + len(self.operations) - 1
+
+    def _sum(self, expr) -> int:
+        terms = expr.as_ordered_terms()
+        moving = [t for t in terms if not self._still(t)]
+        total = self.line(moving[0])
+        for term in moving[1:]:
+            negative = term.could_extract_minus_sign()
+            total = self._operation("sub" if negative else "add", total, self.line(-term if negative else term))
+        still = sp.Add(*(t for t in terms if self._still(t)))
+        return total if still == 0 else self._operation("offset", total, constant=still)
+
+    def _product(self, expr) -> int:
+        still = sp.Mul(*(f for f in expr.args if self._still(f)))
+        moving = [f for f in expr.args if not self._still(f)]
+        below = [1 / f for f in moving if f.is_Pow and f.exp.is_Number and f.exp < 0]
+        above = [f for f in moving if not (f.is_Pow and f.exp.is_Number and f.exp < 0)]
+        if not above:
+            return self._operation("under", self._factors(below), constant=still)
+        line = self._factors(above)
+        if below:
+            line = self._operation("div", line, self._factors(below))
+        if still == -1:
+            return self._operation("neg", line)
+        return line if still == 1 else self._operation("scale", line, constant=still)
+
+    def _factors(self, factors) -> int:
+        line = self.line(factors[0])
+        for factor in factors[1:]:
+            line = self._operation("mul", line, self.line(factor))
+        return line
+
+    def _power(self, base, exponent) -> int:
+        if self._still(base):
+            return self.line(sp.exp(exponent * sp.log(base), evaluate=False))
+        if not self._still(exponent):
+            return self.line(sp.exp(exponent * sp.log(base, evaluate=False), evaluate=False))
+        if exponent.is_Number and exponent < 0:
+            return self._operation("under", self.line(base**-exponent), constant=_ONE)
+        if exponent == sp.Rational(1, 2):
+            return self._operation("sqrt", self.line(base))
+        if exponent.is_Integer:
+            return self._whole_power(self.line(base), int(exponent))
+        return self._operation("pow", self.line(base), constant=exponent)
+
+    def _whole_power(self, base: int, exponent: int) -> int:
+        """By squaring: exact where the base is zero, too."""
+        result: int | None = None
+        while exponent:
+            if exponent & 1:
+                result = base if result is None else self._operation("mul", result, base)
+            exponent >>= 1
+            if exponent:
+                base = self._operation("mul", base, base)
+        assert result is not None
+        return result
+
+    def chain(self, name: str, u: int, derivative: int) -> int:
+        """The function ``name`` of line u, whose derivative by u is a line."""
+        return self._operation(name, u, derivative)
+
+    def ahead(self, lines: int) -> int:
+        """The number of a line that will be written after so many others."""
+        return self._first + len(self.operations) + lines
+
+    def exp(self, u: int) -> int:
+        """Z' = z u'."""
+        return self.chain("exp", u, self.ahead(0))
+
+    def log(self, u: int) -> int:
+        """Z' = u'/u."""
+        return self.chain("log", u, self._operation("under", u, constant=_ONE))
+
+    def _pair(self, first: str, second: str, u: int, turn: bool) -> tuple[int, int]:
+        key = (first, u)
+        if key not in self._known:
+            self._known[key] = one = self.chain(first, u, self.ahead(1))
+            self.chain(second, u, self.ahead(1) if turn else one)
+            if turn:
+                self._operation("neg", one)
+        return self._known[key], self._known[key] + 1
+
+    def sin(self, u: int) -> int:
+        """Sine and cosine together: each is the other's derivative, up to sign."""
+        return self._pair("sin", "cos", u, turn=True)[0]
+
+    def cos(self, u: int) -> int:
+        """See :meth:`sin`."""
+        return self._pair("sin", "cos", u, turn=True)[1]
+
+    def sinh(self, u: int) -> int:
+        """Hyperbolic sine and cosine together."""
+        return self._pair("sinh", "cosh", u, turn=False)[0]
+
+    def cosh(self, u: int) -> int:
+        """See :meth:`sinh`."""
+        return self._pair("sinh", "cosh", u, turn=False)[1]
+
+    def _own_square(self, name: str, u: int, negative: bool) -> int:
+        z = self.chain(name, u, self.ahead(3 if negative else 2))
+        square = self._operation("mul", z, z)
+        if negative:
+            square = self._operation("neg", square)
+        self._operation("offset", square, constant=_ONE)
+        return z
+
+    def tan(self, u: int) -> int:
+        """Z' = (1 + z**2) u'."""
+        return self._own_square("tan", u, negative=False)
+
+    def tanh(self, u: int) -> int:
+        """Z' = (1 - z**2) u'."""
+        return self._own_square("tanh", u, negative=True)
+
+    def _algebraic(self, name: str, u: int, sign: int, offset: int, root: bool, scale: int = 1) -> int:
+        """Z' = scale u' / (offset + sign u**2), or with the square root of that."""
+        line = self._operation("mul", u, u)
+        if sign < 0:
+            line = self._operation("neg", line)
+        line = self._operation("offset", line, constant=sp.Integer(offset))
+        if root:
+            line = self._operation("sqrt", line)
+        return self.chain(name, u, self._operation("under", line, constant=sp.Integer(scale)))
+
+    def atan2(self, y: int, x: int) -> int:
+        """Z' = (x y' - y x') / (x**2 + y**2)."""
+        squares = (self._operation("mul", x, x), self._operation("mul", y, y))
+        radius = self._operation("add", *squares)
+        by_y = self._operation("div", x, radius)
+        by_x = self._operation("neg", self._operation("div", y, radius))
+        return self._operation("atan2", y, x, by_y, by_x)
+
+
+_DERIVATIVES = {
+    **{name: getattr(_Writer, name) for name in ("exp", "log", "sin", "cos", "sinh", "cosh", "tan", "tanh", "atan2")},
+    "atan": lambda w, u: w._algebraic("atan", u, 1, 1, root=False),
+    "atanh": lambda w, u: w._algebraic("atanh", u, -1, 1, root=False),
+    "asin": lambda w, u: w._algebraic("asin", u, -1, 1, root=True),
+    "acos": lambda w, u: w._algebraic("acos", u, -1, 1, root=True, scale=-1),
+    "asinh": lambda w, u: w._algebraic("asinh", u, 1, 1, root=True),
+    "acosh": lambda w, u: w._algebraic("acosh", u, 1, -1, root=True),
+}
