@@ -158,6 +158,7 @@ CODES: dict[str, str] = {
     "HS119": "a numeric exponent above 1,000",
     "HS120": "an expression that grows too large once names are replaced",
     "HS121": "no expression where one is wanted",
+    "HS122": "symbolic work that takes too long",
     # the shape of the document
     "HS201": "a key that does not exist here",
     "HS202": "a key that is missing",
@@ -186,4 +187,5 @@ CODES: dict[str, str] = {
     "HS321": "a setting outside its range",
 }
 
+TOO_LONG = "HS122"
 STEP_AND_TOLERANCE = "HS320"  # wrong usage rather than a wrong model: the command line exits with 2

@@ -2,10 +2,12 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """The functions of the language, as SymPy knows them.
 
-The smooth ones are SymPy's own. The kinked and jumping ones (abs, sign, min, max, floor) are classes of our own:
-SymPy's rewrite themselves, and differentiate into objects no kernel has (DiracDelta, re, im). Ours stay as written,
-fold fractions, and differentiate almost everywhere: abs' = sign, sign' = floor' = 0, max' picks the larger side. Other
-constants are left to the kernel: to tell which of two sums of roots is larger can take SymPy for ever.
+The smooth ones are SymPy's own, but for the hyperbolic three: SymPy asks whether they are real by splitting their
+argument into real and imaginary parts, which in a nest of them takes for ever; ours are real. The kinked and jumping
+ones (abs, sign, min, max, floor) are classes of our own: SymPy's rewrite themselves, and differentiate into objects no
+kernel has (DiracDelta, re, im). Ours stay as written, fold fractions, and differentiate almost everywhere: abs' = sign,
+sign' = floor' = 0, max' picks the larger side. Other constants are left to the kernel: to tell which of two sums of
+roots is larger can take SymPy for ever.
 """
 
 from __future__ import annotations
@@ -96,6 +98,46 @@ class maximum(_Real):
         return (1 + (1 if argindex == 1 else -1) * sign(x - y)) / 2
 
 
+class sinh(sp.sinh):
+    """The hyperbolic sine, real."""
+
+    is_real = is_finite = True
+
+    def fdiff(self, argindex=1):
+        """Cosh."""
+        return cosh(self.args[0])
+
+    def _eval_is_unknown(self):
+        return None
+
+    _eval_is_positive = _eval_is_negative = _eval_is_zero = _eval_is_unknown
+
+
+class cosh(sp.cosh):
+    """The hyperbolic cosine, real."""
+
+    is_real = is_finite = is_positive = True
+
+    def fdiff(self, argindex=1):
+        """Sinh."""
+        return sinh(self.args[0])
+
+
+class tanh(sp.tanh):
+    """The hyperbolic tangent, real."""
+
+    is_real = is_finite = True
+
+    def fdiff(self, argindex=1):
+        """1 - tanh**2."""
+        return 1 - tanh(self.args[0]) ** 2
+
+    def _eval_is_unknown(self):
+        return None
+
+    _eval_is_positive = _eval_is_negative = _eval_is_zero = _eval_is_unknown
+
+
 # name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)
 FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
     "sin": (sp.sin, 1, 1),
@@ -105,9 +147,9 @@ FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
     "acos": (sp.acos, 1, 1),
     "atan": (sp.atan, 1, 1),
     "atan2": (sp.atan2, 2, 2),
-    "sinh": (sp.sinh, 1, 1),
-    "cosh": (sp.cosh, 1, 1),
-    "tanh": (sp.tanh, 1, 1),
+    "sinh": (sinh, 1, 1),
+    "cosh": (cosh, 1, 1),
+    "tanh": (tanh, 1, 1),
     "asinh": (sp.asinh, 1, 1),
     "acosh": (sp.acosh, 1, 1),
     "atanh": (sp.atanh, 1, 1),

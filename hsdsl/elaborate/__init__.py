@@ -8,8 +8,9 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from hsdsl import limits
 from hsdsl.elaborate.definitions import define_lets, define_parameters
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.inputs import define_inputs
@@ -19,10 +20,11 @@ from hsdsl.elaborate.reader import Reader, understood
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.units import elaborate_units
 from hsdsl.elaborate.world import World
-from hsdsl.errors import Findings, ModelError, UsageError
+from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
+from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.schema import Model, read
 from hsdsl.source import Node, Text, compose, decode, read_bytes
 from hsdsl.system import HybridSystem
@@ -97,9 +99,13 @@ def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = 
     source = decode(shown_path, data)
     root = compose(source, findings)
     document = read(root, findings)
-    world = World.of(document, Reader(findings), Path(path).parent, shown_path)
-    with deep_stack():
-        parts = _parts(world)
+    reader = Reader(findings)
+    world = World.of(document, reader, Path(path).parent, shown_path)
+    try:
+        with deep_stack(), timebox(limits.current().seconds, PARTS) as reader.box:
+            parts = _parts(world)
+    except OutOfTime:
+        _say_too_long(reader)
     findings.raise_if_any()
     digest = hashlib.sha256(b"".join((data, *world.files))).hexdigest()
     title, about = world.text(document.title), world.text(document.source)
@@ -109,6 +115,15 @@ def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = 
         raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
     top = world.scope(("time", "parameters", "inputs", "states", "let"), "")
     return Reading(system, document, root, source, world.scopes, top)
+
+
+def _say_too_long(reader: Reader) -> NoReturn:
+    message = "working this expression out takes too long"
+    hint = "make parts of it states, or allow more time with --limit seconds=600"
+    if reader.at is not None:
+        reader.add(reader.at.place, TOO_LONG, message, hint)
+    reader.findings.raise_if_any()
+    raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
 
 
 def _parts(world: World) -> dict[str, Any]:
@@ -161,10 +176,12 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
     usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
     scope = Scope(_override_values(system, usable), place=where)
     try:
-        with deep_stack():
+        with deep_stack(), timebox(limits.current().seconds / PARTS):
             return understood(text, scope).expr
     except ExpressionError as error:
         raise UsageError(f"{where}: {error.message}", error.hint) from None
+    except OutOfTime:
+        raise UsageError(f"{where}: working this expression out takes too long") from None
 
 
 def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Value | Refusal | None]:

@@ -12,6 +12,7 @@ from hsdsl.expression import ExpressionError, Wanted, numeric, parse, symbolic
 from hsdsl.expression.inequality import Inequality, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import Tree
+from hsdsl.expression.timebox import Box
 from hsdsl.names import shown
 from hsdsl.source import ABSENT, Place, Scalar
 
@@ -42,11 +43,16 @@ def all_of(parts: Iterable[T | None]) -> list[T] | None:
     return whole if len(whole) == len(found) else None
 
 
-@dataclass(frozen=True)
+@dataclass
 class Reader:
-    """Reads expressions; what is wrong with them goes to ``findings``, and the answer is then None."""
+    """Reads expressions; what is wrong with them goes to ``findings``, and the answer is then None.
+
+    ``box`` bounds the time that each of them takes, and ``at`` is the one that was begun last.
+    """
 
     findings: Findings
+    box: Box | None = None
+    at: Scalar | None = None
 
     def add(self, place: Place, code: str, message: str, hint: str | None = None) -> None:
         """Report a fault at a place."""
@@ -88,6 +94,9 @@ class Reader:
         """The tree of an expression all of whose names can be used; None where one's definition is broken."""
         if scalar.value == ABSENT:
             return None
+        self.at = scalar
+        if self.box:
+            self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, wanted, scope)
         if wanted == "inequality":

@@ -111,7 +111,7 @@ class _Builder:
             v.number if v.number is None or not minus else -v.number
             for v, (minus, _) in zip(values, tree.terms, strict=True)
         ]
-        return self.value(tree, sp.Add(*terms), numeric.total(numbers), values)
+        return self.value(tree, self.made(tree, sp.Add, *terms), numeric.total(numbers), values)
 
     def product(self, tree: Product) -> Value:
         """Factors multiplied; the length of their exact numbers is measured first."""
@@ -129,7 +129,7 @@ class _Builder:
         if sum(bounds.bits(v.expr) for v in values) > bounds.MOST_BITS:
             raise self.too_long(tree)
         factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
-        return self.value(tree, sp.Mul(*factors), number, values)
+        return self.value(tree, self.made(tree, sp.Mul, *factors), number, values)
 
     def power(self, tree: Power) -> Value:
         """A power; what it would make SymPy compute is measured first."""
@@ -142,10 +142,10 @@ class _Builder:
             self.refuse_unless_finite(tree, number)
         if bounds.power_bits(base.expr, exponent.expr) > bounds.MOST_BITS:
             raise self.too_long(tree)
-        return self.value(tree, sp.Pow(base.expr, exponent.expr), number, [base, exponent])
+        return self.value(tree, self.made(tree, sp.Pow, base.expr, exponent.expr), number, [base, exponent])
 
     def call(self, tree: Call) -> Value:
-        """A function of the language. min and max of many are taken pair by pair."""
+        """A function of the language. min and max of many are taken in pairs."""
         values = [self.number(argument) for argument in tree.arguments]
         number = numeric.apply(tree.function, [v.number for v in values])
         if all(v.constant for v in values):
@@ -156,12 +156,18 @@ class _Builder:
             raise ExpressionError("HS119", message, tree.start, tree.end)
         function: Any = FUNCTIONS[tree.function][0]
         if tree.function in ("min", "max"):
-            expr = exprs[0]
-            for other in exprs[1:]:
-                expr = function(expr, other)
+            expr = self.made(tree, _pairwise, function, exprs)
         else:
-            expr = function(*exprs)
+            expr = self.made(tree, function, *exprs)
         return self.value(tree, expr, number, values)
+
+    def made(self, tree: Tree, function: Any, *arguments: Any) -> Any:
+        """What SymPy makes of arguments; its own failures (a sine of 1e308, exactly) are an error of the expression."""
+        try:
+            return function(*arguments)
+        except (TypeError, AttributeError, ValueError, NotImplementedError, ArithmeticError, RecursionError):
+            message = f"`{self.said(tree)}` cannot be worked out exactly"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal") from None
 
     def value(self, tree: Tree, expr: Any, number: Any, parts: list[Value]) -> Value:
         """A value made of parts, checked."""
@@ -180,6 +186,9 @@ class _Builder:
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+        if constant and size > bounds.MOST_NODES_OF_A_CONSTANT and not expr.is_Rational:
+            message = f"`{self.said(tree)}` is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
         within = _bits_within(tree, parts)
         if within > bounds.MOST_BITS_WITHIN:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
@@ -225,6 +234,14 @@ class _Builder:
     def said(self, tree: Tree) -> str:
         """The text of a node, cut to what a sentence carries."""
         return shown(self.text[tree.start : tree.end], 40)
+
+
+def _pairwise(function: Any, exprs: list[Any]) -> Any:
+    """A function of two, of many: in a tree that is as flat as it can be."""
+    while len(exprs) > 1:
+        pairs = [function(*exprs[i : i + 2]) for i in range(0, len(exprs) - 1, 2)]
+        exprs = pairs + exprs[2 * len(pairs) :]
+    return exprs[0]
 
 
 def _levels(tree: Tree, expr: Any, parts: list[Value]) -> int:

@@ -11,8 +11,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from hsdsl import limits
 from hsdsl import program as lowered
+from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.stack import deep_stack
+from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
@@ -40,9 +43,20 @@ class Names:
 
 
 def lower(system: HybridSystem) -> lowered.Program:
-    """Lower a system; the result needs no SymPy to run."""
-    with deep_stack():
-        return _lower(system)
+    """Lower a system; the result needs no SymPy to run.
+
+    Raises
+    ------
+    ModelError
+        The symbolic work takes longer than the limits allow.
+    """
+    try:
+        with deep_stack(), timebox(limits.current().seconds):
+            return _lower(system)
+    except OutOfTime:
+        message = "deriving and writing out the expressions of this model takes too long"
+        hint = "make parts of its expressions states, or allow more time with --limit seconds=600"
+        raise ModelError([Diagnostic(TOO_LONG, message, None, hint)]) from None
 
 
 def _lower(system: HybridSystem) -> lowered.Program:

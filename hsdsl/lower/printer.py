@@ -56,6 +56,9 @@ class KernelPrinter(PythonCodePrinter):
     def _print_NaN(self, expr):
         return "nan"
 
+    # what differentiation leaves where there is no real value: log(-1) in the derivative of (-1)**x
+    _print_ImaginaryUnit = _print_ComplexInfinity = _print_Infinity = _print_NegativeInfinity = _print_NaN
+
     def _print_Function(self, expr):
         name = _NAMES[type(expr).__name__]
         return f"{name}({', '.join(self._print(a) for a in expr.args)})"

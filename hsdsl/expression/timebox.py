@@ -1,0 +1,93 @@
+"""A box in time around symbolic work, which SymPy cannot be asked to leave by itself.
+
+A second thread watches the processor time of the process and raises :class:`OutOfTime` in the one that works, at its
+next Python instruction. Unlike a signal that does not need the main thread.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any
+
+PARTS = 15  # into which the time for a file is divided: one expression may take one
+
+_python: Any = getattr(ctypes, "pythonapi", None)  # CPython; elsewhere the time is looked at between parts
+_send: Any = None if _python is None else _python.PyThreadState_SetAsyncExc
+
+
+class OutOfTime(BaseException):
+    """The time is spent. No `Exception`, so that no library takes it for one of its own."""
+
+
+class Box:
+    """What is left of the time: for the whole, and for the part that was begun last."""
+
+    def __init__(self, seconds: float, parts: int) -> None:
+        self._part = seconds / parts
+        self._end = time.process_time() + seconds
+        self._part_end = self._end
+
+    def restart(self) -> None:
+        """Begin the next part.
+
+        Raises
+        ------
+        OutOfTime
+            The time for the whole is spent.
+        """
+        now = time.process_time()
+        if now >= self._end:
+            raise OutOfTime
+        self._part_end = now + self._part
+
+    def left(self) -> float:
+        """Processor seconds until this part, or the whole, is out of time."""
+        return min(self._end, self._part_end) - time.process_time()
+
+
+@contextmanager
+def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
+    """Bound the processor time of a block.
+
+    Parameters
+    ----------
+    seconds : float
+        Processor seconds for the whole block.
+    parts : int
+        Between two calls of ``restart`` there is time for one of so many parts.
+
+    Raises
+    ------
+    OutOfTime
+        In the block, once the time is spent.
+    """
+    box = Box(seconds, parts)
+    done = threading.Event()
+    lock = threading.Lock()
+    thread = threading.get_ident()
+
+    def watch() -> None:
+        while not done.wait(max(0.01, box.left())):
+            with lock:
+                if not done.is_set() and box.left() <= 0:
+                    _raise_in(thread, OutOfTime)
+                    return
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield box
+    finally:
+        with lock:
+            done.set()
+        _raise_in(thread, None)  # one that was sent and has not arrived
+        watcher.join()
+
+
+def _raise_in(thread: int, exception: type[BaseException] | None) -> None:
+    if _send is not None:
+        _send(ctypes.c_ulong(thread), ctypes.py_object(exception) if exception else ctypes.c_void_p())

@@ -1,0 +1,64 @@
+"""What a model may ask of the machine, and which of it a user may allow more of."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from hsdsl.errors import UsageError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Caps on a model file, each checked before what it bounds is done.
+
+    Attributes
+    ----------
+    bytes : int
+        Size of the file.
+    values : int
+        Keys, values, mappings and lists in it, with aliases expanded.
+    modes : int
+        Modes, and entries of any other mapping.
+    seconds : float
+        Processor time for the symbolic work on the whole file, once to read it and once to lower it.
+    folders : tuple of Path
+        Where data files may lie besides the model's own folder.
+    """
+
+    bytes: int = 1 << 20
+    values: int = 200_000
+    modes: int = 10_000
+    seconds: float = 60.0
+    folders: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in NUMBERS:
+            if not getattr(self, name) > 0:
+                raise UsageError(f"the limit '{name}' must be positive, not {getattr(self, name)}")
+
+
+NUMBERS = tuple(f.name for f in fields(Limits) if f.name != "folders")
+DEFAULT = Limits()
+_current: ContextVar[Limits] = ContextVar("limits", default=DEFAULT)
+
+
+def current() -> Limits:
+    """Return the limits in force."""
+    return _current.get()
+
+
+@contextmanager
+def applied(limits: Limits | None) -> Generator[None]:
+    """Put limits in force for a while; None changes nothing."""
+    if limits is None:
+        yield
+        return
+    token = _current.set(limits)
+    try:
+        yield
+    finally:
+        _current.reset(token)

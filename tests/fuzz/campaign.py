@@ -1,0 +1,267 @@
+"""Many inputs in worker processes, each with 5 seconds and 1 GiB: count them, and keep what breaks.
+
+python tests/fuzz/campaign.py --kind expressions --inputs 100000
+python tests/fuzz/campaign.py --kind documents --seconds 600 --workers 4
+python tests/fuzz/campaign.py --kind bytes --replay 4711
+
+Input number N of a kind and a seed is always the same one, as long as the files it is made from stay the same. Exit
+code 1 where anything was found: an exception that is not a refusal, a hang, too much memory, or a payload that did
+something.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from random import Random
+from typing import Any
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[2])]
+sys.path = [entry for entry in sys.path if Path(entry or ".").resolve() != Path(__file__).resolve().parent]
+
+from fuzz import generators, targets  # noqa: E402
+
+KINDS = {"bytes": generators.raw, "expressions": generators.expression, "documents": generators.document}
+SECONDS, MEMORY = 5.0, 1 << 30
+BLOCK = 200
+SLOW = 1.0
+
+
+class Hang(BaseException):
+    """An input that took too long."""
+
+
+def _hang(*_: Any) -> None:
+    raise Hang
+
+
+@contextmanager
+def limited_time(seconds: float = SECONDS) -> Generator[None]:
+    """Raise :class:`Hang` after some processor time."""
+    before = signal.signal(signal.SIGPROF, _hang)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def of_index(kind: str, seed: int, index: int) -> tuple[str | bytes, Random]:
+    """Input number ``index``, and the randomness that is left for the rest."""
+    rng = Random(f"{seed}:{kind}:{index}")
+    return KINDS[kind](rng), rng
+
+
+def work(kind: str, seed: int, share: float, jobs: Any, answers: Any, now: Any) -> None:
+    """Take blocks of indices until there are none."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with tempfile.TemporaryDirectory() as folder:
+        inside = targets.prepared(Path(folder))
+        os.chdir(inside)
+        guard = targets.Guard(inside)
+        targets.feed_document(b"", Random(0), inside, 1.0)
+        base = _status("VmSize")
+        resource.setrlimit(resource.RLIMIT_AS, (base + MEMORY, base + MEMORY))
+        while (begin := jobs.get()) is not None:
+            found: list[dict[str, Any]] = []
+            ways: Counter[str] = Counter()
+            for index in range(begin, begin + BLOCK):
+                now[0], now[1] = index, time.process_time()
+                way, fault = one(kind, seed, index, share, guard, inside)
+                ways[way] += 1
+                if fault:
+                    found.append({"kind": kind, "seed": seed, "index": index, **fault})
+            now[0] = -1
+            answers.put((ways, found, _status("VmHWM")))
+
+
+def one(kind: str, seed: int, index: int, share: float, guard: Any, folder: Path) -> tuple[str, dict[str, Any] | None]:
+    """One input under its limits: how far it got, and what went wrong."""
+    data, rng = of_index(kind, seed, index)
+    began = time.process_time()
+    fault, way = None, "broken"
+    try:
+        with limited_time(), guard.watch():
+            way = targets.feed(kind, data, rng, folder, share)
+    except Hang as error:
+        fault = {"what": "hang", "trace": _trace(error)}
+    except BaseException as error:
+        fault = {"what": type(error).__name__, "message": str(error)[:400], "trace": _trace(error)}
+    took = time.process_time() - began
+    if fault is None and took > SLOW:
+        fault = {"what": "slow", "trace": [way]}
+    if fault is not None:
+        text = data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
+        fault |= {"seconds": round(took, 2), "input": text[:3000]}
+    return way, fault
+
+
+def _trace(error: BaseException) -> list[str]:
+    frames = traceback.extract_tb(error.__traceback__)[-12:]
+    return [f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in frames]
+
+
+def _status(key: str) -> int:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(key + ":"):
+            return int(line.split()[1]) * 1024
+    return 0
+
+
+class Crew:
+    """Worker processes, replaced when they die or hang where no signal reaches them."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.context = multiprocessing.get_context("spawn")
+        self.jobs = self.context.SimpleQueue()
+        self.answers = self.context.Queue()
+        self.workers = [self.hired() for _ in range(options.workers)]
+
+    def hired(self) -> tuple[Any, Any]:
+        """A new worker, and what it is at."""
+        now = self.context.Array("d", [-1.0, 0.0], lock=False)
+        arguments = (self.options.kind, self.options.seed, self.options.share, self.jobs, self.answers, now)
+        worker = self.context.Process(target=work, args=arguments, daemon=True)
+        worker.start()
+        return worker, now
+
+    def inspect(self) -> list[dict[str, Any]]:
+        """What became of workers that no longer answer; each is replaced."""
+        found: list[dict[str, Any]] = []
+        for number, (worker, now) in enumerate(self.workers):
+            stuck = worker.is_alive() and now[0] >= 0 and _processor_time(worker.pid) - now[1] > 3 * SECONDS
+            if not stuck and (worker.is_alive() or now[0] < 0):
+                continue
+            if stuck:
+                worker.kill()
+            data, _ = of_index(self.options.kind, self.options.seed, int(now[0]))
+            text = data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
+            what = "hang in C" if stuck else f"died with {worker.exitcode}"
+            found.append({"kind": self.options.kind, "seed": self.options.seed, "index": int(now[0]), "what": what,
+                          "trace": [what], "input": text[:3000]})  # fmt: skip
+            self.workers[number] = self.hired()
+        return found
+
+
+def _processor_time(pid: int) -> float:
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
+    """Feed until the inputs or the seconds are spent."""
+    began = time.monotonic()
+    crew = Crew(options)
+    ways: Counter[str] = Counter()
+    faults: list[dict[str, Any]] = []
+    given, peak, next_index = 0, 0, options.start
+    waiting = 0
+    while True:
+        spent = given >= options.inputs or time.monotonic() - began > options.seconds
+        while not spent and waiting < 2 * options.workers:
+            crew.jobs.put(next_index)
+            next_index, given, waiting = next_index + BLOCK, given + BLOCK, waiting + 1
+            spent = given >= options.inputs
+        if spent and not waiting:
+            break
+        try:
+            counted, found, high = crew.answers.get(timeout=2)
+        except Exception:
+            lost = crew.inspect()
+            faults += lost
+            waiting -= len(lost)  # the rest of a block is lost with its worker
+            continue
+        ways.update(counted)
+        faults += found
+        peak, waiting = max(peak, high), waiting - 1
+        if sum(ways.values()) % (50 * BLOCK) == 0:
+            _say(options, ways, faults, began)
+    for _ in crew.workers:
+        crew.jobs.put(None)
+    return {
+        "kind": options.kind, "seed": options.seed, "inputs": sum(ways.values()), "first": options.start,
+        "seconds": round(time.monotonic() - began), "ways": dict(ways), "peak_bytes": peak, "faults": faults,
+    }  # fmt: skip
+
+
+def _say(options: argparse.Namespace, ways: Counter[str], faults: list[dict[str, Any]], began: float) -> None:
+    counted = ", ".join(f"{n:,} {way}" for way, n in ways.most_common())
+    grave = sum(f["what"] != "slow" for f in faults)
+    print(f"{options.kind}: {counted}; {grave} faults, {len(faults) - grave} slow, {time.monotonic() - began:.0f} s",
+          file=sys.stderr, flush=True)  # fmt: skip
+
+
+def distinct(faults: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One of each sort, the shortest input first found."""
+    sorts: dict[tuple[str, str], dict[str, Any]] = {}
+    for fault in faults:
+        if fault["what"] == "slow":
+            continue
+        key = (fault["what"], fault["trace"][-1] if fault["trace"] else "")
+        kept = sorts.setdefault(key, {**fault, "times": 0})
+        kept["times"] += 1
+    return list(sorts.values())
+
+
+def parsed(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The options."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kind", choices=KINDS, required=True)
+    parser.add_argument("--inputs", type=int, default=10_000)
+    parser.add_argument("--seconds", type=float, default=float("inf"))
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=int, default=0, help="the number of the first input")
+    parser.add_argument("--share", type=float, default=0.15, help="how many of the legal ones are lowered and run")
+    parser.add_argument("--out", type=Path, help="write counts and faults as JSON")
+    parser.add_argument("--replay", type=int, help="feed one input and let its exception through")
+    return parser.parse_args(arguments)
+
+
+def main() -> int:
+    """Run a campaign, or one input of it again."""
+    options = parsed()
+    if options.replay is not None:
+        return replay(options)
+    result = run(options)
+    if options.out:
+        options.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    grave = distinct(result["faults"])
+    for fault in grave:
+        print(f"{fault['what']} x {fault['times']}: --seed {fault['seed']} --replay {fault['index']}: "
+              f"{fault.get('message', '')} {' > '.join(fault['trace'][-4:])}")  # fmt: skip
+    print(json.dumps({**result, "faults": sum(f["what"] != "slow" for f in result["faults"]),
+                      "slow": sum(f["what"] == "slow" for f in result["faults"])}))  # fmt: skip
+    return 1 if grave else 0
+
+
+def replay(options: argparse.Namespace) -> int:
+    """One input again, here."""
+    data, rng = of_index(options.kind, options.seed, options.replay)
+    print(data if isinstance(data, str) else data.decode("utf-8", "backslashreplace"))
+    with tempfile.TemporaryDirectory() as folder:
+        inside = targets.prepared(Path(folder))
+        began = time.process_time()
+        print(targets.feed(options.kind, data, rng, inside, options.share), time.process_time() - began, "s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""What must hold for every input: an answer or a refusal of ours, no code run, nothing touched, names mangled."""
+
+from __future__ import annotations
+
+import builtins
+import re
+import signal
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from fuzz import seeds
+from hsdsl.diagnose import as_json, render
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import ModelError, UsageError
+from hsdsl.expression import ExpressionError, parse, symbolic
+from hsdsl.expression.inequality import inequality
+from hsdsl.expression.scope import Scope, Value, state, symbol
+from hsdsl.expression.stack import deep_stack
+from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.model import Model
+from hsdsl.system import TIME
+
+SCOPE = Scope(
+    {
+        **{name: state(name) for name in ("x", "v", "y", "u")},
+        **{name: Value(symbol(name)) for name in ("a", "c", "k")},
+        "t": Value(TIME),
+    }
+)
+# all that generated text may consist of, besides numbers and punctuation
+_GENERATED = re.compile(
+    r"def|return|bind|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
+    r"|flow|surfaces|magnitudes|outputs|(?:gradient|rate|reset|spread|expression|parameter|minimum|maximum|input)_\d+"
+    r"|condition_\d+_\d+|initial|until|step|tolerance|relaxation|max_transitions|sample_times|sample_count"
+    r"|[xpabcsvwg]\d+|q_m?\d+_\d+"
+    r"|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|log|sqrt|abs|sign|floor|min|max"
+)
+_WORD = re.compile(r"[^\W\d]\w*")
+_FORBIDDEN = ("os.", "subprocess.", "socket.", "shutil.", "ctypes.", "urllib.", "ftplib.", "pty.", "pickle.")
+
+
+class Violation(Exception):
+    """Something happened that no model may cause."""
+
+
+class Guard:
+    """An audit hook: while `watching`, files of the folder may be read, and nothing else may happen."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = str(folder.resolve())
+        self.watching = False
+        self.seen: list[str] = []
+        self._readable = (self.folder, sys.prefix, sys.base_prefix, str(seeds.TESTS.parent / "hsdsl"))
+        sys.addaudithook(self._hook)
+
+    def _hook(self, event: str, arguments: tuple[Any, ...]) -> None:
+        if not self.watching:
+            return
+        if event == "open":
+            self._opened(*arguments)
+        elif event == "compile":
+            self._compiled(*arguments)
+        elif event.startswith(_FORBIDDEN) and event not in ("os.listdir", "os.scandir"):
+            self.seen.append(f"{event} {arguments!r:.200}")
+
+    def _opened(self, path: Any, mode: Any, flags: int) -> None:
+        import os
+
+        if isinstance(path, int):
+            return
+        real = os.path.realpath(os.fsdecode(path))
+        if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) or not real.startswith(self._readable):
+            self.seen.append(f"open {real} {mode}")
+
+    def _compiled(self, source: Any, filename: Any) -> None:
+        if source is not None and not str(filename).startswith("<hsdsl"):
+            self.seen.append(f"compile {source!r:.200}")
+
+    @contextmanager
+    def watch(self) -> Generator[None]:
+        """Raise what was seen; also where a payload has left its mark."""
+        self.seen.clear()
+        self.watching = True
+        try:
+            yield
+        finally:
+            self.watching = False
+        if (Path(self.folder) / seeds.CANARY).exists() or hasattr(builtins, seeds.CANARY):
+            self.seen.append("the payload ran")
+        if self.seen:
+            raise Violation("; ".join(self.seen[:5]))
+
+
+def prepared(folder: Path) -> Path:
+    """A folder as models lie in: data files good and bad, a way out of it, and something outside."""
+    inside = folder / "model"
+    inside.mkdir(parents=True, exist_ok=True)
+    (inside / "u.csv").write_text("time,u\n0,1\n0.5,-1\n1,2e300\n")
+    (inside / "empty.csv").write_text("")
+    (inside / "binary.csv").write_bytes(bytes(range(256)) * 4)
+    (folder / "secret.csv").write_text("time,u\n0,1\n")
+    for link, target in (("link.csv", folder / "secret.csv"), ("outside", folder)):
+        if not (inside / link).is_symlink():
+            (inside / link).symlink_to(target)
+    return inside
+
+
+def feed(kind: str, data: str | bytes, rng: Random, folder: Path, share: float = 0.15) -> str:
+    """One input through what reads it; the answer is how far it got.
+
+    Raises
+    ------
+    Exception
+        Anything but the refusals of the house: a defect.
+    """
+    if kind == "expressions":
+        return feed_expression(str(data), rng, share)
+    return feed_document(data if isinstance(data, bytes) else data.encode(), rng, folder, share)
+
+
+def feed_expression(text: str, rng: Random, share: float) -> str:
+    """One expression, as a number, a condition and an inequality."""
+    got = "refused"
+    for wanted in ("number", "condition", "inequality"):
+        try:
+            tree = parse(text, wanted)  # pyright: ignore[reportArgumentType]
+            if SCOPE.faults(tree):
+                continue
+            with deep_stack():
+                if wanted == "number":
+                    found = [symbolic.number(tree, SCOPE, text).expr]
+                elif wanted == "inequality":
+                    both = inequality(tree, SCOPE, text, "when")
+                    found = [both.left.expr, both.right.expr]
+                else:
+                    symbolic.condition(tree, SCOPE, text)
+                    continue
+                got = "read"
+                if rng.random() < share:
+                    _lowered(found)
+                    got = "lowered"
+        except ExpressionError as error:
+            if not (0 <= error.start < error.end <= max(1, len(text) + 1) and error.message):
+                raise Violation(f"{error.code} at {error.start}:{error.end}: {error.message}") from error
+    return got
+
+
+def _lowered(found: list[Any]) -> None:
+    names = dict(zip(map(symbol, ("x", "v", "y", "u", "a", "c", "k")), map(symbol, _MANGLED), strict=True))
+    exprs = [replaced(expr, names, {}) for expr in found]
+    arguments = [TIME, *(symbol(f"x{i}") for i in range(4))]
+    gradient = Gradient(exprs, arguments)
+    every = (*exprs, *(d for row in gradient.rows for d in row))
+    check_text(print_routines([Definition("flow", tuple(arguments), every, gradient.statements)], ()).source)
+
+
+_MANGLED = ("x0", "x1", "x2", "x3", "p0", "p1", "p2")
+
+
+def feed_document(data: bytes, rng: Random, folder: Path, share: float) -> str:
+    """One file: read, a share of them lowered, and a share of those run for a moment."""
+    path = str(folder / "m.yaml")
+    try:
+        model = Model(elaborate(path, text=data))
+    except ModelError as error:
+        for diagnostic in error.diagnostics:
+            _check_said(render(diagnostic))
+        if not error.diagnostics:
+            raise Violation("refused without a word") from error
+        as_json(error.diagnostics)
+        return "refused"
+    if rng.random() >= share:
+        return "read"
+    program = model.program
+    for routines in (program.constants, *(r for mode in program.modes for r in (mode.routines, mode.diagnosis))):
+        check_text(routines.source)
+    try:
+        with interrupted_after(0.1):
+            model.simulate(max_transitions=20)
+    except (UsageError, KeyboardInterrupt):
+        return "lowered"
+    return "run"
+
+
+def check_text(source: str) -> None:
+    """Refuse generated text with a word in it that is not ours."""
+    for word in set(_WORD.findall(source)):
+        if not _GENERATED.fullmatch(word):
+            raise Violation(f"the name {word!r} stands in generated text")
+
+
+def _check_said(text: str) -> None:
+    for jargon in ("sympy", "pydantic", "Traceback", " object at 0x", "\x1b"):
+        if jargon in text.split("\n")[0]:
+            raise Violation(f"{jargon!r} is said: {text[:300]}")
+
+
+@contextmanager
+def interrupted_after(seconds: float) -> Generator[None]:
+    """Ctrl-C after some processor time."""
+    before = signal.signal(signal.SIGVTALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
