@@ -1,4 +1,4 @@
-"""Write the reference pages that the code itself knows: language, command line, integrators, error codes.
+"""Write the reference pages that the code itself knows: language, command line, integrators, errors, lint rules.
 
 python docs/generate.py           write docs/reference/*.md
 python docs/generate.py --check   write nothing; name the pages that are stale and exit 1
@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ import typer.main
 from hsdsl import cli, errors, integrators, schema
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.integrators import ButcherTableau
+from hsdsl.lint.pages import error_pages
+from hsdsl.lint.rules import FAMILIES, RULES, family
 from hsdsl.model import requests
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -58,7 +61,16 @@ Answers go to standard output, messages and progress to standard error.
 
 ERROR_CODES = """# Error codes
 
-A code keeps its meaning for ever; a retired one is not used again.
+A code keeps its meaning for ever; a retired one is not used again. `hsdsl explain CODE` prints what stands here.
+Examples may leave out the keys that every model has.
+
+"""
+
+LINT_RULES = """# Lint rules
+
+`hsdsl lint` looks for what is legal in a model and still probably not meant (warnings), or worth knowing (notes).
+`hsdsl explain CODE` prints the page of a rule. How to choose rules and ignore findings is on
+[a page of its own](../how-to/lint.md).
 
 """
 
@@ -177,9 +189,37 @@ def as_typed(parameter: Any) -> str:
 
 
 def error_codes() -> str:
-    """List the codes a diagnostic may carry."""
-    rows = [(f"`{code}`", text) for code, text in sorted(errors.CODES.items())]
-    return ERROR_CODES + table(("code", "about"), rows)
+    """Document every code of an error."""
+    rows = [(f"[`{code}`](#{code.lower()})", text) for code, text in sorted(errors.CODES.items())]
+    parts = [f"## {code}\n\n{lowered(page)}\n\n" for code, page in error_pages().items()]
+    return ERROR_CODES + table(("code", "about"), rows) + "".join(parts)
+
+
+def lowered(page: str) -> str:
+    """Make the headings of a page those of a part of another."""
+    return page.replace("\n## ", "\n### ")
+
+
+def rule_index() -> str:
+    """List every lint rule by family."""
+    parts = [LINT_RULES]
+    for name in FAMILIES:
+        rows = [
+            (f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})", rule.name, rule.title, rule.severity)
+            for code, rule in RULES.items()
+            if family(code) == name
+        ]
+        parts.append(f"## {name.capitalize()}\n\n" + table(("code", "name", "finds", ""), rows) if rows else "")
+    return "".join(parts)
+
+
+def rule_family(name: str) -> str:
+    """Document the rules of one family from their docstrings."""
+    parts = [f"# Rules: {name}\n\n"]
+    for code, rule in RULES.items():
+        if family(code) == name:
+            parts.append(f"## {code} {rule.name}\n\n{lowered(rule.page)}\n\n")
+    return "".join(parts)
 
 
 def integrator_page() -> str:
@@ -240,6 +280,12 @@ PAGES: dict[str, Callable[[], str]] = {
     "language.md": language,
     "command-line.md": command_line,
     "errors.md": error_codes,
+    "rules.md": rule_index,
+    **{
+        f"rules/{name}.md": partial(rule_family, name)
+        for name in FAMILIES
+        if any(family(code) == name for code in RULES)
+    },
     "integrators.md": integrator_page,
 }
 
@@ -267,7 +313,7 @@ def main() -> int:
         for name in old:
             print(f"docs/reference/{name} is stale; run python docs/generate.py", file=sys.stderr)
         return 1 if old else 0
-    REFERENCE.mkdir(exist_ok=True)
+    (REFERENCE / "rules").mkdir(parents=True, exist_ok=True)
     for name in PAGES:
         (REFERENCE / name).write_text(render(name), encoding="utf-8")
     return 0

@@ -121,6 +121,7 @@ class Findings:
 
 
 # One line a code: what the code is about. The codes are stable; a retired one is never used again.
+# Each has a page, with an example, in hsdsl/lint/errors.md.
 CODES: dict[str, str] = {
     # the file and its YAML
     "HS001": "the file is not UTF-8 text",

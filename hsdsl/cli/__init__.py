@@ -16,6 +16,7 @@ import typer
 from hsdsl import __version__
 from hsdsl.cli.distance import distance
 from hsdsl.cli.doctor import doctor
+from hsdsl.cli.explain import explain
 from hsdsl.cli.lint import lint
 from hsdsl.cli.run import run
 from hsdsl.cli.schema import schema
@@ -33,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (run, validate, lint, distance, schema, doctor):
+for verb in (run, validate, lint, explain, distance, schema, doctor):
     app.command()(verb)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import PurePath
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -82,8 +82,8 @@ def _location(span: Span) -> dict[str, Any]:
 def _uri(path: str) -> str:
     """A path as a URI: relative ones stay relative, to be resolved by who reads the log."""
     if os.path.isabs(path):
-        return PurePath(path).as_uri()
-    return quote(PurePath(path).as_posix())
+        return Path(path).as_uri()
+    return quote(Path(path).as_posix())
 
 
 def _edit(edit: Edit) -> dict[str, Any]:

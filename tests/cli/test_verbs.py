@@ -48,3 +48,12 @@ def test_version(command):
 @pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "a", "b"], ["validate"]])
 def test_wrong_words(command, arguments):
     assert command(*arguments).code == 2
+
+
+def test_explain(command):
+    error, rule = command("explain", "hs111"), command("explain", "unused-parameter")
+    assert error.code == rule.code == 0
+    assert error.out.startswith("HS111\n\nA name that nothing defines.\n") and "Use instead" in error.out
+    assert rule.out.startswith("HS401 unused-parameter\n\nA parameter that nothing uses.\n")
+    assert command("explain", "HS401", "--json").json["page"] in rule.out
+    assert command("explain", "HS999").code == 2

@@ -1,0 +1,41 @@
+"""The pages of errors, and `hsdsl explain`. The pages of rules are tested with the rules."""
+
+import pytest
+from lint.fragments import blocks, completed
+
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import CODES, ModelError
+from hsdsl.lint import RULES
+from hsdsl.lint.pages import error_pages, pages, titles
+
+WITHOUT_EXAMPLE = {"HS001", "HS110", "HS122"}  # not UTF-8; ten thousand characters; a minute of work
+
+
+def codes_found(page, heading, folder):
+    for language, text in blocks(page, heading):
+        if language == "csv":
+            (folder / "u.csv").write_text(text)
+    (text,) = [text for language, text in blocks(page, heading) if language == "yaml"]
+    try:
+        elaborate(folder / "model.yaml", text=completed(text).encode())
+    except ModelError as error:
+        return {diagnostic.code for diagnostic in error.diagnostics}
+    return set()
+
+
+def test_every_code_has_a_page_and_a_title():
+    assert list(error_pages()) == list(CODES)
+    assert set(pages()) == set(titles()) == {*CODES, *RULES}
+
+
+@pytest.mark.parametrize("code", [code for code in CODES if code not in WITHOUT_EXAMPLE])
+def test_examples(code, tmp_path):
+    page = error_pages()[code]
+    assert codes_found(page, "Example", tmp_path) == {code}
+    assert codes_found(page, "Use instead", tmp_path) == set()
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_page_says_something_beside_its_examples(code):
+    title, text, *_ = error_pages()[code].split("\n\n")
+    assert title.endswith(".") and text.endswith(".") and not text.startswith("#")
