@@ -7,6 +7,7 @@ the code generator's by exchanging one of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -14,8 +15,24 @@ from hsdsl.arithmetic import Arithmetic, Number
 Vector = tuple[Number, ...]
 Routine = Callable[..., Vector]  # called as routine(t, x0, ..., x{n-1})
 Series = Sequence[Number]  # Taylor coefficients 0, 1, 2, ... in time
-Taylor = Callable[[int, Number, Vector], tuple[tuple[Series, ...], tuple[Series | None, ...]]]
-# called as taylor(order, t, x): the series of the solution through (t, x), and of each smooth surface along it
+
+
+@dataclass(frozen=True)
+class Taylor:
+    """Taylor coefficients along one mode's flow, data bound.
+
+    Attributes
+    ----------
+    flow : callable
+        ``flow(order, t, x)`` gives the series of all lines that the flow needs, of the solution through (t, x): line 0
+        is time, lines 1 to n are the states, with coefficients 0 to order + 1.
+    surfaces : callable
+        ``surfaces(order, lines)`` gives the coefficients 0 to order of each surface along that solution; None for one
+        that is kinked.
+    """
+
+    flow: Callable[[int, Number, Vector], tuple[Series, ...]]
+    surfaces: Callable[[int, tuple[Series, ...]], tuple[Series | None, ...]]
 
 
 class ModeKernel(Protocol):

@@ -59,6 +59,8 @@ class Tape:
         The line of each state's derivative.
     surfaces : tuple of int or None
         The line of each surface; None where it is kinked.
+    needed : int
+        How many operations, the first ones, the flow needs.
     """
 
     constants: Routines
@@ -66,6 +68,7 @@ class Tape:
     operations: tuple[Operation, ...]
     flow: tuple[int, ...]
     surfaces: tuple[int | None, ...]
+    needed: int
 
 
 @dataclass(frozen=True)

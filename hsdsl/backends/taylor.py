@@ -47,26 +47,28 @@ def compile_tape(tape: Tape, dimension: int, arithmetic: Arithmetic, name: str) 
     exec(compile(text_of(tape, dimension), f"<hsdsl series of {name}>", "exec"), namespace)
 
     def bind(data: Sequence[Number]) -> Taylor:
-        return namespace["bind"](*constants(*data)[0]())
+        return Taylor(*namespace["bind"](*constants(*data)[0]()))
 
     return bind
 
 
 def text_of(tape: Tape, dimension: int) -> str:
-    """Write ``bind(constants)``, which returns ``taylor(order, t, x)``."""
-    states = range(1, dimension + 1)
-    first = dimension + 1
+    """Write ``bind(constants)``, which returns the two functions of a `Taylor`."""
+    states, first = range(1, dimension + 1), dimension + 1
     lines = [_line(first + i, operation) for i, operation in enumerate(tape.operations)]
-    body = [f"def bind({', '.join(f'c{i}' for i in range(tape.constant_count))}):", "  def taylor(order, t, x):"]
+    own, after = range(first, first + tape.needed), range(first + tape.needed, first + len(lines))
+    body = [f"def bind({', '.join(f'c{i}' for i in range(tape.constant_count))}):", "  def flow(order, t, x):"]
     body += ["    l0 = [t, one] + [zero]*order", *(f"    l{i} = [x[{i - 1}]]" for i in states)]
-    body += [f"    l{first + i} = []" for i in range(len(lines))]
-    body += ["    for k in range(order):", "      m = k + 1"]
-    body += [f"      {line}" for line in lines]
+    body += [f"    l{i} = []" for i in own]
+    body += ["    for k in range(order + 1):", "      m = k + 1"]
+    body += [f"      {lines[i - first]}" for i in own]
     body += [f"      l{i}.append(l{tape.flow[i - 1]}[k]/m)" for i in states]
-    body += ["    k = order", *(f"    {line}" for line in _for_surfaces(tape, lines, first))]
-    surfaces = ", ".join("None" if line is None else f"l{line}" for line in tape.surfaces)
-    body += [f"    return ({''.join(f'l{i}, ' for i in states)}), ({surfaces}{', ' if tape.surfaces else ''})"]
-    return "\n".join([*body, "  return taylor", ""])
+    every = "".join(f"l{i}, " for i in range(first + tape.needed))
+    body += [f"    return ({every})", "  def surfaces(order, lines):", f"    ({every}) = lines"]
+    body += [f"    l{i} = []" for i in after]
+    body += ["    for k in range(order + 1):", "      pass", *(f"      {lines[i - first]}" for i in after)]
+    found = "".join("None, " if line is None else f"l{line}[:order + 1], " for line in tape.surfaces)
+    return "\n".join([*body, f"    return ({found})", "  return flow, surfaces", ""])
 
 
 def _line(number: int, operation: Operation) -> str:
@@ -74,14 +76,3 @@ def _line(number: int, operation: Operation) -> str:
     names = dict(zip("uvgw", (f"l{i}" for i in operation.lines), strict=False))
     text = template.format(kind=operation.kind, z=f"l{number}", c=f"c{operation.constant}", **names)
     return f"l{number}.append({text})"
-
-
-def _for_surfaces(tape: Tape, lines: list[str], first: int) -> list[str]:
-    """The last coefficient of what the surfaces need: the states have theirs already."""
-    wanted, needed = [line for line in tape.surfaces if line is not None], set[int]()
-    while wanted:
-        line = wanted.pop()
-        if line >= first and line not in needed:
-            needed.add(line)
-            wanted += tape.operations[line - first].lines
-    return [lines[line - first] for line in sorted(needed)]

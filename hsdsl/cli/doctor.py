@@ -27,7 +27,7 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print one JSON obj
 
 def _found() -> dict[str, Any]:
     from hsdsl import __version__
-    from hsdsl.integrators import INTEGRATORS
+    from hsdsl.integrators import METHODS
     from hsdsl.simulate import SCHEMES
 
     return {
@@ -40,7 +40,7 @@ def _found() -> dict[str, Any]:
         "engines": ["python"],
         "compilers": [name for name in COMPILERS if shutil.which(name)],
         "schemes": list(SCHEMES),
-        "methods": list(INTEGRATORS),
+        "methods": list(METHODS),
     }
 
 

@@ -1,4 +1,4 @@
-"""Integrators: one file a method, each a table; this dictionary is what models and the command line may name."""
+"""Integrators: one file a method, most of them tables; METHODS is what models and the command line may name."""
 
 from hsdsl.integrators.dop853 import DOP853
 from hsdsl.integrators.dopri5 import DOPRI5
@@ -8,10 +8,13 @@ from hsdsl.integrators.midpoint import MIDPOINT
 from hsdsl.integrators.ralston import RALSTON
 from hsdsl.integrators.rk4 import RK4
 from hsdsl.integrators.tableau import ButcherTableau
+from hsdsl.integrators.taylor import TAYLOR, TaylorMethod
 
 INTEGRATORS: dict[str, ButcherTableau] = {
     table.name: table for table in (EULER, MIDPOINT, HEUN, RALSTON, RK4, DOPRI5, DOP853)
 }
-AUTO = DOPRI5.name  # what `method: auto` means while there is one adaptive method
+Method = ButcherTableau | TaylorMethod
+METHODS: dict[str, Method] = {**INTEGRATORS, TAYLOR.name: TAYLOR}
+AUTO = DOPRI5.name  # what `method: auto` means while there is no fast engine for the others
 
-__all__ = ["AUTO", "INTEGRATORS", "ButcherTableau"]
+__all__ = ["AUTO", "INTEGRATORS", "METHODS", "ButcherTableau", "Method", "TaylorMethod"]

@@ -37,7 +37,7 @@ class Stepper:
         ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
     """
 
-    table: ButcherTableau
+    name: str
     step: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]]
     piece: Callable[[Flow, Number, Number, State, State, Stages, State, State], Polynomial]
     error: Callable[[Number, Stages, State], State] | None
@@ -48,7 +48,7 @@ def stepper(table: ButcherTableau, dimension: int, arithmetic: Arithmetic) -> St
     """Write and compile the step functions of ``table`` for ``dimension`` states."""
     writer = _Writer(table, dimension, arithmetic)
     return Stepper(
-        table,
+        table.name,
         writer.compile("step", writer.step()),
         writer.compile("piece", writer.piece()),
         writer.compile("error", writer.error()) if table.adaptive else None,

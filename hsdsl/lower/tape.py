@@ -32,9 +32,10 @@ def make_tape(flow, surfaces, states, data) -> Tape | None:
         rows = tuple(writer.line(f) for f in flow)
     except Kinked:
         return None
+    needed = len(writer.operations)
     lines = tuple(writer.line_or_none(r) for r in surfaces)
     constants = print_routines([Definition("constants", (), tuple(writer.constants))], data)
-    return Tape(constants, len(writer.constants), tuple(writer.operations), rows, lines)
+    return Tape(constants, len(writer.constants), tuple(writer.operations), rows, lines, needed)
 
 
 class _Writer:

@@ -15,11 +15,11 @@ from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.integrators import INTEGRATORS
+from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.lower import lower
 from hsdsl.model.estimate import Estimate, compare, finer_settings
 from hsdsl.model.mechanical import one_stop
-from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, resolve
+from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
 from hsdsl.names import did_you_mean
@@ -102,7 +102,7 @@ class Model:
         until : number or str, optional
             End of the run.
         scheme, method : str, optional
-            A name of :data:`hsdsl.simulate.SCHEMES`; a name of :data:`hsdsl.integrators.INTEGRATORS`, or ``auto``.
+            A name of :data:`hsdsl.simulate.SCHEMES`; a name of :data:`hsdsl.integrators.METHODS`, or ``auto``.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to 1 + |x|; they exclude each other.
         relaxation : number or str, optional
@@ -155,7 +155,7 @@ class Model:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
         finer = finer_settings(execution)
         asked |= {"step": None, "tolerance": None, "watch": None, **finer}
-        if execution.method in INTEGRATORS:
+        if execution.method in METHODS:
             asked["method"] = execution.method
         return compare(execution, self.simulate(**asked), finer)
 
@@ -255,11 +255,16 @@ class Model:
         if most < 0 or most != int(most):
             raise UsageError(f"max_transitions must be a whole number, not {most}")
         check_digits(request.method, values.kernel.arithmetic)
+        check_smooth(request.method, self.program)
+        tolerance = positive("tolerance") if request.size == "tolerance" else None
+        method = request.method
+        if isinstance(method, TaylorMethod):
+            method = method.for_tolerance(tolerance, values.kernel.arithmetic)
         return Settings(
             scheme=request.scheme,
-            method=request.method,
+            method=method,
             step=positive("step") if request.size == "step" else None,
-            tolerance=positive("tolerance") if request.size == "tolerance" else None,
+            tolerance=tolerance,
             relaxation=positive("relaxation"),
             until=until,
             max_transitions=int(most),

@@ -14,8 +14,9 @@ from typing import Any
 
 from hsdsl.arithmetic import Arithmetic
 from hsdsl.errors import UsageError
-from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
+from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
 from hsdsl.names import did_you_mean
+from hsdsl.program import Program
 from hsdsl.simulate import SCHEMES
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
@@ -55,7 +56,7 @@ class Request:
     """
 
     scheme: str
-    method: ButcherTableau | None
+    method: Method | None
     size: str
     values: dict[str, Asked]
 
@@ -112,26 +113,38 @@ def _scheme(asked: Asked) -> str:
     raise UsageError(f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES]))
 
 
-def _method(asked: Asked, size_asked: Asked, size: str) -> ButcherTableau:
+def _method(asked: Asked, size_asked: Asked, size: str) -> Method:
     if asked.value == "auto":
-        return INTEGRATORS[AUTO]
-    if asked.value not in INTEGRATORS:
+        return METHODS[AUTO]
+    if asked.value not in METHODS:
         raise UsageError(
             f"there is no method '{asked.value}' ({asked.place})",
-            did_you_mean(str(asked.value), ["auto", *INTEGRATORS]),
+            did_you_mean(str(asked.value), ["auto", *METHODS]),
         )
-    table = INTEGRATORS[asked.value]
+    table = METHODS[asked.value]
     if size == "step" or table.adaptive:
         return table
     if asked.place == FILE and size_asked.place not in (FILE, "default"):
-        return INTEGRATORS[AUTO]
+        return METHODS[AUTO]
     raise UsageError(
         f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",
         "give a step, or use method 'auto'",
     )
 
 
-def check_digits(method: ButcherTableau | None, arithmetic: Arithmetic) -> None:
+def check_smooth(method: Method | None, program: Program) -> None:
+    """Refuse Taylor series for a model with a flow that has none everywhere."""
+    if not isinstance(method, TaylorMethod):
+        return
+    for mode in program.modes:
+        if mode.tape is None:
+            raise UsageError(
+                f"method '{method.name}' needs smooth flows; that of mode {mode.name} has abs, sign, min, max or floor",
+                f"use method '{AUTO}'",
+            )
+
+
+def check_digits(method: Method | None, arithmetic: Arithmetic) -> None:
     """Refuse a method whose coefficients have fewer digits than a run computes with."""
     if method is None or method.digits is None or (arithmetic.digits or 0) <= method.digits:
         return

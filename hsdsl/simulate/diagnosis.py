@@ -6,7 +6,9 @@ from collections.abc import Iterable
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
+from hsdsl.integrators import TaylorMethod
 from hsdsl.integrators.stepper import State
+from hsdsl.integrators.taylor import NoSeries, terms
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.stops import show
 
@@ -22,7 +24,23 @@ def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop
                 finite = False
             if not finite:
                 return Stop("not_finite", t, f"{name}, has no finite value at t = {show(t)} ({_state(here, x)})")
+    if has_no_series(run, here, t):
+        sentence = f"the flow of mode {here.mode.name} has no Taylor series at t = {show(t)}; another method may go on"
+        return Stop("not_finite", t, sentence)
     return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
+
+
+def has_no_series(run: Run, here: Here, t: Number) -> bool:
+    """Whether the method is Taylor's and cannot expand the flow where the run stands."""
+    method = run.settings.method
+    series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
+    if not isinstance(method, TaylorMethod) or series is None:
+        return False
+    try:
+        terms(series, method.order, t, here.x)
+    except NoSeries:
+        return True
+    return False
 
 
 def _largest(here: Here) -> str:

@@ -13,7 +13,7 @@ from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators.stepper import Stages, State
+from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
 from hsdsl.simulate.patience import Patience
@@ -55,7 +55,8 @@ def relaxed(run: Run, here: Here | Stop) -> Stop:
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
     """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
-    control, method, arc, attempt = run.control, run.stepper(len(here.x)), here.arc, attempts(run, here)
+    control, method, arc = run.control, run.stepper(here), here.arc
+    attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
     t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
@@ -98,12 +99,12 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     return here.moved(t, x)
 
 
-def attempts(run: Run, here: Here) -> Attempt:
+def attempts(run: Run, here: Here, method: Stepper) -> Attempt:
     """Make the function that tries one step from (t, x) and says where it ended.
 
     It returns what was found, the step's end z, the stages, and the flow at z if it has a value there.
     """
-    method, flow, surfaces = run.stepper(len(here.x)), here.kernel.flow, here.kernel.surfaces
+    flow, surfaces = here.kernel.flow, here.kernel.surfaces
     step, isfinite, epsilon = method.step, run.arithmetic.isfinite, run.settings.relaxation
 
     def attempt(t: Number, h: Number, t1: Number, x: State, slope: State) -> Attempted:

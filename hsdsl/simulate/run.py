@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
+from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.stepper import State, Stepper, stepper
+from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import Kernel, ModeKernel
 from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate.control import Control
@@ -54,10 +56,15 @@ class Run:
         """The run's number type."""
         return self.kernel.arithmetic
 
-    def stepper(self, dimension: int) -> Stepper:
-        """The method for states of one dimension."""
-        assert self.settings.method is not None
-        return stepper(self.settings.method, dimension, self.arithmetic)
+    def stepper(self, here: Here) -> Stepper:
+        """The method for the mode that the run is in."""
+        method = self.settings.method
+        assert method is not None
+        if isinstance(method, ButcherTableau):
+            return stepper(method, len(here.x), self.arithmetic)
+        series = self.kernel.taylor(self.program.modes.index(here.mode), here.segment.data)
+        assert series is not None
+        return taylor_stepper(method, series, self.arithmetic)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are the same instant."""

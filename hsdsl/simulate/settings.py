@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
-from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators import Method
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Settings:
     """
 
     scheme: str
-    method: ButcherTableau | None
+    method: Method | None
     step: Number | None
     tolerance: Number | None
     relaxation: Number

@@ -38,7 +38,14 @@ def series(directory: Any, flow: str, order: int, x: list[Any], t: Any = 0, **mo
     """The coefficients of the first state along a flow."""
     made, program = kernel(directory, flow, [], **more)
     data = tuple(made.constant(f"parameter_{i}", ())[0] for i in range(len(program.parameters)))
-    return made.taylor(0, data)(order, made.arithmetic.zero + t, tuple(made.arithmetic.zero + v for v in x))[0][0]
+    start = tuple(made.arithmetic.zero + v for v in x)
+    return both(made.taylor(0, data), order, made.arithmetic.zero + t, start)[0][0]
+
+
+def both(taylor: Any, order: int, t: Any, x: Any) -> Any:
+    """The coefficients of states and of surfaces, up to the order."""
+    lines = taylor.flow(order, t, x)
+    return [line[: order + 1] for line in lines[1 : len(x) + 1]], taylor.surfaces(order, lines)
 
 
 def near(actual: Any, wanted: Any) -> bool:
@@ -84,7 +91,7 @@ EXPRESSIONS = [f"{name}({ARGUMENTS.get(name, 'x + x**2/3')})" for name in SMOOTH
 @pytest.mark.parametrize("text", EXPRESSIONS)
 def test_surfaces_along_a_straight_flow(text: str, tmp_path: Any) -> None:
     made, _ = kernel(tmp_path, "{x: 1}", [text], parameters="{p: 5}")
-    found = made.taylor(0, (MANY.zero + 5,))(8, MANY.zero, (MANY.constant(Fraction(3, 10)),))[1][0]
+    found = both(made.taylor(0, (MANY.zero + 5,)), 8, MANY.zero, (MANY.constant(Fraction(3, 10)),))[1][0]
     residual = hsdsl.load(tmp_path / "model.yaml").system.modes[0].walls[0].residual
     x, p = (sp.Symbol(name, real=True) for name in "xp")
     with mp.workdps(60):
@@ -95,15 +102,15 @@ def test_surfaces_along_a_straight_flow(text: str, tmp_path: Any) -> None:
 
 def test_a_whole_power_of_a_series_that_begins_with_zero(tmp_path: Any) -> None:
     made, _ = kernel(tmp_path, "{x: 1}", ["x**p"], parameters="{p: 3}")
-    assert made.taylor(0, (MANY.zero + 3,))(5, MANY.zero, (MANY.zero,))[1][0] == [0, 0, 0, 1, 0, 0]
+    assert both(made.taylor(0, (MANY.zero + 3,)), 5, MANY.zero, (MANY.zero,))[1][0] == [0, 0, 0, 1, 0, 0]
 
 
 def test_kinked_flows_have_no_series_and_kinked_surfaces_none_of_theirs(tmp_path: Any) -> None:
     made, _ = kernel(tmp_path, "{x: abs(x)}", ["x"])
     assert made.taylor(0, ()) is None
     made, _ = kernel(tmp_path, "{x: 1}", ["sin(abs(x))", "sin(x)"], FLOAT64)
-    states, surfaces = made.taylor(0, ())(2, 0.0, (0.0,))
-    assert states == ([0.0, 1.0, 0.0],) and surfaces[0] is None and surfaces[1] == [0.0, 1.0, 0.0]
+    states, surfaces = both(made.taylor(0, ()), 2, 0.0, (0.0,))
+    assert states == [[0.0, 1.0, 0.0]] and surfaces[0] is None and surfaces[1] == [0.0, 1.0, 0.0]
 
 
 LEAVES = st.sampled_from(["x", "t", "p", "2", "1/3", "pi"])
@@ -132,7 +139,7 @@ def test_coefficients_of_random_expressions_are_derivatives(tmp_path_factory: An
     data = (MANY.constant(Fraction(7, 10)),)
     x, t, s, order = MANY.zero + 0.3, MANY.zero + 0.1, MANY.constant(Fraction(1, 10**12)), 4
     try:
-        (states,), (residual,) = made.taylor(0, data)(order, t, (x,))
+        (states,), (residual,) = both(made.taylor(0, data), order, t, (x,))
     except (OverflowError, ValueError):
         return
     sums = [sum(c * s**k for k, c in enumerate(row)) for row in (states, residual)]
@@ -141,3 +148,35 @@ def test_coefficients_of_random_expressions_are_derivatives(tmp_path_factory: An
     size = max(1, *(abs(c) for c in (*states, *residual)))
     assert abs(slope - bound.flow(t + s, sums[0])[0]) <= size**6 * 1e-44
     assert abs(sums[1] - bound.surfaces(t + s, sums[0])[0]) <= size**6 * 1e-44
+
+
+KINKED = """
+hsdsl: 1
+modes:
+  a: {flow: {x: "abs(x) - 1"}}
+initial: {mode: a, x: 0}
+experiment: {until: 1, method: taylor}
+"""
+
+
+def test_kinked_flows_are_refused_in_a_sentence(tmp_path: Any) -> None:
+    path = tmp_path / "kinked.yaml"
+    path.write_text(KINKED)
+    with pytest.raises(hsdsl.UsageError, match="needs smooth flows; that of mode a has abs"):
+        hsdsl.load(path).simulate()
+
+
+def test_a_flow_without_a_series_stops_in_a_sentence(tmp_path: Any) -> None:
+    path = tmp_path / "root.yaml"
+    path.write_text(KINKED.replace("abs(x) - 1", "1 + sqrt(t)"))
+    run = hsdsl.load(path).simulate()
+    assert run.stop.reason == "not_finite"
+    assert "the flow of mode a has no Taylor series at t = 0; another method may go on" in run.stop.message
+
+
+def test_an_even_solution_is_no_trap(tmp_path: Any) -> None:
+    """All coefficients up to the order vanish at the start."""
+    path = tmp_path / "late.yaml"
+    path.write_text(KINKED.replace("abs(x) - 1", "t**40"))
+    run = hsdsl.load(path).simulate(tolerance=1e-12)
+    assert run.final.state["x"] == pytest.approx(1 / 41, abs=1e-11)

@@ -1,0 +1,115 @@
+"""Taylor series of any order: each step is the solution's own polynomial, from recurrences along the flow.
+
+The coefficients come from a model's tape (`hsdsl.program.Tape`), so a flow must be smooth. The order follows from the
+tolerance. Scheme `relaxed` chooses steps by the error estimate as for every method, `located` from the last term and the
+first that is left out: A. Jorba and M. Zou, A software package for the
+numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14, 2005
+(doi:10.1080/10586458.2005.10128904).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
+from hsdsl.kernel import Taylor
+
+LEAST_ORDER = 4
+
+
+class NoSeries(ValueError):
+    """The flow has no Taylor series at a point, though it may have a value there (the square root of 0)."""
+
+
+@dataclass(frozen=True)
+class TaylorMethod:
+    """The method before (``order`` 0) or after it knows its order."""
+
+    order: int = 0
+    name: str = "taylor"
+    title: str = "Taylor series, order from the tolerance"
+    source: str = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
+    adaptive: bool = True
+    digits: int | None = None
+
+    @property
+    def degree(self) -> int:
+        """Degree of a step's polynomial."""
+        return self.order
+
+    def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> TaylorMethod:
+        """Choose the order; without a tolerance that of round-off."""
+        smallest = max(arithmetic.unit, tolerance or 0)
+        order = ceil(1 - arithmetic.functions["log"](smallest) / 2)
+        return replace(self, order=max(LEAST_ORDER, int(order)))
+
+
+TAYLOR = TaylorMethod()
+
+
+def taylor_stepper(method: TaylorMethod, series: Taylor, arithmetic: Arithmetic) -> Stepper:
+    """Make step functions from a mode's series; trials from one point share its coefficients."""
+    order, zero = method.order, arithmetic.zero
+    known: dict[tuple[Number, State], Stages] = {}
+
+    def coefficients(t: Number, x: State) -> Stages:
+        if (t, x) not in known:
+            known.clear()
+            known[t, x] = terms(series, order, t, x)
+        return known[t, x]
+
+    def step(flow: Flow, t: Number, h: Number, x: State, slope: State) -> tuple[State, Stages]:
+        stages = coefficients(t, x)
+        z = stages[-2] if x else ()
+        for c in reversed((x, *stages[:-2])):
+            z = tuple(a + h * b for a, b in zip(c, z, strict=True))
+        return z, stages
+
+    def piece(
+        flow: Flow, t: Number, h: Number, x: State, z: State, stages: Stages, slope: State, end: State
+    ) -> Polynomial:
+        power, parts = zero + 1, list[State]()
+        for c in stages[:-1]:
+            power = power * h
+            parts.append(tuple(a * power for a in c))
+        return tuple(parts)
+
+    def error(h: Number, stages: Stages, end: State) -> State:
+        """How badly the polynomial solves the equation at its end: h (X' - f) / (order + 1)."""
+        slope = tuple(order * c for c in stages[-2])
+        for m in range(order - 1, 0, -1):
+            slope = tuple(m * c + h * b for c, b in zip(stages[m - 1], slope, strict=True))
+        return tuple(h * (a - b) / (order + 1) for a, b in zip(slope, end, strict=True))
+
+    return Stepper(method.name, step, piece, error)
+
+
+def terms(series: Taylor, order: int, t: Number, x: State) -> Stages:
+    """Return the coefficients 1 to order + 1 of all states, by coefficient.
+
+    Raises
+    ------
+    NoSeries
+        There is none at this point.
+    """
+    try:
+        lines = series.flow(order, t, x)
+    except DOMAIN_ERRORS as problem:
+        raise NoSeries(str(problem)) from None
+    return tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
+
+
+def proposed_step(stages: Stages, x: State, tolerance: Number, arithmetic: Arithmetic) -> Number | None:
+    """The step at which the first terms that are left out stay below the tolerance; None where all of them vanish.
+
+    Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap.
+    """
+    power, least = arithmetic.functions["pow"], None
+    for m in (len(stages) - 1, len(stages)):
+        for c, a in zip(stages[m - 1], x, strict=True):
+            if c != 0:
+                h = power(tolerance * (1 + abs(a)) / abs(c), (arithmetic.zero + 1) / m)
+                least = h if least is None else min(h, least)
+    return least
