@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from hsdsl.metrics.budget import Budget
+
 
 class Plane:
     """All modes are parts of one plane: the digital control system, or any model whose guards glue without moving."""
 
     timed = False
-    budget = 50_000
+    evaluations = 50_000
+    budget = Budget()
 
-    def convex(self, mode):
-        return True
+    def contains(self, mode, low, high):
+        return np.ones(len(low), dtype=bool)
 
-    def between(self, p, q):
+    def between(self, p, q, enough=0.0):
         apart = np.sqrt(np.sum((p.x - q.x) ** 2, axis=1)) + np.abs(p.depth - q.depth)
         return apart, apart
 
@@ -22,8 +25,8 @@ class Plane:
 class Bent(Plane):
     """The same plane, but no domain is known to be convex: only single points and the way between them count."""
 
-    def convex(self, mode):
-        return False
+    def contains(self, mode, low, high):
+        return np.zeros(len(low), dtype=bool)
 
 
 class Line(Plane):
@@ -36,7 +39,7 @@ class Line(Plane):
     def __init__(self, restitution, grid):
         self.c, self.grid = restitution, grid
 
-    def between(self, p, q):
+    def between(self, p, q, enough=0.0):
         lower = np.abs(p.x[:, 0] - q.x[:, 0])
         v = self.grid[None, :]
         down = lambda x: np.hypot(x[:, :1], x[:, 1:] - v)  # noqa: E731
@@ -49,7 +52,7 @@ class Line(Plane):
 class Apart(Plane):
     """Modes that no edge connects."""
 
-    def between(self, p, q):
+    def between(self, p, q, enough=0.0):
         if p.mode != q.mode:
             infinite = np.full(len(p.t), np.inf)
             return infinite, infinite

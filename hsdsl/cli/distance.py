@@ -45,16 +45,21 @@ def distance(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the distance of two runs over time: .png or .svg.")
     ] = None,
+    seconds: Annotated[
+        float,
+        typer.Option(metavar="S", help="About how long the search may take; what is then still open stays open."),
+    ] = 60.0,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the sentence.")] = False,
 ) -> None:
     """Measure how far apart two states, or two runs, are in the hybrid metric."""
     with errors_reported(json):
         parameters = _parameters(set_ or [])
+        options = {"relaxation": relaxation, "parameters": parameters, "seconds": seconds}
         if second is not None:
             if from_ is not None or to is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
             names = None if coordinates is None else [name.strip() for name in coordinates.split(",")]
-            of_runs(first, second, metric, relaxation, parameters, json, names, plot)
+            of_runs(first, second, metric, json, options, names, plot)
         elif coordinates is not None or plot is not None:
             raise UsageError("--coordinates and --plot are for two runs")
         elif from_ is None or to is None:
@@ -63,18 +68,16 @@ def distance(
                 f'for example: hsdsl distance {first} --from "free x=13 v=5" --to "free x=13 v=-4"',
             )
         else:
-            of_points(first, from_, to, metric, relaxation, parameters, json)
+            of_points(first, from_, to, metric, json, options)
 
 
-def of_points(
-    path: Path, p: str, q: str, metric: str | None, relaxation: str | None, parameters: dict[str, str], json: bool
-) -> None:
+def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, options: dict[str, Any]) -> None:
     """Measure between two states of a model."""
     from hsdsl.model import load
     from hsdsl.report import dumps
 
-    name = metric or ("quotient" if relaxation is None else "relaxed")
-    found = load(path).distance(p, q, metric=name, relaxation=relaxation, parameters=parameters)
+    name = metric or ("quotient" if options["relaxation"] is None else "relaxed")
+    found = load(path).distance(p, q, metric=name, **options)
     if not json:
         print(found.sentence)
         return

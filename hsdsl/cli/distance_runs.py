@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
-from hsdsl.cli.console import say
+from hsdsl.cli.console import FIRST_SIGN, INTERVAL, say
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 
@@ -17,31 +20,63 @@ def of_runs(
     first: Path,
     second: Path,
     metric: str | None,
-    relaxation: str | None,
-    parameters: dict[str, Any],
     json: bool,
+    options: dict[str, Any],
     coordinates: Sequence[str] | None = None,
     plot: Path | None = None,
 ) -> None:
-    """Measure between two runs; a model file stands for the run of its own experiment."""
+    """Measure between two runs; a model file stands for the run of its own experiment.
+
+    ``options`` are ``relaxation``, ``parameters`` and ``seconds``.
+    """
     from hsdsl.model.between_runs import distance
     from hsdsl.report import dumps
 
-    if plot is not None and plot.suffix.lower() not in PICTURES:
-        raise UsageError(f"--plot {plot}: the name should end in .png or .svg")
-    run, other = _run(first, parameters), _run(second, parameters)
-    model = _model_beside(first, run)
-    options: dict[str, Any] = {"relaxation": relaxation, "model": model, "parameters": parameters}
-    found = distance(run, other, metric or "rho", coordinates=coordinates, **options)
+    check_picture(plot)
+    run, other = _run(first, options["parameters"]), _run(second, options["parameters"])
+    options = {**options, "model": _model_beside(first, run)}
+    with _progress() as watch:
+        found = distance(run, other, metric or "rho", coordinates=coordinates, watch=watch, **options)
     if plot is not None:
         from hsdsl.model.between_runs import plot_distance
 
         plot_distance(run, other, plot, **options)
         say(f"wrote {plot}")
-    if json:
-        print(dumps(found.as_json()))
+    print(dumps(found.as_json()) if json else found.sentence)
+
+
+def check_picture(plot: Path | None) -> None:
+    """Refuse a name that does not say what to draw.
+
+    Raises
+    ------
+    UsageError
+        Another suffix than those of ``PICTURES``.
+    """
+    if plot is not None and plot.suffix.lower() not in PICTURES:
+        raise UsageError(f"--plot {plot}: the name should end in .png or .svg")
+
+
+@contextmanager
+def _progress() -> Generator[Callable[[float, float], None] | None]:
+    """Show what is known so far, on a terminal, once it takes longer than a moment."""
+    if not sys.stderr.isatty():
+        yield None
         return
-    print(found.sentence)
+    due = monotonic() + FIRST_SIGN
+
+    def watch(lower: float, upper: float) -> None:
+        nonlocal due
+        if monotonic() >= due:
+            due = monotonic() + INTERVAL
+            sys.stderr.write(f"\rat least {lower:.4g}, at most {upper:.4g} so far\x1b[K")
+            sys.stderr.flush()
+
+    try:
+        yield watch
+    finally:
+        sys.stderr.write("\r\x1b[K")
+        sys.stderr.flush()
 
 
 def _run(path: Path, parameters: dict[str, Any]) -> Execution:

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.metrics.bernstein import largest_norm, length
+from hsdsl.metrics.bernstein import bernstein, largest_norm, length
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.merge import Cells, Side, common_span, merge
 from hsdsl.metrics.supremum import Supremum, supremum
@@ -119,16 +120,24 @@ class PointMetric(Protocol):
         ...
 
     @property
-    def budget(self) -> int:
+    def evaluations(self) -> int:
         """How many distances may be asked for before a search has to end with what it knows."""
         ...
 
-    def convex(self, mode: str) -> bool:
-        """Whether a mode's domain is known to be convex."""
+    @property
+    def budget(self) -> Budget:
+        """The time that may be spent."""
         ...
 
-    def between(self, p: Points, q: Points) -> tuple[Array, Array]:
-        """Bound the distances of pairs from below and above, each of shape (n,)."""
+    def contains(self, mode: str, low: Array, high: Array) -> Array:
+        """Whether boxes, (n, d) lower and upper corners, are known to lie in a mode's domain, or that to be convex."""
+        ...
+
+    def between(self, p: Points, q: Points, enough: float) -> tuple[Array, Array]:
+        """Bound the distances of pairs from below and above, each of shape (n,).
+
+        Upper bounds of at most ``enough`` need not be improved.
+        """
         ...
 
 
@@ -140,7 +149,7 @@ class OnSpace:
     strips: bool
 
     def over(self, a: Side, b: Side) -> Array:
-        """Bound by the difference of the two polynomials, where they are in one convex domain."""
+        """Bound by the difference of the two polynomials, where the straight lines between them stay in one domain."""
         bound = np.full(len(a.pieces), np.inf)
         same = np.flatnonzero(self._in_one_domain(a, b))
         if len(same):
@@ -150,7 +159,7 @@ class OnSpace:
                 bound[same] += apart
         return bound
 
-    def at(self, a: Side, b: Side, end: int, times: Array) -> tuple[Array, Array]:
+    def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
         """Bound at single times, mode pair by mode pair."""
         lower, upper = np.zeros(len(a.pieces)), np.full(len(a.pieces), np.inf)
         x, y = a.at_end(end), b.at_end(end)
@@ -159,7 +168,8 @@ class OnSpace:
             here = np.flatnonzero((pairs[:, 0] == i) & (pairs[:, 1] == j))
             p = self._points(a[here], i, x[here], times[here], end)
             q = self._points(b[here], j, y[here], times[here], end)
-            lower[here], upper[here] = self.metric.between(p, q)
+            lower[here], upper[here] = self.metric.between(p, q, enough)
+            enough = max(enough, float(lower[here].max()))
         return lower, upper
 
     def motion(self, side: Side) -> Array:
@@ -176,10 +186,24 @@ class OnSpace:
         return Points(name, x[:, list(columns)], times, edge, depth)
 
     def _in_one_domain(self, a: Side, b: Side) -> Array:
-        domains = [(name, columns) for name, columns in a.trace.modes if self.metric.convex(name)]
-        number_a = np.array([domains.index(m) if m in domains else -1 for m in a.trace.modes])
-        number_b = np.array([domains.index(m) if m in domains else -2 for m in b.trace.modes])
-        return number_a[a.trace.mode[a.pieces]] == number_b[b.trace.mode[b.pieces]]
+        inside = np.zeros(len(a.pieces), dtype=bool)
+        for i, layout in enumerate(a.trace.modes):
+            if layout not in b.trace.modes:
+                continue
+            other = b.trace.modes.index(layout)
+            here = np.flatnonzero((a.trace.mode[a.pieces] == i) & (b.trace.mode[b.pieces] == other))
+            if len(here):
+                inside[here] = self.metric.contains(layout[0], *self._hull(a[here], b[here], list(layout[1])))
+        return inside
+
+    def _hull(self, a: Side, b: Side, columns: list[int]) -> tuple[Array, Array]:
+        """Boxes around both curves; with the time as last coordinate where it is one."""
+        points = np.concatenate([bernstein(a.powers), bernstein(b.powers)], axis=1)[:, :, columns]
+        low, high = points.min(axis=1), points.max(axis=1)
+        if self.metric.timed:
+            begin = a.trace.start[a.pieces]
+            low, high = np.column_stack([low, begin]), np.column_stack([high, a.trace.end[a.pieces]])
+        return low, high
 
 
 def rho(
@@ -209,8 +233,9 @@ def rho(
     if relaxation is not None:
         _check_depth(cells, relaxation)
     floor = ROUNDOFF * largest_state(cells)
-    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, floor, metric.budget)
-    return curve_distance(found, cells, a, b, "quotient" if relaxation is None else "relaxed", gap)
+    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, floor, metric.evaluations, metric.budget)
+    name = "quotient" if relaxation is None else "relaxed"
+    return curve_distance(found, cells, a, b, name, gap, metric.budget)
 
 
 def _check_depth(cells: Cells, relaxation: float) -> None:
@@ -244,15 +269,18 @@ def largest_state(cells: Cells) -> float:
     return float(max(1.0, *sizes))
 
 
-def curve_distance(found: Supremum, cells: Cells, a: Execution, b: Execution, metric: str, gap: float) -> CurveDistance:
+def curve_distance(
+    found: Supremum, cells: Cells, a: Execution, b: Execution, metric: str, gap: float, budget: Budget
+) -> CurveDistance:
     """Say what a supremum means."""
     notes = [span_note(a, b, common_span(cells.a, cells.b))]
     if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + ROUNDOFF * largest_state(cells)):
-        cause = (
-            "the bounds on single point distances allow no less"
-            if found.complete
-            else f"the search stopped after {found.evaluations} point distances"
-        )
+        if budget.ran_out:
+            cause = f"the {budget.seconds:g} seconds it was given were over after {found.evaluations} point distances"
+        elif found.complete:
+            cause = "the bounds on single point distances allow no less"
+        else:
+            cause = f"the search stopped after {found.evaluations} point distances"
         notes.append(f"Upper and lower bound differ: {cause}.")
     interval = Interval(found.lower, max(found.lower, found.upper))
     return CurveDistance(interval, found.time, metric, common_span(cells.a, cells.b), " ".join(filter(None, notes)))

@@ -7,17 +7,14 @@ the point is allowed, so that the polyhedra contain the sets they stand for: low
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Curved = Callable[[Array], float]
-VectorMap = Callable[[Array], Array]
+from hsdsl.metrics.enclosures import Array
+from hsdsl.metrics.formulas import Formula
 
 TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the numbers
 
@@ -30,7 +27,7 @@ class Domain:
     coordinates: tuple[str, ...]
     normals: Array
     levels: Array
-    curved: tuple[Curved, ...] = ()
+    curved: tuple[Formula, ...] = ()
     texts: tuple[str, ...] = ()
 
     @property
@@ -65,7 +62,7 @@ class Gate:
     image_frame: Array
     normals: Array
     levels: Array
-    curved: tuple[Curved, ...] = ()
+    curved: tuple[Formula, ...] = ()
 
     @property
     def size(self) -> int:
@@ -84,14 +81,18 @@ class Gate:
 
 @dataclass(frozen=True, eq=False)
 class CurvedGate:
-    """A guard whose surface or reset is not affine: ``surface(x) = 0``, ``conditions(x) <= 0``, ``reset(x)``."""
+    """A guard whose surface or reset is not affine: ``surface(x) = 0``, ``conditions(x) <= 0``, ``reset(x)``.
+
+    ``marks`` are functions of the target's coordinates that are 0 on the image.
+    """
 
     edge: str
     source: int
     target: int
-    surface: Curved
-    conditions: tuple[Curved, ...]
-    reset: VectorMap
+    surface: Formula
+    conditions: Formula
+    reset: Formula
+    marks: Formula
 
 
 @dataclass(frozen=True, eq=False)

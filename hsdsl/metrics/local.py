@@ -1,21 +1,26 @@
 """Distances where guards, resets or domains are not affine: the best path that local solves find.
 
-Its length is an upper bound (it is a path of the space, checked in points where a domain is curved). Nothing here
-bounds from below: that comes from what no passage changes, and from the affine part of the model.
+Its length is an upper bound: it is a path of the space, and whether its straight pieces stay in curved domains is
+proved where enclosures can (:mod:`hsdsl.metrics.inside`). Nothing here bounds from below: that comes from
+:mod:`hsdsl.metrics.nearest`, and from the affine part of the model.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.routes import Crossing, Route, crossings, straight_inside
+from hsdsl.metrics.inside import CERTAIN, OUTSIDE, straight_inside
+from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
 from hsdsl.metrics.search import End, Found
+from hsdsl.metrics.serial import one_thread
 
 MOST_SEQUENCES = 6
 MORE_HOPS = 1  # than the shortest sequence has
@@ -26,20 +31,46 @@ ITERATIONS_OF_MANY = 100
 # Room for inequalities: a reset may land on a boundary everywhere, and no solver bears that as a constraint.
 MARGINS = (1e-8, 1e-10)
 STEPS = 12  # of Newton's method back onto a surface
+SMOOTHING = 1e-9  # of the length where a leg shrinks to nothing, relative to the points' distance
+DEPTH = 0.05  # how deep inside a bent path is held, relative to how far outside the straight one was
+BENDS = 2  # put into a path whose straight pieces leave their domains, at most so often
 
 
 def search_locally(
-    space: Space, starts: list[End], ends: list[End], relaxation: float, hops: int, limit: float, enough: float
+    space: Space,
+    starts: list[End],
+    ends: list[End],
+    relaxation: float,
+    hops: int,
+    limit: float,
+    enough: float,
+    budget: Budget,
 ) -> Found:
     """The best path found between any of ``starts`` and ``ends``; stops where it is as short as ``enough``."""
     found = Found(upper=limit, lower=0.0)
-    for start in starts:
-        for end in ends:
-            for sequence in _sequences(space, start, end, hops):
-                if found.upper <= enough * (1 + 1e-9):
-                    return found
-                _try(space, sequence, start, end, relaxation, found)
+    with one_thread():
+        for start in starts:
+            for end in ends:
+                for sequence in _sequences(space, start, end, hops):
+                    if found.upper <= enough or (found.upper < np.inf and budget.spent()):
+                        return found
+                    _try(space, sequence, start, end, relaxation, found)
     return found
+
+
+def improve(route: Route, guess: Array, relaxation: float) -> tuple[float, Route, Array] | None:
+    """The shortest path near a guess through a given sequence, None where none is found.
+
+    Returns
+    -------
+    length, route, unknowns
+        With tolls; the route may have bends added.
+    """
+    found = Found(upper=np.inf)
+    ends = End(*route.start), End(*route.end)
+    with one_thread():
+        _try_from(route, guess, *ends, relaxation * sum(c.edge is not None for c in route.sequence), found)
+    return None if found.upper == np.inf else (found.upper, found.through, found.unknowns)
 
 
 def _sequences(space: Space, start: End, end: End, hops: int) -> Iterator[tuple[Crossing, ...]]:
@@ -63,36 +94,71 @@ def _back(sequence: tuple[Crossing, ...], following: Crossing) -> bool:
 
 def _try(space: Space, sequence: tuple[Crossing, ...], start: End, end: End, relaxation: float, found: Found) -> None:
     toll = start.cost + end.cost + relaxation * len(sequence)
-    if not sequence:
-        value = float(np.linalg.norm(start.x - end.x)) + toll
-        if value < found.upper and straight_inside(space, start.mode, start.x, end.x):
-            _keep(found, value, (), start, end, [])
-        return
     route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
-    size = 1e3 * (1 + float(max(np.abs(start.x).max(initial=0), np.abs(end.x).max(initial=0))))
+    if not sequence:
+        verdict = int(straight_inside(space, start.mode, start.x[None], end.x[None])[0])
+        if verdict != OUTSIDE:
+            _keep(found, float(np.linalg.norm(start.x - end.x)) + toll, route, start, end, np.zeros(0), verdict)
+        else:
+            middle = (start.x + end.x) / 2
+            _try_from(_bent(route, np.zeros(0), [0]), middle, start, end, toll, found, BENDS - 1)
+        return
     for guess in _guesses(space, sequence, start, end):
-        for margin in MARGINS:
-            s = _solve(route, guess, margin * (1 + float(np.abs(guess).max(initial=0))))
-            if s is None or not np.abs(s).max(initial=0) <= size:
-                continue  # a solve that ran away: so far out its rounding alone would pass for a path
-            value = route.length(s) + toll
-            if route.allowed(s):
-                if value < found.upper:
-                    _keep(found, value, sequence, start, end, route.legs(s))
-                break
+        _try_from(route, guess, start, end, toll, found)
 
 
-def _keep(
-    found: Found,
-    value: float,
-    sequence: tuple[Crossing, ...],
-    start: End,
-    end: End,
-    legs: list[tuple[int, Array, Array]],
-) -> None:
-    found.upper, found.start, found.end = value, start, end
-    found.route = [(c.edge, c.forward) for c in sequence]
-    found.legs = legs or [(start.mode, start.x, end.x)]
+def _try_from(route: Route, guess: Array, start: End, end: End, toll: float, found: Found, bends: int = BENDS) -> None:
+    """Solve from a guess; where straight pieces leave their domains, let them bend and solve again."""
+    size = 1e3 * (1 + float(max(np.abs(start.x).max(initial=0), np.abs(end.x).max(initial=0))))
+    for margin in MARGINS:
+        s = _solve(route, guess, margin * (1 + float(np.abs(guess).max(initial=0))))
+        # A solve that ran away: so far out its rounding alone would pass for a path.
+        if s is None or not np.abs(s).max(initial=0) <= size or not route.allowed(s):
+            continue
+        value = route.length(s) + toll
+        if value >= found.upper:
+            return
+        verdicts = route.judged(s)
+        outside = [k for k, verdict in enumerate(verdicts) if verdict == OUTSIDE]
+        if not outside:
+            _keep(found, value, route, start, end, s, min(verdicts))
+        elif bends:
+            bent = _bent(route, s, outside)
+            _try_from(bent, _with_middles(route, s, outside), start, end, toll, found, bends - 1)
+        return
+
+
+def _bent(route: Route, s: Array, legs: Sequence[int]) -> Route:
+    """The same route with a bend in some of its legs, whose halves are held in their domains."""
+    held, depths = dict(route.held), dict[int, float]()
+    sequence: list[Crossing] = []
+    for k, (mode, a, b) in enumerate(route.legs(s)):
+        if k in legs:
+            depth = max(DEPTH * beyond(route.space, mode, a, b), held.get(k, 0.0))
+            depths |= {len(sequence): depth, len(sequence) + 1: depth}
+            sequence.append(bend(route.space, mode))
+        elif k in held:
+            depths[len(sequence)] = held[k]
+        sequence += route.sequence[k : k + 1]
+    return replace(route, sequence=tuple(sequence), held=tuple(depths.items()))
+
+
+def _with_middles(route: Route, s: Array, legs: Sequence[int]) -> Array:
+    points = [*route.points(s), np.zeros(0)]
+    parts: list[Array] = []
+    for k, (_, a, b) in enumerate(route.legs(s)):
+        parts += [(a + b) / 2] * (k in legs)
+        parts.append(points[k])
+    return np.concatenate(parts)
+
+
+def _keep(found: Found, value: float, route: Route, start: End, end: End, s: Array, verdict: int) -> None:
+    if value >= found.upper:
+        return
+    found.upper, found.start, found.end, found.unknowns = value, start, end, s
+    found.route = [(c.edge, c.forward) for c in route.sequence]
+    found.legs, found.through = route.legs(s), route
+    found.proved = verdict == CERTAIN
 
 
 def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End) -> list[Array]:
@@ -113,35 +179,35 @@ def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End)
 
 def _solve(route: Route, guess: Array, margin: float) -> Array | None:
     minimise: Any = import_module("scipy.optimize").minimize
+    apart = 1e-3 + float(sum(np.linalg.norm(b - a) for _, a, b in route.legs(guess)))
+
+    def length(s: Array) -> tuple[float, Array]:
+        return route.smooth_length(s, SMOOTHING * apart)
+
+    def room(s: Array) -> Array:
+        return route.room(s) + margin
+
     constraints: list[dict[str, Any]] = [
-        {"type": "eq", "fun": route.surfaces},
-        {"type": "ineq", "fun": lambda s: route.room(s) + margin},  # pyright: ignore[reportUnknownLambdaType, reportUnknownArgumentType]
+        {"type": "eq", "fun": route.surfaces, "jac": route.surface_slopes},
+        {"type": "ineq", "fun": room, "jac": route.room_slopes},
     ]
+    most = ITERATIONS if len(guess) < MANY else ITERATIONS_OF_MANY
+    options = {"maxiter": most, "ftol": 1e-13}
     with np.errstate(all="ignore"):
         try:
-            answer: Any = minimise(
-                route.length,
-                guess,
-                method="SLSQP",
-                constraints=constraints,
-                options={"maxiter": ITERATIONS if len(guess) < MANY else ITERATIONS_OF_MANY, "ftol": 1e-13},
-            )
+            answer: Any = minimise(length, guess, jac=True, method="SLSQP", constraints=constraints, options=options)
         except (ValueError, np.linalg.LinAlgError):
             return None
-    return _onto(route, np.array(answer.x, dtype=float))
+        return onto(route, np.array(answer.x, dtype=float))
 
 
-def _onto(route: Route, s: Array) -> Array:
+def onto(route: Route, s: Array) -> Array:
     """Newton's method onto the surfaces, along their gradients."""
     for _ in range(STEPS):
         residual = route.surfaces(s)
         if not np.all(np.isfinite(residual)) or np.abs(residual).max(initial=0) <= 1e-14:
             break
-        step = 1e-7 * (1 + np.abs(s))
-        moves = np.diag(step)
-        jacobian = np.column_stack(
-            [(route.surfaces(s + m) - route.surfaces(s - m)) / (2 * float(h)) for m, h in zip(moves, step, strict=True)]
-        )
+        jacobian = route.surface_slopes(s)
         if not np.all(np.isfinite(jacobian)):
             break
         s = s - np.linalg.lstsq(jacobian, residual, rcond=None)[0]

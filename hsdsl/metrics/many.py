@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from hsdsl.metrics.chain import chain_of
 from hsdsl.metrics.follow import may_follow
-from hsdsl.metrics.geometry import Array, Passage, Space
+from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.line import interval_of, minimise_on_line
 from hsdsl.metrics.norms import minimise
 from hsdsl.metrics.search import TOLERANCE, gaps
+from hsdsl.metrics.sides import norms, to_side
 
 ROUNDING = 16 * 2.0**-53
 Indices = NDArray[np.intp]
@@ -187,11 +188,6 @@ def shortest(
     return minimise(list(matrices), offsets, normals, levels)
 
 
-def norms(x: Array) -> Array:
-    """Euclidean norms of rows."""
-    return np.hypot(x[:, 0], x[:, 1]) if x.shape[1] == 2 else np.sqrt(np.einsum("ij,ij->i", x, x))
-
-
 def _entered(pairs: Pairs) -> Array:
     """For each passage, a lower bound on how far each p is from where it is entered (inf in another mode)."""
     passages = pairs.space.passages
@@ -210,22 +206,6 @@ def _left(pairs: Pairs) -> Array:
         if g.target == pairs.target:
             found[g.index] = to_side(g, g.leave, pairs.q)
     return found
-
-
-def to_side(passage: Passage, side: tuple[Array, Array], points: Array) -> Array:
-    """The distance from points to one side of a passage: exact on guards of one dimension, else to its whole plane."""
-    base, frame = side
-    gate = passage.gate
-    if gate.size == 0:
-        return norms(points - base)
-    if gate.size == 1:
-        low, high = interval_of(gate.normals, gate.levels)
-        slope = frame[:, 0]
-        square = float(slope @ slope)
-        s = np.clip((points - base) @ slope / square if square else np.zeros(len(points)), low, high)
-        return norms(points - base - s[:, None] * slope)
-    away = points - base
-    return norms(away - away @ np.linalg.pinv(frame).T @ frame.T)
 
 
 def _rest(between: Array, leaves: Array, last: int, indices: Indices) -> Array:

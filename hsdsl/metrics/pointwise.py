@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import Points
 from hsdsl.metrics.geometry import Space
+from hsdsl.metrics.inside import highest
+from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.points import Place, distance, distances
 
-QUICK, SLOW = 50_000, 2_000
+QUICK, SLOW = 50_000, 20_000
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,7 @@ class SpaceMetric:
 
     space: Space
     relaxation: float | None = None
+    budget: Budget = field(default_factory=Budget)
 
     @property
     def timed(self) -> bool:
@@ -28,27 +33,41 @@ class SpaceMetric:
         return self.space.timed
 
     @property
-    def budget(self) -> int:
-        """Distances are quick where everything is affine, and solved one by one elsewhere."""
+    def evaluations(self) -> int:
+        """Distances are quick where everything is affine, and take local solves elsewhere."""
         return QUICK if self.space.affine else SLOW
 
-    def convex(self, mode: str) -> bool:
-        """Whether a mode's domain is known to be convex."""
-        return self.space.domains[self._index(mode)].convex
+    @cached_property
+    def _neighbours(self) -> Neighbours:
+        return Neighbours(self.space, self.relaxation, self.budget)
 
-    def between(self, p: Points, q: Points) -> tuple[Array, Array]:
-        """Bound the distances of pairs from below and above."""
+    def contains(self, mode: str, low: Array, high: Array) -> Array:
+        """Whether whole boxes are known to be in a mode's domain, or that domain to be convex."""
+        domain = self.space.domains[self._index(mode)]
+        inside = np.ones(len(low), dtype=bool)
+        for formula in domain.curved:
+            inside &= highest(formula, low, high) <= 0
+        return inside
+
+    def between(self, p: Points, q: Points, enough: float = 0.0) -> tuple[Array, Array]:
+        """Bound the distances of pairs from below and above; bounds of at most ``enough`` need not be close."""
         lower, upper = np.zeros(len(p.t)), np.full(len(p.t), np.inf)
         waits = (p.edge != "") | (q.edge != "")
         flows = np.flatnonzero(~waits)
         if len(flows):
-            lower[flows], upper[flows] = distances(
-                self.space, p.mode, self._coordinates(p, flows), q.mode, self._coordinates(q, flows), self.relaxation
-            )
+            lower[flows], upper[flows] = self._flowing(p, q, flows, enough)
         for k in np.flatnonzero(waits).tolist():
-            found = distance(self.space, self._place(p, k), self._place(q, k), self.relaxation).interval
-            lower[k], upper[k] = found.lower, found.upper
+            found = distance(self.space, self._place(p, k), self._place(q, k), self.relaxation, budget=self.budget)
+            lower[k], upper[k] = found.interval.lower, found.interval.upper
         return lower, upper
+
+    def _flowing(self, p: Points, q: Points, chosen: Array, enough: float) -> tuple[Array, Array]:
+        x, y = self._coordinates(p, chosen), self._coordinates(q, chosen)
+        for points in (p, q):
+            self._index(points.mode)
+        if self.space.affine:
+            return distances(self.space, p.mode, x, q.mode, y, self.relaxation)
+        return distances(self.space, p.mode, x, q.mode, y, self.relaxation, self._neighbours, enough)
 
     def _index(self, mode: str) -> int:
         try:

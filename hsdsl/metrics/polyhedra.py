@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.geometry import Array, Curved, Domain, Gate
+from hsdsl.metrics.formulas import Formula
+from hsdsl.metrics.geometry import Array, Domain, Gate
 
 SLACK = 1e-12  # relative: what counts as zero among coefficients made by rounding
 
@@ -19,7 +20,7 @@ def pieces_of(
     surface: tuple[Array, float],
     inequalities: tuple[Array, Array],
     reset: tuple[Array, Array],
-    curved: tuple[Curved, ...],
+    curved: tuple[Formula, ...],
 ) -> list[Gate]:
     """A guard as gates: one, or none where it is empty.
 

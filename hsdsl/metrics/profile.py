@@ -41,7 +41,7 @@ def profiles(
     found: dict[str, Profile] = {}
     kinds: dict[str, CellDistance] = {"rho": OnSpace(metric, relaxation is not None), "sup": Labelled()}
     for name, kind in kinds.items():
-        ends = [kind.at(first, second, end, (chosen.begin, chosen.end)[end]) for end in (0, 1)]
+        ends = [kind.at(first, second, end, (chosen.begin, chosen.end)[end], 0.0) for end in (0, 1)]
         lower, upper = (np.stack([ends[0][k], ends[1][k]], axis=1).ravel() for k in (0, 1))
         found[name] = Profile(times, lower, upper)
     return found

@@ -16,6 +16,7 @@ import numpy as np
 
 from hsdsl.execution import Execution
 from hsdsl.metrics.bernstein import largest_norm, length
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import GAP, ROUNDOFF, CurveDistance, curve_distance, largest_state, merged
 from hsdsl.metrics.merge import Side
 from hsdsl.metrics.supremum import supremum
@@ -32,7 +33,7 @@ class Labelled:
         """Bound by the difference of the two polynomials."""
         return largest_norm(a.powers - b.powers) + (a.mode != b.mode)
 
-    def at(self, a: Side, b: Side, end: int, times: Array) -> tuple[Array, Array]:
+    def at(self, a: Side, b: Side, end: int, times: Array, enough: float = 0.0) -> tuple[Array, Array]:
         """Return D, exact up to rounding."""
         difference = a.at_end(end) - b.at_end(end)
         apart = np.sqrt(np.sum(difference**2, axis=1)) + (a.mode != b.mode)
@@ -58,5 +59,6 @@ def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
         The runs have no time in common, or one is not finite there.
     """
     cells = merged(a, b)
-    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells), EVALUATIONS)
-    return curve_distance(found, cells, a, b, "sup", gap)
+    budget = Budget()
+    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells), EVALUATIONS, budget)
+    return curve_distance(found, cells, a, b, "sup", gap, budget)

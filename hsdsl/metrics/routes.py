@@ -1,35 +1,48 @@
-"""Paths through guards and domains that are not affine: their length, and what must hold on them."""
+"""Paths through guards and domains that are not affine: their length, what must hold on them, and all derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 
-from hsdsl.metrics.geometry import Array, Curved, Gate, Space, VectorMap
+from hsdsl.metrics.formulas import Formula, affine, stacked
+from hsdsl.metrics.geometry import Array, CurvedGate, Domain, Gate, Space
+from hsdsl.metrics.inside import INSIDE, OUTSIDE, straight_inside
 
-INSIDE = 1e-9  # how far beyond an inequality a path may be, relative to the size of the numbers
-SAMPLES = 16  # of a straight piece, where its domain is not a polyhedron
+# Where a leg that is held is held: dense towards its ends, at which it may leave a boundary it begins on.
+SHARES = (0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999)
 
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A guard passed in one direction, any guard: the unknown is the point x on it."""
+    """A guard passed in one direction, any guard: the unknown is the point x on it.
 
-    edge: str
+    ``room`` are functions of the image that are at most 0 in its domain. A crossing without an edge is a bend: a point
+    of a domain at which a path turns.
+    """
+
+    edge: str | None
     source: int
     target: int
     guard_mode: int
     forward: bool
-    surface: Curved
-    conditions: tuple[Curved, ...]
-    reset: VectorMap
+    surface: Formula
+    conditions: Formula
+    reset: Formula
+    room: Formula
 
     def sides(self, x: Array) -> tuple[Array, Array]:
         """Where the passage is entered and left."""
-        image = self.reset(x)
+        image = self.reset.value(x)
         return (x, image) if self.forward else (image, x)
+
+    def slopes(self, x: Array) -> tuple[Array, Array]:
+        """The derivatives of both sides."""
+        own, image = np.eye(len(x)), self.reset.jacobian(x)
+        return (own, image) if self.forward else (image, own)
 
 
 def crossings(space: Space) -> tuple[Crossing, ...]:
@@ -37,43 +50,58 @@ def crossings(space: Space) -> tuple[Crossing, ...]:
     found: tuple[Crossing, ...] | None = space.cache.get("crossings")
     if found is None:
         both: list[Crossing] = []
-        for gate in (*(_as_functions(g) for g in space.gates), *space.curved_gates):
-            what = gate.surface, gate.conditions, gate.reset
-            both.append(Crossing(gate.edge, gate.source, gate.target, gate.source, True, *what))
-            both.append(Crossing(gate.edge, gate.target, gate.source, gate.source, False, *what))
+        for gate in (*space.gates, *space.curved_gates):
+            curved = isinstance(gate, CurvedGate)
+            what = (gate.surface, gate.conditions, gate.reset) if curved else _as_formulas(gate)
+            room = inequalities(space.domains[gate.target])
+            both.append(Crossing(gate.edge, gate.source, gate.target, gate.source, True, *what, room))
+            both.append(Crossing(gate.edge, gate.target, gate.source, gate.source, False, *what, room))
         found = space.cache["crossings"] = tuple(both)
     return found
 
 
-def _as_functions(gate: Gate) -> Crossing:
-    normal = np.linalg.svd(gate.frame.T)[2][-1] if gate.size else np.ones(1)
+def inequalities(domain: Domain) -> Formula:
+    """All of a domain's inequalities, as functions that are at most 0."""
+    return stacked([affine(domain.normals, -domain.levels), *domain.curved])
 
-    def surface(x: Array) -> float:
-        return float(normal @ (x - gate.base))
 
-    def beyond(row: int) -> Curved:
-        return lambda x: float(gate.normals[row] @ (gate.frame.T @ (x - gate.base)) - gate.levels[row])
+def bend(space: Space, mode: int) -> Crossing:
+    """A point of a domain at which a path turns."""
+    n = len(space.domains[mode].coordinates)
+    nothing, identity = affine(np.zeros((0, n)), np.zeros(0)), affine(np.eye(n), np.zeros(n))
+    return Crossing(None, mode, mode, mode, True, nothing, nothing, identity, inequalities(space.domains[mode]))
 
-    def reset(x: Array) -> Array:
-        return gate.image_base + gate.image_frame @ (gate.frame.T @ (x - gate.base))
 
-    conditions = (*(beyond(row) for row in range(len(gate.levels))), *gate.curved)
-    return Crossing(gate.edge, gate.source, gate.target, gate.source, True, surface, conditions, reset)
+def _as_formulas(gate: Gate) -> tuple[Formula, Formula, Formula]:
+    """Surface, conditions and reset of an affine guard, in the coordinates of its mode."""
+    normal = np.linalg.svd(gate.frame.T)[2][-1:] if gate.size else np.ones((1, len(gate.base)))
+    along, image = gate.normals @ gate.frame.T, gate.image_frame @ gate.frame.T
+    conditions = affine(along, -along @ gate.base - gate.levels)
+    reset = affine(image, gate.image_base - image @ gate.base)
+    return affine(normal, -normal @ gate.base), stacked([conditions, *gate.curved]), reset
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A sequence of crossings between p and q; unknowns are the guard points, one after the other."""
+    """A sequence of crossings between p and q; unknowns are the guard points, one after the other.
+
+    ``held`` are legs that are made to stay in their domains, and by how much in their middle (a quarter of that).
+    """
 
     space: Space
     sequence: tuple[Crossing, ...]
     start: tuple[int, Array]
     end: tuple[int, Array]
+    held: tuple[tuple[int, float], ...] = ()
 
     def points(self, unknowns: Array) -> list[Array]:
         """The guard points."""
-        sizes = [len(self.space.domains[c.guard_mode].coordinates) for c in self.sequence]
-        return np.split(unknowns, np.cumsum(sizes)[:-1]) if sizes else []
+        return [unknowns[where] for where in self._slices]
+
+    @cached_property
+    def _slices(self) -> list[slice]:
+        ends = list(accumulate((len(self.space.domains[c.guard_mode].coordinates) for c in self.sequence), initial=0))
+        return [slice(a, b) for a, b in pairwise(ends)]
 
     def legs(self, unknowns: Array) -> list[tuple[int, Array, Array]]:
         """The straight pieces: mode, start and end."""
@@ -85,36 +113,92 @@ class Route:
             at, mode = leave, crossing.target
         return [*found, (mode, at, self.end[1])]
 
+    def leg_slopes(self, unknowns: Array) -> list[tuple[Array, Array]]:
+        """The derivatives of each leg's start and end by all unknowns."""
+        at = np.zeros((len(self.start[1]), len(unknowns)))
+        found: list[tuple[Array, Array]] = []
+        first = 0
+        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
+            enter, leave = (_placed(slope, first, len(unknowns)) for slope in crossing.slopes(x))
+            found.append((at, enter))
+            at, first = leave, first + len(x)
+        return [*found, (at, np.zeros((len(self.end[1]), len(unknowns))))]
+
     def length(self, unknowns: Array) -> float:
         """The path's length."""
         return float(sum(np.linalg.norm(b - a) for _, a, b in self.legs(unknowns)))
 
+    def smooth_length(self, unknowns: Array, rounding: float) -> tuple[float, Array]:
+        """The sum of sqrt(|leg|^2 + rounding^2), which has derivatives everywhere, and those."""
+        total, gradient = 0.0, np.zeros(len(unknowns))
+        for (_, a, b), (da, db) in zip(self.legs(unknowns), self.leg_slopes(unknowns), strict=True):
+            size = float(np.sqrt((b - a) @ (b - a) + rounding**2))
+            total += size
+            gradient += (b - a) @ (db - da) / size
+        return total, gradient
+
     def surfaces(self, unknowns: Array) -> Array:
         """What must be 0."""
-        return np.array([c.surface(x) for c, x in zip(self.sequence, self.points(unknowns), strict=True)])
+        parts = [c.surface.value(x) for c, x in zip(self.sequence, self.points(unknowns), strict=True)]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def surface_slopes(self, unknowns: Array) -> Array:
+        """Its derivatives."""
+        rows, first = [np.zeros((0, len(unknowns)))], 0
+        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
+            rows.append(_placed(crossing.surface.jacobian(x), first, len(unknowns)))
+            first += len(x)
+        return np.vstack(rows)
 
     def room(self, unknowns: Array) -> Array:
         """What must not be negative: guards' conditions, and images inside their domains."""
-        values: list[float] = []
+        parts: list[Array] = [np.zeros(0)]
         for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
-            values += [-condition(x) for condition in crossing.conditions]
-            image_mode = crossing.target if crossing.forward else crossing.source
-            domain, image = self.space.domains[image_mode], crossing.reset(x)
-            values += (domain.levels - domain.normals @ image).tolist()
-            values += [-value(image) for value in domain.curved]
-        return np.array(values)
+            parts += [-crossing.conditions.value(x), -crossing.room.value(crossing.reset.value(x))]
+        legs = self.legs(unknowns) if self.held else []
+        for k, depth in self.held:
+            mode, a, b = legs[k]
+            for share in SHARES:
+                at = a + share * (b - a)
+                parts += [-f.value(at) - depth * share * (1 - share) for f in self.space.domains[mode].curved]
+        return np.concatenate(parts)
+
+    def room_slopes(self, unknowns: Array) -> Array:
+        """Its derivatives."""
+        rows, first = [np.zeros((0, len(unknowns)))], 0
+        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
+            image = crossing.room.jacobian(crossing.reset.value(x)) @ crossing.reset.jacobian(x)
+            rows += [-_placed(part, first, len(unknowns)) for part in (crossing.conditions.jacobian(x), image)]
+            first += len(x)
+        legs, slopes = (self.legs(unknowns), self.leg_slopes(unknowns)) if self.held else ([], [])
+        for k, _ in self.held:
+            (mode, a, b), (da, db) = legs[k], slopes[k]
+            for share in SHARES:
+                at, moves = a + share * (b - a), da + share * (db - da)
+                rows += [-f.jacobian(at) @ moves for f in self.space.domains[mode].curved]
+        return np.vstack(rows)
 
     def allowed(self, unknowns: Array) -> bool:
-        """Whether the path lies in the space: on its guards, and straight pieces in their domains."""
+        """Whether guards' conditions hold and images lie in their domains, up to rounding."""
         size = INSIDE * (1 + float(np.abs(unknowns).max(initial=0)))
         on = np.abs(self.surfaces(unknowns)).max(initial=0) <= size
-        inside = self.room(unknowns).min(initial=0) >= -size
-        return bool(on and inside) and all(straight_inside(self.space, *leg) for leg in self.legs(unknowns))
+        return bool(on and self.room(unknowns).min(initial=0) >= -size)
+
+    def judged(self, unknowns: Array) -> list[int]:
+        """For each leg whether it stays in its domain, see :func:`hsdsl.metrics.inside.straight_inside`."""
+        if not np.all(np.isfinite(unknowns)):
+            return [OUTSIDE]
+        legs = self.legs(unknowns)
+        return [int(straight_inside(self.space, mode, a[None], b[None])[0]) for mode, a, b in legs]
 
 
-def straight_inside(space: Space, mode: int, a: Array, b: Array) -> bool:
-    """Whether a straight piece stays in its domain: looked at in points where the domain is not a polyhedron."""
-    curved: Sequence[Curved] = space.domains[mode].curved
-    size = INSIDE * (1 + float(max(np.abs(a).max(initial=0), np.abs(b).max(initial=0))))
-    shares = np.linspace(0, 1, SAMPLES + 1) if curved else ()
-    return all(value(a + share * (b - a)) <= size for share in shares for value in curved)
+def beyond(space: Space, mode: int, a: Array, b: Array) -> float:
+    """How far a straight piece is seen to leave its domain."""
+    at = [a + share * (b - a) for share in SHARES]
+    return max((f(x) for f in space.domains[mode].curved for x in at), default=0.0)
+
+
+def _placed(block: Array, first: int, width: int) -> Array:
+    wide = np.zeros((block.shape[0], width))
+    wide[:, first : first + block.shape[1]] = block
+    return wide

@@ -9,9 +9,11 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.chain import Chain, Problem, chain_of
 from hsdsl.metrics.cones import solve
 from hsdsl.metrics.follow import may_follow
@@ -45,11 +47,21 @@ class Found:
     end: End | None = None
     ended_early: bool = False
     local: bool = False
-    route: list[tuple[str, bool]] = field(default_factory=list[tuple[str, bool]])
+    proved: bool = True  # of a path through curved domains: that it stays inside
+    route: list[tuple[str | None, bool]] = field(default_factory=list[tuple[str | None, bool]])
     legs: list[tuple[int, Array, Array]] = field(default_factory=list[tuple[int, Array, Array]])
+    through: Any = None  # the route of a path by local solves, its guard points being ``unknowns``
 
 
-def search(space: Space, starts: list[End], ends: list[End], relaxation: float, hops: int, limit: float) -> Found:
+def search(
+    space: Space,
+    starts: list[End],
+    ends: list[End],
+    relaxation: float,
+    hops: int,
+    limit: float,
+    budget: Budget,
+) -> Found:
     """Search between any of ``starts`` and any of ``ends``.
 
     Parameters
@@ -60,19 +72,23 @@ def search(space: Space, starts: list[End], ends: list[End], relaxation: float, 
         The most passages on a path; what is cut there is kept apart in ``Found.cut``.
     limit : float
         Only paths shorter than this matter (inf: all).
+    budget : Budget
+        The time for it.
     """
     found = Found(upper=limit)
     for end in ends:
         for start in starts:
-            _Search(space, start, end, relaxation, hops, found).run()
+            _Search(space, start, end, relaxation, hops, found, budget).run()
     return found
 
 
 class _Search:
     """One pair of ends."""
 
-    def __init__(self, space: Space, start: End, end: End, relaxation: float, hops: int, found: Found) -> None:
-        self.space, self.start, self.end = space, start, end
+    def __init__(
+        self, space: Space, start: End, end: End, relaxation: float, hops: int, found: Found, budget: Budget
+    ) -> None:
+        self.space, self.start, self.end, self.budget = space, start, end, budget
         self.relaxation, self.hops, self.found = relaxation, hops, found
         self.fixed = start.cost + end.cost
         self.heap: list[tuple[float, int, tuple[int, ...]]] = []
@@ -88,7 +104,7 @@ class _Search:
             if bound >= self._enough():
                 self.found.lower = min(self.found.lower, bound)
                 break
-            if self.solved > MOST_PROBLEMS:
+            if self.solved > MOST_PROBLEMS or self.budget.spent():
                 self.found.lower = min(self.found.lower, bound)
                 self.found.ended_early = True
                 break

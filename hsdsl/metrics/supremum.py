@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.merge import Cells, Side
 
 Array = npt.NDArray[Any]
@@ -23,8 +24,11 @@ class CellDistance(Protocol):
         """Bound the distance over each whole cell from above, cheaply; infinite where nothing is known. Shape (n,)."""
         ...
 
-    def at(self, a: Side, b: Side, end: int, times: Array) -> tuple[Array, Array]:
-        """Bound the distance at the cells' left (0) or right (1) ends, from below and above."""
+    def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
+        """Bound the distance at the cells' left (0) or right (1) ends, from below and above.
+
+        Upper bounds of at most ``enough`` need not be improved.
+        """
         ...
 
     def motion(self, side: Side) -> Array:
@@ -76,7 +80,7 @@ class _Frontier:
         return _Frontier(cells, np.concatenate([self.bound, other.bound]), np.concatenate([self.ends, other.ends]))
 
 
-def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int) -> Supremum:
+def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int, budget: Budget) -> Supremum:
     """Find the supremum over all cells.
 
     Parameters
@@ -89,13 +93,15 @@ def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, mos
         Stop when ``upper - lower <= max(gap * lower, floor)``, or when the bounds at single times allow no less.
     most : int
         Evaluate the distance at no more times than about this.
+    budget : Budget
+        The time for it, and whom to tell how far it is.
 
     Returns
     -------
     Supremum
     """
     found = Supremum(float(cells.begin[0]))
-    search = _Search(distance, found, gap, floor, most)
+    search = _Search(distance, found, gap, floor, most, budget)
     bounds = _bounds(cells, distance)
     known = np.isfinite(bounds)
     frontier = _Frontier(cells, bounds, np.full((len(cells), 2), np.nan))
@@ -121,6 +127,7 @@ class _Search:
     gap: float
     floor: float
     most: int
+    budget: Budget
 
     def best_first(self, frontier: _Frontier) -> None:
         """Evaluate and cut the cells with the largest bounds until all are decided."""
@@ -181,10 +188,13 @@ class _Search:
         return np.flatnonzero(~decided)
 
     def _spent(self, bound: Array) -> bool:
-        if self.found.evaluations < self.most:
+        highest = float(np.max(bound))
+        self.budget.tell(self.found.lower, max(highest, self.found.points))
+        over = self.found.evaluations > 0 and self.budget.spent()  # a first look is always taken
+        if self.found.evaluations < self.most and not over:
             return False
         self.found.complete = False
-        self.found.upper = max(self.found.upper, float(np.max(bound)))
+        self.found.upper = max(self.found.upper, highest)
         return True
 
     def _refined(self, batch: _Frontier) -> _Frontier:
@@ -214,14 +224,16 @@ class _Search:
             return
         asked = cells[unknown]
         times = (asked.begin, asked.end)[end]
-        lower, upper = self.distance.at(*asked.sides(), end, times)
+        found, enough = self.found, self.found.accepted(self.gap, self.floor)
+        lower, upper = self.distance.at(*asked.sides(), end, times, enough)
         ends[unknown, end] = upper
-        found = self.found
         found.evaluations += len(unknown)
         best = int(np.argmax(lower))
         if lower[best] > found.lower:
             found.lower, found.time = float(lower[best]), float(times[best])
-        found.points = max(found.points, float(np.max(upper)))
+        found.upper = max(found.upper, float(np.max(upper)))
+        # What was accepted before it was improved, or has no bound, must not raise what is accepted next.
+        found.points = max(found.points, float(np.max(upper[(upper > enough) & np.isfinite(upper)], initial=0.0)))
 
 
 def _largest_first(bound: Array, chosen: Array) -> tuple[Array, Array]:

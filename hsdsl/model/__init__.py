@@ -188,6 +188,7 @@ class Model:
         relaxation: Any = None,
         parameters: Mapping[str, Any] | None = None,
         hops: int | None = None,
+        seconds: float = 60.0,
     ) -> PointDistance:
         """Return how far apart two points are: the length of the shortest curve that may pass through guards.
 
@@ -203,16 +204,19 @@ class Model:
             Overrides by name.
         hops : int, optional
             The most passages of a path.
+        seconds : float
+            About how long the search may take; then the interval is what is known by then, and ``certified`` says so.
 
         Raises
         ------
         UsageError
             A point or a number that does not fit the model, or a point outside its mode's domain.
         """
+        from hsdsl.model.between_runs import budget_of
         from hsdsl.model.places import distance_of_points
 
         values = with_parameters(self._values(FLOAT64), parameters or {})
-        return distance_of_points(values, p, q, metric, relaxation, hops)
+        return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds))
 
     @property
     def columns(self) -> list[str]:

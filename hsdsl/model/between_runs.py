@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import CurveDistance, PointMetric
 from hsdsl.metrics.table import Request, between, check_same_model
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
     from hsdsl.model.values import Values
+
+SECONDS = 60.0  # that a search may take, unless said otherwise
+
+
+def budget_of(seconds: float, watch: Callable[[float, float], None] | None = None) -> Budget:
+    """Make a budget that begins now.
+
+    Raises
+    ------
+    UsageError
+        The time is not positive.
+    """
+    if not seconds > 0:
+        raise UsageError(f"a distance needs a positive number of seconds, not {seconds:g}")
+    return Budget(seconds, watch=watch)
 
 
 def distance(
@@ -26,6 +42,8 @@ def distance(
     model: Model | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     coordinates: Sequence[str] | None = None,
+    seconds: float = SECONDS,
+    watch: Callable[[float, float], None] | None = None,
 ) -> CurveDistance:
     """Return how far apart two runs of one model are.
 
@@ -44,6 +62,11 @@ def distance(
         values: runs whose parameters differ are compared in the space of these.
     coordinates : names, optional
         For ``rho-hat``: the states that count as the position.
+    seconds : float
+        For ``rho``, ``quotient`` and ``relaxed``: about how long the search may take. When they are over the interval
+        is what is known by then, and the note says so.
+    watch : callable, optional
+        Told now and then what those three are at least and at most.
 
     Returns
     -------
@@ -55,7 +78,7 @@ def distance(
         Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
         since.
     """
-    source = _Source(run, model, parameters or {})
+    source = _Source(run, model, parameters or {}, budget_of(seconds, watch))
     depth = None if relaxation is None else source.number(relaxation)
     return between(metric, Request(run, other, source.space, depth, coordinates))
 
@@ -64,9 +87,13 @@ class _Source:
     """The model behind a run, read when it is first needed."""
 
     def __init__(
-        self, run: Execution, model: Model | str | os.PathLike[str] | None, parameters: Mapping[str, Any]
+        self,
+        run: Execution,
+        model: Model | str | os.PathLike[str] | None,
+        parameters: Mapping[str, Any],
+        budget: Budget,
     ) -> None:
-        self.run, self.model, self.parameters = run, model, parameters
+        self.run, self.model, self.parameters, self.budget = run, model, parameters, budget
 
     @cached_property
     def values(self) -> Values:
@@ -92,7 +119,9 @@ class _Source:
         from hsdsl.metrics.pointwise import SpaceMetric
         from hsdsl.metrics.space import make_space
 
-        return SpaceMetric(make_space(self.values.system, [float(v) for v in self.values.parameters]), depth)
+        space = make_space(self.values.system, [float(v) for v in self.values.parameters])
+        self.budget.start()
+        return SpaceMetric(space, depth, self.budget)
 
 
 def _load(path: str | os.PathLike[str] | None, run: Execution) -> Model:
@@ -111,8 +140,11 @@ def plot_distance(
     relaxation: Any = None,
     model: Model | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
+    seconds: float = SECONDS,
 ) -> None:
     """Draw the distance of two runs over time, beside the difference of their states; see :func:`distance`.
+
+    When ``seconds`` are over, the times that are left have wide bounds.
 
     Raises
     ------
@@ -123,7 +155,7 @@ def plot_distance(
     from hsdsl.plot.over_time import plot_over_time
 
     check_same_model(run, other)
-    source = _Source(run, model, parameters or {})
+    source = _Source(run, model, parameters or {}, budget_of(seconds))
     depth = None if relaxation is None else source.number(relaxation)
     found = profiles(run, other, source.space(depth), depth)
     words = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.errors import UsageError
+from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import TOLERANCE, Space
 from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
 from hsdsl.metrics.space import make_space
@@ -21,7 +22,7 @@ _ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 def distance_of_points(
-    values: Values, p: str | Place, q: str | Place, metric: str, relaxation: Any, hops: int | None
+    values: Values, p: str | Place, q: str | Place, metric: str, relaxation: Any, hops: int | None, budget: Budget
 ) -> PointDistance:
     """Return how far apart two points of a model's space are; see `Model.distance`."""
     if metric not in METRICS:
@@ -33,8 +34,9 @@ def distance_of_points(
     start, end = (read_place(values, space, given) if isinstance(given, str) else given for given in (p, q))
     for place in (start, end):
         _check_inside(space, place)
+    budget.start()
     try:
-        return distance(space, start, end, depth, hops)
+        return distance(space, start, end, depth, hops, budget)
     except ValueError as error:
         raise UsageError(str(error)) from error
 

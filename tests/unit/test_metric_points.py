@@ -203,8 +203,8 @@ def test_runner_through_a_curved_guard_in_a_slice():
     found = distance(space, p, q)
     touchdown = np.cos(np.pi / 5)
     direct = (1 - touchdown) + np.hypot(0.85 - touchdown, 0.1)  # through the guard's point of the slice
-    assert found.interval.lower == pytest.approx(0.15, rel=1e-9)  # what no passage changes
-    assert found.interval.lower <= found.interval.upper <= direct * (1 + 1e-9)
+    # Below: what no passage changes; above: the direct way.
+    assert 0.15 * (1 - 1e-9) <= found.interval.lower <= found.interval.upper <= direct * (1 + 1e-9)
     assert "lower end certified" in found.certified
 
 

@@ -9,23 +9,23 @@ input and no time is in it). What is affine is recognised exactly, by constant d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 import sympy as sp
 
 from hsdsl import functions
-from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
-from hsdsl.backends.python import compile_routines
 from hsdsl.errors import UsageError
 from hsdsl.expression.stack import deep_stack
-from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
 from hsdsl.metrics.polyhedra import pieces_of
+from hsdsl.metrics.space.affine import affine as as_affine
+from hsdsl.metrics.space.affine import stack
+from hsdsl.metrics.space.conditions import clauses
+from hsdsl.metrics.space.formulas import formula
+from hsdsl.metrics.space.images import equations
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
-
-__all__ = ["Space", "make_space"]
 
 MOST_SAMPLES = 200  # of an input that a guard depends on
 
@@ -49,14 +49,6 @@ def make_space(system: HybridSystem, parameters: Sequence[float]) -> Space:
         return _Maker(system, parameters).space()
 
 
-@dataclass(frozen=True)
-class _Affine:
-    """``gradient @ x + constant``."""
-
-    gradient: np.ndarray
-    constant: float
-
-
 class _Maker:
     """One model at one set of parameter values."""
 
@@ -76,7 +68,7 @@ class _Maker:
         curved: list[CurvedGate] = []
         for j, mode in enumerate(self.system.modes):
             for edge in mode.edges:
-                for clause in _clauses(edge.condition):
+                for clause in clauses(edge.condition):
                     self._guard(j, edge, clause, domains, gates, curved)
         names = tuple(mode.name for mode in self.system.modes)
         return Space(names, domains, tuple(gates), tuple(curved), self._kept(), self.timed)
@@ -126,15 +118,15 @@ class _Maker:
         rows, curved, texts, curved_texts = [], [], [], []
         for surface in surfaces:
             residual = self._place(surface.residual)
-            row = _affine(residual, self.symbols[j])
+            row = as_affine(residual, self.symbols[j])
             if row is None:
-                curved.append(self._scalar(residual, j))
+                curved.append(self._formula((residual,), j))
                 curved_texts.append(surface.text)
             else:
                 rows.append(row)
                 texts.append(surface.text)
         coordinates = self.states[j] + ("t",) * self.timed
-        normals, levels = _stack(rows, len(coordinates))
+        normals, levels = stack(rows, len(coordinates))
         return Domain(mode.name, coordinates, normals, levels, tuple(curved), (*texts, *curved_texts))
 
     def _guard(self, j: int, edge: Edge, clause, domains, gates: list[Gate], curved: list[CurvedGate]) -> None:
@@ -151,20 +143,27 @@ class _Maker:
         if not self._moves(sp.sympify(raw)):
             conditions.append(-sp.sympify(rate))
         reset = [self._place(r) for r in edge.reset] + [TIME] * self.timed
-        flat = [_affine(e, self.symbols[j]) for e in (surface, *reset)]
+        flat = [as_affine(e, self.symbols[j]) for e in (surface, *reset)]
         if any(f is None for f in flat):
-            both = (*domains[j].curved, *(self._scalar(c, j) for c in conditions), *_flat_conditions(domains[j]))
-            curved.append(CurvedGate(edge.name, j, k, self._scalar(surface, j), both, self._vector(reset, j)))
+            domain = domains[j]
+            flat_part = affine(domain.normals, -domain.levels)
+            both = stacked([*domain.curved, self._formula(conditions, j), flat_part])
+            marks = equations(surface, reset, self.symbols[j], self._image_symbols(edge))
+            made = self._formula((surface,), j), both, self._formula(reset, j), formula(marks, self.symbols[k])
+            curved.append(CurvedGate(edge.name, j, k, *made))
             return
-        rows = [(c, _affine(c, self.symbols[j])) for c in conditions]
-        normals, levels = _stack([r for _, r in rows if r is not None], len(self.symbols[j]))
-        bent = (*domains[j].curved, *(self._scalar(c, j) for c, r in rows if r is None))
+        rows = [(c, as_affine(c, self.symbols[j])) for c in conditions]
+        normals, levels = stack([r for _, r in rows if r is not None], len(self.symbols[j]))
+        bent = (*domains[j].curved, *(self._formula((c,), j) for c, r in rows if r is None))
         linear = np.array([f.gradient for f in flat[1:]]).reshape(len(reset), len(self.symbols[j]))
         gates += pieces_of(
             edge.name, (j, domains[j]), (k, domains[k]), (flat[0].gradient, -flat[0].constant),
             (np.vstack([domains[j].normals, normals]), np.concatenate([domains[j].levels, levels])),
             (linear, np.array([f.constant for f in flat[1:]])), bent,
         )  # fmt: skip
+
+    def _image_symbols(self, edge: Edge) -> list[sp.Symbol]:
+        return [*map(_symbol, edge.target_states), *(TIME,) * self.timed]
 
     def _kept(self) -> tuple[tuple[int, ...], ...] | None:
         common = [n for n in self.states[0] if all(n in states for states in self.states)]
@@ -184,30 +183,8 @@ class _Maker:
         surface = sp.expand(self._place(edge.surface.residual))
         return bool(surface.free_symbols) and sp.cancel(change / surface).is_number
 
-    def _scalar(self, expression: sp.Expr, j: int):
-        function = self._compiled((expression,), j)
-        return lambda x: float(function(x)[0])
-
-    def _vector(self, expressions, j: int):
-        function = self._compiled(tuple(expressions), j)
-        return lambda x: np.array(function(x), dtype=float)
-
-    def _compiled(self, expressions, j: int):
-        """Compile over numbered coordinates; NaN outside the expressions' real domain."""
-        numbered = [_symbol(f"x{i}") for i in range(len(self.symbols[j]))]
-        mapping = dict(zip(self.symbols[j], numbered, strict=True))
-        results = tuple(sp.sympify(e).xreplace(mapping) for e in expressions)
-        routine = compile_routines(
-            print_routines([Definition("value", tuple(numbered), results)], ()), FLOAT64, "geometry"
-        )()[0]
-
-        def evaluate(x):
-            try:
-                return routine(*map(float, x))
-            except DOMAIN_ERRORS:
-                return (np.nan,) * len(results)
-
-        return evaluate
+    def _formula(self, expressions, j: int) -> Formula:
+        return formula(expressions, self.symbols[j])
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -222,54 +199,3 @@ def _geometric(mode: Mode):
         yield from (sp.sympify(r) for r in edge.reset)
         if edge.condition is not None:
             yield edge.condition
-
-
-def _affine(expression: sp.Expr, symbols) -> _Affine | None:
-    """The expression as an affine function, None where it is none."""
-    expression = sp.expand(expression)
-    own = set(symbols)
-    if any(f.free_symbols & own for f in expression.atoms(functions.sign, functions.floor, sp.sign, sp.floor)):
-        return None
-    gradient = [sp.expand(expression.diff(s)) for s in symbols]
-    if any(g.free_symbols & own for g in gradient):
-        return None
-    constant = expression.xreplace(dict.fromkeys(symbols, sp.S.Zero))
-    numbers = np.array([float(sp.N(v, 20)) for v in (*gradient, constant)])
-    return _Affine(numbers[:-1], float(numbers[-1])) if np.all(np.isfinite(numbers)) else None
-
-
-def _stack(rows: list[_Affine], size: int) -> tuple[np.ndarray, np.ndarray]:
-    normals = np.array([r.gradient for r in rows]).reshape(len(rows), size)
-    return normals, np.array([-r.constant for r in rows])
-
-
-def _flat_conditions(domain: Domain):
-    return tuple((lambda x, n=n, c=c: float(n @ x - c)) for n, c in zip(domain.normals, domain.levels, strict=True))
-
-
-def _clauses(condition) -> list[list[sp.Expr]]:
-    """A condition as alternatives, each a list of expressions that are at most 0 (closed: strict counts as not)."""
-    if condition is None:
-        return [[]]
-    normal = sp.to_dnf(condition, simplify=False)
-    if normal == sp.true:
-        return [[]]
-    if normal == sp.false:
-        return []
-    return [
-        [e for literal in sp.And.make_args(clause) for e in _literal(literal)] for clause in sp.Or.make_args(normal)
-    ]
-
-
-def _literal(literal) -> list[sp.Expr]:
-    if isinstance(literal, sp.Not):
-        literal = literal.args[0].negated
-    if literal == sp.true or isinstance(literal, sp.Ne):
-        return []
-    if isinstance(literal, (sp.Ge, sp.Gt)):
-        return [literal.rhs - literal.lhs]
-    if isinstance(literal, (sp.Le, sp.Lt)):
-        return [literal.lhs - literal.rhs]
-    if isinstance(literal, sp.Eq):
-        return [literal.lhs - literal.rhs, literal.rhs - literal.lhs]
-    raise UsageError(f"distances: the condition {literal} is no comparison of numbers")

@@ -1,0 +1,218 @@
+"""Interval arithmetic for generated routines, many boxes at once: what a formula can be anywhere in a box.
+
+Every result contains every value that the formula takes there, rounding included. Where it has no value somewhere in a
+box the result is everything, so that nothing is concluded from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsdsl.arithmetic import Arithmetic
+
+Array = NDArray[np.float64]
+
+STEPS = 4  # units in the last place by which NumPy's functions may be wrong
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """The numbers from ``low`` to ``high``, element by element."""
+
+    low: Any
+    high: Any
+
+    def __neg__(self) -> Range:
+        return Range(-self.high, -self.low)
+
+    def __add__(self, other: Any) -> Range:
+        other = as_range(other)
+        return _outwards(self.low + other.low, self.high + other.high)
+
+    def __sub__(self, other: Any) -> Range:
+        return self + -as_range(other)
+
+    def __mul__(self, other: Any) -> Range:
+        other = as_range(other)
+        if other is self:
+            return _square(self)
+        corners = [_product(a, b) for a in (self.low, self.high) for b in (other.low, other.high)]
+        return _outwards(_least(corners), -_least([-c for c in corners]))
+
+    def __truediv__(self, other: Any) -> Range:
+        other = as_range(other)
+        through_zero = (other.low <= 0) & (other.high >= 0)
+        low, high = np.where(through_zero, 1.0, other.low), np.where(through_zero, 1.0, other.high)
+        return _unless(through_zero, self * _outwards(1 / high, 1 / low))
+
+
+def as_range(value: Any) -> Range:
+    """A range of its own, or of one number."""
+    return value if isinstance(value, Range) else Range(value, value)
+
+
+def hull(low: Array, high: Array) -> list[Range]:
+    """The coordinates of boxes, rows of two (B, n) arrays."""
+    return [Range(low[:, i], high[:, i]) for i in range(low.shape[1])]
+
+
+def _outwards(low: Any, high: Any, steps: int = 1) -> Range:
+    for _ in range(steps):
+        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+    return Range(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
+
+
+def _product(a: Any, b: Any) -> Any:
+    return np.where((a == 0) | (b == 0), 0.0, a * b)  # also where the other is unbounded
+
+
+def _square(x: Range) -> Range:
+    a, b = x.low * x.low, x.high * x.high
+    least = np.where((x.low <= 0) & (x.high >= 0), 0.0, np.minimum(a, b))
+    low = _outwards(least, np.maximum(a, b))
+    return Range(np.maximum(low.low, 0.0), low.high)
+
+
+def _unless(undefined: Any, known: Range) -> Range:
+    return Range(np.where(undefined, -np.inf, known.low), np.where(undefined, np.inf, known.high))
+
+
+def _rising(function: Any, least: float = -np.inf, most: float = np.inf) -> Callable[[Any], Range]:
+    """An increasing function, defined between two numbers."""
+
+    def enclose(value: Any) -> Range:
+        x = as_range(value)
+        outside = (x.low < least) | (x.high > most)
+        low, high = np.clip(x.low, least, most), np.clip(x.high, least, most)
+        return _unless(outside, _outwards(function(low), function(high), STEPS))
+
+    return enclose
+
+
+def _sine(value: Any, quarter: float = 0.0) -> Range:
+    """Sine or (``quarter`` = 1) cosine: 1 where a crest lies in the range, -1 where a trough does."""
+    x = as_range(value)
+    ends = [np.sin(v) if quarter == 0 else np.cos(v) for v in (x.low, x.high)]
+    low, high = np.minimum(*ends), np.maximum(*ends)
+    turns = [v / (2 * np.pi) - (1 - quarter) / 4 for v in (x.low, x.high)]  # a crest at every whole number
+    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
+    crest = np.floor(turns[1] + slack) > np.floor(turns[0] - slack)
+    trough = np.floor(turns[1] + 0.5 + slack) > np.floor(turns[0] + 0.5 - slack)
+    found = _outwards(np.where(trough, -1.0, low), np.where(crest, 1.0, high), STEPS)
+    lost = ~(np.isfinite(x.low) & np.isfinite(x.high))
+    return Range(np.where(lost, -1.0, np.maximum(found.low, -1.0)), np.where(lost, 1.0, np.minimum(found.high, 1.0)))
+
+
+def _tangent(value: Any) -> Range:
+    x = as_range(value)
+    turns = [v / np.pi - 0.5 for v in (x.low, x.high)]
+    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
+    pole = np.floor(turns[1] + slack) != np.floor(turns[0] - slack)
+    return _unless(pole, _outwards(np.tan(x.low), np.tan(x.high), STEPS))
+
+
+def _absolute(value: Any) -> Range:
+    x = as_range(value)
+    least = np.where((x.low <= 0) & (x.high >= 0), 0.0, np.minimum(np.abs(x.low), np.abs(x.high)))
+    return Range(least, np.maximum(np.abs(x.low), np.abs(x.high)))
+
+
+def _arc_cosine(value: Any) -> Range:
+    return _outwards(np.pi / 2, np.pi / 2) - _ARC_SINE(value)
+
+
+def _cosh(value: Any) -> Range:
+    x = _absolute(value)
+    return _outwards(np.cosh(x.low), np.cosh(x.high), STEPS)
+
+
+def _angle(y: Any, x: Any) -> Range:
+    """atan2: its extremes are at corners, unless the box meets the half line where it jumps."""
+    y, x = as_range(y), as_range(x)
+    jumps = (x.low <= 0) & (y.low <= 0) & (y.high >= 0)
+    corners = np.broadcast_arrays(*(np.arctan2(b, a) for a in (x.low, x.high) for b in (y.low, y.high)))
+    found = _outwards(np.minimum.reduce(corners), np.maximum.reduce(corners), STEPS)
+    return Range(np.where(jumps, -np.pi, found.low), np.where(jumps, np.pi, found.high))
+
+
+def _power(base: Any, exponent: Any) -> Range:
+    """By logarithm where the base is positive; whole exponents of other bases by the ends."""
+    b, e = as_range(base), as_range(exponent)
+    positive = b.low > 0
+    log = _rising(np.log)(Range(np.where(positive, b.low, 1.0), np.where(positive, b.high, 1.0)))
+    general = _rising(np.exp)(log * e)
+    whole = np.all(e.low == e.high) and np.all(np.mod(e.low, 1) == 0) and np.all(e.low > 0)
+    if not whole:
+        return _unless(~positive, general)
+    even = np.mod(e.low, 2) == 0
+    size = np.maximum(np.abs(b.low), np.abs(b.high)) ** e.low
+    rough = _outwards(np.where(even, 0.0, -size), size, STEPS)
+    return Range(np.where(positive, general.low, rough.low), np.where(positive, general.high, rough.high))
+
+
+def _smaller(*values: Any) -> Range:
+    ranges = [as_range(v) for v in values]
+    return Range(_least([r.low for r in ranges]), _least([r.high for r in ranges]))
+
+
+def _larger(*values: Any) -> Range:
+    ranges = [as_range(v) for v in values]
+    return Range(-_least([-r.low for r in ranges]), -_least([-r.high for r in ranges]))
+
+
+def _least(values: list[Any]) -> Any:
+    return np.minimum.reduce(np.broadcast_arrays(*values))
+
+
+def _constant(value: Fraction) -> Range:
+    nearest = float(value)
+    return Range(nearest, nearest) if Fraction(nearest) == value else _outwards(nearest, nearest)
+
+
+def _step(function: Callable[[Any], Any]) -> Callable[[Any], Range]:
+    """An increasing function that needs no rounding."""
+    return lambda value: Range(function(as_range(value).low), function(as_range(value).high))
+
+
+_ARC_SINE = _rising(np.arcsin, -1.0, 1.0)
+
+ENCLOSED = Arithmetic(
+    name="enclosure",
+    digits=None,
+    unit=2.0**-53,
+    constant=_constant,
+    isfinite=lambda value: bool(np.all(np.isfinite(value.low) & np.isfinite(value.high))),
+    functions={
+        **{name: _rising(getattr(np, name)) for name in ("sinh", "tanh", "exp")},
+        "atan": _rising(np.arctan),
+        "asinh": _rising(np.arcsinh),
+        "asin": _ARC_SINE,
+        "acos": _arc_cosine,
+        "acosh": _rising(np.arccosh, 1.0),
+        "atanh": _rising(np.arctanh, -1.0, 1.0),
+        "log": _rising(np.log, 0.0),
+        "sqrt": _rising(np.sqrt, 0.0),
+        "sin": _sine,
+        "cos": partial(_sine, quarter=1.0),
+        "tan": _tangent,
+        "atan2": _angle,
+        "cosh": _cosh,
+        "pow": _power,
+        "abs": _absolute,
+        "min": _smaller,
+        "max": _larger,
+        "sign": _step(np.sign),
+        "floor": _step(np.floor),
+        "heaviside": _step(lambda x: 0.5 * (1.0 + np.sign(x))),
+        "pi": _outwards(np.pi, np.pi),
+        "e": _outwards(np.e, np.e),
+        "nan": Range(-np.inf, np.inf),
+    },
+)  # fmt: skip

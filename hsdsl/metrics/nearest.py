@@ -1,0 +1,59 @@
+"""How far a point is at least from the guards and images of its mode: every path with a passage goes to one.
+
+A function that is r at a point and whose gradient is at most G in the box of half width R around it has no zero nearer
+than R while R G <= |r|. Enclosures give G.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hsdsl.metrics.enclosures import Array
+from hsdsl.metrics.formulas import Formula
+from hsdsl.metrics.geometry import Space
+from hsdsl.metrics.sides import to_side
+
+HALVINGS = 12
+FARTHEST = 1e6  # no bound beyond this is looked for
+
+
+def to_passages(space: Space, mode: int, x: Array) -> Array:
+    """For points of a mode, (B, n), the least distance to where any passage begins or ends there; inf without any."""
+    nearest = np.full(len(x), np.inf)
+    for passage in space.passages:
+        if passage.source == mode:
+            nearest = np.minimum(nearest, to_side(passage, passage.enter, x))
+    for gate in space.curved_gates:
+        if gate.source == mode:
+            nearest = np.minimum(nearest, to_zeros(gate.surface, x))
+        if gate.target == mode:
+            nearest = np.minimum(nearest, to_zeros(gate.marks, x))
+    return nearest
+
+
+def to_zeros(formula: Formula, x: Array) -> Array:
+    """A lower bound on the distance from points to where all of a formula's functions are 0."""
+    below, above = formula.ranges(x, x)
+    nearest = np.zeros(len(x))
+    for k in range(below.shape[1]):
+        size = np.maximum(np.maximum(below[:, k], -above[:, k]), 0.0)
+        nearest = np.maximum(nearest, _free(formula, k, x, size))
+    return nearest
+
+
+def _free(formula: Formula, k: int, x: Array, size: Array) -> Array:
+    """The largest half width found in whose box a function that is ``size`` at x has no zero."""
+    near = np.zeros(len(x))
+    with np.errstate(all="ignore"):
+        far = np.fmin(size / _steepest(formula, k, x, near), FARTHEST)
+        for n in range(HALVINGS):
+            tried = far if n == 0 else (near + far) / 2
+            free = tried * _steepest(formula, k, x, tried) <= size
+            near, far = np.where(free, tried, near), np.where(free, far, tried)
+    return near
+
+
+def _steepest(formula: Formula, k: int, x: Array, half_width: Array) -> Array:
+    """A bound on the length of the gradient in boxes."""
+    below, above = formula.slopes(x - half_width[:, None], x + half_width[:, None])
+    return np.sqrt(np.sum(np.maximum(np.abs(below[:, k]), np.abs(above[:, k])) ** 2, axis=1))

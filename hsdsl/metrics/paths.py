@@ -1,0 +1,148 @@
+"""What a distance between points is asked with and answered by: places, and the path that attains the upper end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.metrics.chain import chain_of
+from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.interval import INFINITE, Interval
+from hsdsl.metrics.search import End, Found
+
+ROUNDING = 16 * 2.0**-53  # relative to the size of the numbers
+CLOSED = 1e-9  # relative: such a gap counts as none
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point: of a mode's domain or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.
+
+    ``x`` are the mode's states in file order; in a strip, the guard point's. ``t`` where time is a coordinate.
+    """
+
+    mode: str
+    x: tuple[float, ...]
+    edge: str | None = None
+    depth: float = 0.0
+    t: float | None = None
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A straight piece of a path in one mode, and the passage after it (``edge``; None at the end and at a bend)."""
+
+    mode: str
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    edge: str | None = None
+    forward: bool = True
+
+
+@dataclass(frozen=True)
+class PointDistance:
+    """A distance with the path that attains its upper end, and what is certified of it, in words."""
+
+    interval: Interval
+    path: tuple[Piece, ...]
+    certified: str
+
+    @property
+    def sentence(self) -> str:
+        """The distance and its path, for a person."""
+        if self.interval.lower == np.inf:
+            return f"inf ({self.certified})"
+        lines = [f"{self.interval.upper:.10g}, in {self.interval} ({self.certified})"]
+        for piece in self.path:
+            start, end = (", ".join(f"{v:.6g}" for v in x) for x in (piece.start, piece.end))
+            backwards = "" if piece.forward else " backwards"
+            passage = "" if piece.edge is None else f", then {piece.edge}{backwards}"
+            lines.append(f"  {piece.mode}: ({start}) to ({end}){passage}")
+        return "\n".join(lines)
+
+
+def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) -> list[End]:
+    """The ways a path can end at a place: in its domain, or bound to go on through its strip.
+
+    Raises
+    ------
+    ValueError
+        The place does not fit the space.
+    """
+    mode, x = coordinates(space, place)
+    if place.edge is None or relaxation is None:
+        return [End(mode, x)]
+    if not 0 <= place.depth <= relaxation:
+        raise ValueError(f"the depth in a strip lies between 0 and {relaxation}, not {place.depth}")
+    gates = [i for i, g in enumerate(space.gates) if g.edge == place.edge and g.source == mode]
+    if not gates and not any(c.edge == place.edge and c.source == mode for c in space.curved_gates):
+        raise ValueError(f"mode {place.mode} has no edge '{place.edge}' with a guard")
+    on = [End(mode, x, -place.depth, 2 * i + is_end) for i in gates]
+    return [End(mode, x, place.depth), *on]
+
+
+def coordinates(space: Space, place: Place) -> tuple[int, Array]:
+    """A place's mode and coordinates."""
+    try:
+        mode = space.mode_index(place.mode)
+    except KeyError:
+        raise ValueError(f"there is no mode '{place.mode}'") from None
+    values = tuple(place.x)
+    if space.timed:
+        if place.t is None:
+            raise ValueError("time is a coordinate here (a guard or reset depends on it): give t")
+        values += (place.t,)
+    names = space.domains[mode].coordinates
+    if len(values) != len(names):
+        raise ValueError(f"mode {place.mode} has the coordinates {', '.join(names)}, not {len(values)} numbers")
+    return mode, np.array(values, dtype=float)
+
+
+def answer(space: Space, found: Found, a: End, b: End, hops: int) -> PointDistance:
+    upper, lower = found.upper, min(found.lower, found.upper)
+    if upper == np.inf and not found.local and found.cut == np.inf and not found.ended_early:
+        return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
+    rounding = ROUNDING * float(np.abs(a.x).sum() + np.abs(b.x).sum() + 2 * (0 if upper == np.inf else upper))
+    interval = Interval(max(0.0, lower - rounding), upper + rounding)
+    return PointDistance(interval, _path(space, found), _sentence(found, hops))
+
+
+def _sentence(found: Found, hops: int) -> str:
+    if found.local:
+        return _of_local_solves(found)
+    if found.ended_early:
+        return "certified, with a wide gap: the search ended early"
+    if found.cut < np.inf:
+        return f"certified up to {hops} hops"
+    return "certified"
+
+
+def _of_local_solves(found: Found) -> str:
+    if found.upper == np.inf:
+        return "lower end certified; no path was found, though one may exist"
+    unproved = "" if found.proved else "; that it stays in its domains was looked at in points, not proved"
+    if found.upper > found.lower * (1 + CLOSED):
+        early = ", ended early for want of time" if found.ended_early else ""
+        return f"upper end: the best path that local solves found{early}; lower end certified, not tight{unproved}"
+    return f"certified{unproved}"
+
+
+def _path(space: Space, found: Found) -> tuple[Piece, ...]:
+    if found.start is None or found.end is None:
+        return ()
+    if found.legs:
+        passed = [*found.route, (None, True)]
+        return tuple(_piece(space, *leg, *by) for leg, by in zip(found.legs, passed, strict=True))
+    at, mode = found.start.x, found.start.mode
+    pieces: list[Piece] = []
+    if found.sequence:
+        chain = chain_of(space, found.sequence)
+        for passage, (enter, leave) in zip(chain.passages, chain.sides(found.unknowns), strict=True):
+            pieces.append(_piece(space, mode, at, enter, passage.gate.edge, passage.forward))
+            at, mode = leave, passage.target
+    return (*pieces, _piece(space, mode, at, found.end.x))
+
+
+def _piece(space: Space, mode: int, start: Array, end: Array, edge: str | None = None, forward: bool = True) -> Piece:
+    return Piece(space.modes[mode], tuple(start.tolist()), tuple(end.tolist()), edge, forward)
