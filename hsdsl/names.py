@@ -12,6 +12,7 @@ LOOKALIKES = "·²³"  # Unicode lets some of them stand in names; in mathematic
 INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"
 )
+_GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300
@@ -35,10 +36,23 @@ def closest(name: str, candidates: Iterable[str]) -> str | None:
     for candidate in names:
         if candidate.lower() == name.lower() and candidate != name:
             return candidate
+    plain = _spelled(name)
+    for candidate in names:
+        if _spelled(candidate) == plain:
+            return candidate
     if len(names) > _MOST_TO_COMPARE:
         return None
     found = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return found[0] if found else None
+
+
+def _spelled(name: str) -> str:
+    """A name without accents and dots above, Greek letters by their names: what people take for the same."""
+    letters: list[str] = []
+    for letter in name if name.isascii() else unicodedata.normalize("NFKD", name):
+        greek = _GREEK.fullmatch(unicodedata.name(letter, ""))
+        letters.append(greek.group(1) if greek else "" if unicodedata.combining(letter) else letter)
+    return "".join(letters).lower().replace("_", "")
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:

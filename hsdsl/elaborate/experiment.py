@@ -44,7 +44,8 @@ def _check_states(world: World, mode: str, given: dict[Key, Scalar]) -> None:
         message = f"the {noun} {', '.join(lacking)} of the mode '{mode}' has no initial value"
         if len(lacking) > 1:
             message = message.replace(" has no ", " have no ")
-        world.reader.add(world.document.initial.mode.place, "HS308", message)
+        hint = "add " + ", ".join(f"{s}: ..." for s in states if s not in given)
+        world.reader.add(world.document.initial.mode.place, "HS308", message, hint)
 
 
 def elaborate_experiment(world: World) -> Experiment:

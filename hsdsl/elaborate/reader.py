@@ -100,7 +100,7 @@ class Reader:
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, wanted, scope)
         if wanted == "inequality":
-            the_comparison(tree, key)
+            the_comparison(tree, key, text)
         faults = scope.faults(tree)
         for fault in faults:
             self._report(scalar, fault)
@@ -117,7 +117,9 @@ class Reader:
 def _tree(text: str, wanted: Wanted, scope: Scope) -> Tree:
     word = text.strip().lower()
     if word in _NOT_FINITE and word.lstrip("+-") not in scope.values:
-        raise ExpressionError("HS118", f"`{text.strip()}` is not a finite number", 0, len(text))
+        raise ExpressionError(
+            "HS118", f"`{text.strip()}` is not a finite number", 0, len(text), "every number is finite here"
+        )
     return parse(text, wanted)
 
 

@@ -15,6 +15,7 @@ MOST_BITS = 6_000  # of one exact number: the product of two must still print as
 MOST_BITS_WITHIN = 1_000_000  # of the numbers SymPy meets when it brings sums to a common denominator
 MOST_NODES = 100_000
 MOST_NODES_OF_A_CONSTANT = 500  # SymPy computes one as often as it asks for its sign
+MOST_LEVELS_OF_A_CONSTANT = 12  # and computes it anew at each of its levels
 MOST_LEVELS = 100  # SymPy's time grows with the cube of it
 LARGEST_NUMBER = 2**1024  # no float is as large
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from hsdsl.expression import symbolic
 from hsdsl.expression.scope import Scope, Value
-from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree
+from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
+from hsdsl.names import shown
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,12 @@ def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
     ExpressionError
         As `symbolic.number`, and where there is no inequality or more than one.
     """
-    comparison = the_comparison(tree, key)
+    comparison = the_comparison(tree, key, text)
     left, right = (symbolic.number(side, scope, text) for side in comparison.operands)
     return Inequality(left, comparison.operators[0], right)
 
 
-def the_comparison(tree: Tree, key: str) -> Comparison:
+def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
     """The tree, if it is exactly one inequality.
 
     Raises
@@ -41,14 +42,33 @@ def the_comparison(tree: Tree, key: str) -> Comparison:
         Otherwise, with what to write under ``key``.
     """
     if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
-        more = "put the rest under `if`" if key == "when" else "write each inequality as an item of its own"
-        raise ExpressionError("HS116", f"`{key}` takes one inequality", tree.start, tree.end, more)
+        message = f"`{key}` takes one inequality"
+        raise ExpressionError("HS116", message, tree.start, tree.end, _apart(tree, key, text))
     if not isinstance(tree, Comparison):
         message = f"`{key}` takes an inequality, and this is not one"
-        raise ExpressionError("HS116", message, tree.start, tree.end, "write it as left >= right")
+        hint = "write it as left >= right" + ("" if isinstance(tree, Truth) else f": {_said(tree, text)} >= 0")
+        raise ExpressionError("HS116", message, tree.start, tree.end, hint)
     operator = tree.operators[0]
     if operator in ("==", "!="):
         message = f"`{key}` takes an inequality, not `{operator}`"
-        hint = "write `>=` or `<=`, with the side on which the mode ends" if key == "when" else "write `>=` or `<=`"
+        left, right = (_said(side, text) for side in tree.operands)
+        hint = f"write {left} >= {right} or {left} <= {right}, whichever is true where the mode "
+        hint += "ends" if key == "when" else "may be"
         raise ExpressionError("HS107", message, tree.start, tree.end, hint)
     return tree
+
+
+def _apart(tree: Tree, key: str, text: str) -> str:
+    """What to write instead of several inequalities in one."""
+    if key != "when":
+        return "write each inequality as an item of its own"
+    if not (isinstance(tree, Logic) and all(isinstance(operand, Comparison) for operand in tree.operands)):
+        return "put the rest under `if`"
+    if tree.operator == "or":
+        return "write a transition for each: " + "; ".join(f"when: {_said(o, text)}" for o in tree.operands)
+    first, *others = (_said(operand, text) for operand in tree.operands)
+    return f"write when: {first} and, on a line of its own, if: {' and '.join(others)}"
+
+
+def _said(tree: Tree, text: str) -> str:
+    return shown(text[tree.start : tree.end], 40)

@@ -6,6 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
+from hsdsl.expression.foreign import CASES, NAMES, power_of
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import (
     Call,
@@ -52,7 +53,9 @@ def parse(text: str, wanted: Wanted = "number") -> Tree:
     """
     tokens = tokenize(text, wanted)
     if tokens[0].kind == "end":
-        raise ExpressionError("HS121", "an expression is missing", 0, 1)
+        raise ExpressionError(
+            "HS121", "an expression is missing", 0, 1, "write a number or an expression behind the colon"
+        )
     with deep_stack():
         return _Parser(text, tokens).whole()
 
@@ -196,7 +199,7 @@ class _Parser:
         if token.text == ",":
             after = self.tokens[self.at + 1]
             decimal = before.kind == after.kind == "number"
-            hint = f"write {shown(before.text)}.{shown(after.text)}" if decimal else None
+            hint = _decimal(before.text, after.text) if decimal else "parentheses hold one expression"
             return ExpressionError(
                 "HS102", "a comma stands only between the arguments of a function", token.start, token.end, hint
             )
@@ -207,19 +210,42 @@ class _Parser:
         left, right = shown(before.text, 30), shown(token.text, 30)
         if token.text in _FOREIGN_WORDS or before.text in _FOREIGN_WORDS:
             word = token if token.text in _FOREIGN_WORDS else before
-            hint = f"write `{word.text.lower()}`" if word.text.isupper() else "write plain arithmetic"
+            hint = f"write `{word.text.lower()}`" if word.text.isupper() else CASES
             return ExpressionError("HS109", f"`{word.text}` is not a word of the language", word.start, word.end, hint)
         if before.text in FUNCTIONS:
             message = f"`{before.text}` is a function and needs parentheses"
             hint = f"write {before.text}({right})"
             return ExpressionError("HS112", message, before.start, before.end, hint)
+        if token.text == "(" and self.power_of_function():
+            message = f"`{self.tokens[self.at - 3].text}` is a function and needs parentheses"
+            hint = power_of(self.tokens[self.at - 3].text)
+            return ExpressionError("HS112", message, self.tokens[self.at - 3].start, before.end, hint)
         if token.text == "(":
             left, right = (left, "(...)") if before.text != ")" else ("(...)", "(...)")
         elif before.text == ")":
             left = "(...)"
         message = f"an operator is missing between `{left}` and `{right}`"
-        hint = None if before.kind == token.kind == "number" else f"write {left}*{right} for a product"
-        return ExpressionError("HS104", message, before.start, token.end, hint)
+        return ExpressionError("HS104", message, before.start, token.end, _joined(before, token, left, right))
+
+    def power_of_function(self) -> bool:
+        """Whether what was just read is ``sin**2``."""
+        function, power = self.tokens[max(0, self.at - 3)], self.tokens[max(0, self.at - 2)]
+        return function.text in FUNCTIONS and power.text == "**"
+
+
+def _joined(before: Token, token: Token, left: str, right: str) -> str:
+    if before.kind == token.kind == "number":
+        return "a number has one decimal point, and no blanks"
+    if before.kind == "number" and token.text in ("deg", "degrees", "rad"):
+        return NAMES[token.text]
+    blank = before.kind == "number" and token.kind == "name" and before.end < token.start
+    unit = "; units stand under `units`" if blank else ""
+    return f"write {left}*{right} for a product{unit}"
+
+
+def _decimal(left: str, right: str) -> str:
+    both = f"{shown(left)}.{shown(right)}"
+    return f"write {shown(left)}{shown(right)}, or {both}" if len(right) == 3 else f"write {both}"
 
 
 def _chain(binding: int, operators: list[str], operands: list[Tree], start: int, end: int) -> Tree:

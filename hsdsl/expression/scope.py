@@ -9,32 +9,12 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.expression.foreign import NAMES, derivative_of
 from hsdsl.expression.syntax import Call, ExpressionError, Name, Tree, walk
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import WORDS, closest, did_you_mean, shown
 
 RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
-_SPELLED = {
-    "e": "write exp(1) for Euler's number",
-    "π": "write pi",
-    "PI": "write pi",
-    "Pi": "write pi",
-    "inf": "every number is finite here",
-    "nan": "every number is finite here",
-    "arcsin": "write asin",
-    "arccos": "write acos",
-    "arctan": "write atan",
-    "arctan2": "write atan2",
-    "ln": "write log",
-    "log10": "write log(x)/log(10)",
-    "log2": "write log(x)/log(2)",
-    "fabs": "write abs",
-    "sgn": "write sign",
-    "pow": "write x**y",
-    "ceil": "write -floor(-x)",
-    "cbrt": "write x**(1/3), for x that is not negative",
-    "der": "a derivative is what `flow` gives a state",
-}
 
 
 @dataclass(frozen=True)
@@ -135,10 +115,10 @@ class Scope:
         if node.function not in FUNCTIONS:
             end = node.start + len(node.function)
             if node.function in self.values or node.function in CONSTANTS:
-                message, hint = f"'{shown(node.function)}' is not a function", f"write {node.function}*(...)"
+                message, hint = f"'{shown(node.function)}' is not a function", _product_or_value(node)
             else:
                 message = f"there is no function '{shown(node.function)}'"
-                hint = _SPELLED.get(node.function) or _nearest(node.function) or "functions: " + " ".join(FUNCTIONS)
+                hint = NAMES.get(node.function) or _nearest(node.function) or "functions: " + " ".join(FUNCTIONS)
             return ExpressionError("HS112", message, node.start, end, hint)
         _, fewest, most = FUNCTIONS[node.function]
         given = len(node.arguments)
@@ -150,13 +130,22 @@ class Scope:
         return ExpressionError("HS113", message, node.start, node.end)
 
     def _hint(self, name: str) -> str | None:
-        if name in _SPELLED:
-            return _SPELLED[name]
+        if name in NAMES:
+            return NAMES[name]
         known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
-        return did_you_mean(name, [*known, *CONSTANTS])
+        near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS])
+        return near or "define it, under `parameters`, `inputs` or `let`"
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
+
+
+def _product_or_value(node: Call) -> str:
+    match node.arguments:
+        case (Name("t"),):
+            return f"write {node.function}: every name has its value at the present time"
+        case _:
+            return f"write {node.function}*(...)"
 
 
 def _nearest(name: str) -> str | None:

@@ -9,6 +9,7 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.expression import bounds, numeric
+from hsdsl.expression.foreign import CASES
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import (
     CONDITIONS,
@@ -73,7 +74,8 @@ class _Builder:
         """The value of a node that must be a number."""
         if isinstance(tree, CONDITIONS):
             message = f"`{self.said(tree)}` is a condition where a number is wanted"
-            raise ExpressionError("HS114", message, tree.start, tree.end, "conditions stand under `if`")
+            hint = f"write {int(tree.value)}" if isinstance(tree, Truth) else CASES
+            raise ExpressionError("HS114", message, tree.start, tree.end, hint)
         match tree:
             case Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
@@ -186,9 +188,8 @@ class _Builder:
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
-        if constant and size > bounds.MOST_NODES_OF_A_CONSTANT and not expr.is_Rational:
-            message = f"`{self.said(tree)}` is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
+        if constant and not expr.is_Rational:
+            self.refuse_large_constant(tree, size, depth)
         within = _bits_within(tree, parts)
         if within > bounds.MOST_BITS_WITHIN:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
@@ -197,6 +198,16 @@ class _Builder:
             message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
             raise ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
         return Value(expr, number, constant, uses, size, depth, within)
+
+    def refuse_large_constant(self, tree: Tree, size: int, depth: int) -> None:
+        """Raise where SymPy would compute a constant for ever."""
+        if size > bounds.MOST_NODES_OF_A_CONSTANT:
+            message = f"`{self.said(tree)}` is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
+        if depth > bounds.MOST_LEVELS_OF_A_CONSTANT:
+            most = bounds.MOST_LEVELS_OF_A_CONSTANT
+            message = f"`{self.said(tree)}` is a constant whose functions are nested more than {most} deep"
+            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
@@ -228,7 +239,9 @@ class _Builder:
                 pairs = zip(tree.operators, values, values[1:], strict=False)
                 return sp.And(*(_RELATIONS[operator](a, b, evaluate=False) for operator, a, b in pairs))
         message = f"`{self.said(tree)}` is a number where a condition is wanted"
-        hint = "compare it with something: `> 0`"
+        hint = f"compare it with something: {self.said(tree)} > 0"
+        if isinstance(tree, Number) and tree.value in (0, 1):
+            hint = f"write {'true' if tree.value else 'false'}"
         raise ExpressionError("HS115", message, tree.start, tree.end, hint)
 
     def said(self, tree: Tree) -> str:

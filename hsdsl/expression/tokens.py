@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
+from hsdsl.expression.foreign import SIGNS, better
 from hsdsl.expression.syntax import ExpressionError, Wanted
 from hsdsl.names import LOOKALIKES, normalised, shown
 
@@ -16,40 +17,6 @@ _MOST_DIGITS = 1000
 _NUMBER = re.compile(r"0[xX][0-9a-fA-F]+|0[oO][0-7]+|([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/(),<>]")
 _GROUPED = re.compile(r"[0-9]+(_[0-9]+)+")
-
-# what other languages write: its start, a code, a sentence, the right form
-_FOREIGN: tuple[tuple[str, str, str, str], ...] = (
-    ("&&", "HS108", "`&&` is not an operator of the language", "write `and`"),
-    ("||", "HS108", "`||` is not an operator of the language", "write `or`"),
-    ("&", "HS108", "`&` is not an operator of the language", "write `and`"),
-    ("|", "HS108", "`|` is not an operator of the language", "write `or`, and abs(x) for an absolute value"),
-    ("!", "HS108", "`!` is not an operator of the language", "write `not`"),
-    ("~", "HS108", "`~` is not an operator of the language", "write `not`"),
-    ("^", "HS106", "`^` is not an operator of the language", "write `**` for a power"),
-    ("'", "HS109", "a quote mark has no meaning in an expression", "names have no quotes; `flow` gives derivatives"),
-    ('"', "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
-    ("[", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
-    ("]", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
-    ("{", "HS109", "braces have no meaning in an expression", "use parentheses"),
-    ("}", "HS109", "braces have no meaning in an expression", "use parentheses"),
-    (".", "HS109", "names have no dots in an expression", "write the name or the function alone: sin(x)"),
-    ("%", "HS109", "`%` is not an operator of the language", "write x - y*floor(x/y) for a remainder"),
-    (":", "HS109", "a colon has no meaning in an expression", "write plain arithmetic"),
-    (";", "HS109", "a semicolon has no meaning in an expression", "write one expression"),
-    ("?", "HS109", "a question mark has no meaning in an expression", "use modes and transitions, or min and max"),
-    ("−", "HS101", "this is not the minus sign of expressions", "write `-`"),
-    ("–", "HS101", "this is not the minus sign of expressions", "write `-`"),
-    ("×", "HS101", "`×` is not an operator of the language", "write `*`"),
-    ("·", "HS101", "`·` is not an operator of the language", "write `*`"),
-    ("⋅", "HS101", "`⋅` is not an operator of the language", "write `*`"),
-    ("÷", "HS101", "`÷` is not an operator of the language", "write `/`"),
-    ("≥", "HS101", "`≥` is not an operator of the language", "write `>=`"),
-    ("≤", "HS101", "`≤` is not an operator of the language", "write `<=`"),
-    ("≠", "HS101", "`≠` is not an operator of the language", "write `!=`"),
-    ("²", "HS101", "`²` is not an operator of the language", "write `**2`"),
-    ("³", "HS101", "`³` is not an operator of the language", "write `**3`"),
-    ("√", "HS101", "`√` is not a function of the language", "write `sqrt(x)`"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,9 +107,9 @@ def _operator(text: str, at: int, wanted: Wanted) -> Token:
         return Token("operator", match.group(), at, match.end())
     if text[at] == "=":
         raise _equals(text, at, wanted)
-    for sign, code, message, hint in _FOREIGN:
+    for sign, code, message, hint in SIGNS:
         if text.startswith(sign, at):
-            raise ExpressionError(code, message, at, at + len(sign), hint)
+            raise ExpressionError(code, message, at, at + len(sign), better(sign, text, at) or hint)
     raise ExpressionError("HS101", f"the character `{text[at]}` has no meaning in an expression", at, at + 1)
 
 

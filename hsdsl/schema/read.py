@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 from hsdsl.errors import Diagnostic, Findings, Span
 from hsdsl.names import closest, shown
 from hsdsl.schema.documents import SHAPES, Model
+from hsdsl.schema.leaves import undifferentiated
 from hsdsl.schema.repair import repair
 from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
 
@@ -43,6 +44,21 @@ _MEANT = {
     "simulation": "experiment",
     "name": "title",
     "description": "about",
+}
+_ADD = {
+    "hsdsl": "begin the file with hsdsl: 1",
+    "modes": "write modes: and under it each mode's name with its flow",
+    "flow": "write flow: and under it each state with its derivative",
+    "initial": "write initial: {mode: ..., x: ...}, a value for each state of that mode",
+    "experiment": "write experiment: {until: 10}, the time at which a run ends",
+    "until": "write until: and the time at which a run ends",
+    "when": "write when: and the inequality at which the transition fires, such as x >= 1",
+    "to": "write to: and the mode that is entered",
+    "value": "write value: and the parameter's number or expression",
+    "times": "write times: [0, 1, 2], or file: and the name of a CSV file",
+    "values": "write values: and one value for each of the times",
+    "file": "write file: and the name of a CSV file",
+    "time": "write time: and when that is",
 }
 _PLACE: dict[tuple[str, ...], str] = {
     (): "a model",
@@ -116,6 +132,8 @@ def _fields(location: _Location) -> list[str]:
 def _meant(fault: ErrorDetails) -> str | None:
     """The key that an unknown one was probably meant to be."""
     location = fault["loc"]
+    if fault["type"] == "HS205" and location[-1] == "[key]":
+        return undifferentiated(str(location[-2]))
     if fault["type"] != "extra_forbidden":
         return None
     key, fields = str(location[-1]), _fields(location)
@@ -148,7 +166,17 @@ def _missing(root: Node, location: _Location) -> Diagnostic:
         span = Span(span.path, 1, 1)
     elif place.start[1] != place.end[1] or isinstance(_names(location[:-1])[-1], int):
         span = Span(span.path, span.line, span.column)
-    return place.text.diagnostic("HS202", message, span)
+    return place.text.diagnostic("HS202", message, span, _to_add(root, location))
+
+
+def _to_add(root: Node, location: _Location) -> str:
+    """What to write where a key is missing."""
+    key = str(location[-1])
+    if key != "mode":
+        return _ADD[key]
+    modes = root.entries["modes"][1] if isinstance(root, Mapping) and "modes" in root.entries else root
+    names = [str(name) for name, _ in modes] if isinstance(modes, Mapping) else []
+    return f"write mode: {names[0]}" if len(names) == 1 else "write mode: and the mode that a run starts in"
 
 
 def _names(location: _Location) -> _Location:

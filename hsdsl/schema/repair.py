@@ -27,7 +27,8 @@ def repair(root: Node, location: _Location, fault: str, meant: str | None) -> bo
     if not location:
         return False
     if location[-1] == "[key]":
-        return _drop(root, location[:-1])
+        above = _descend(root, location[:-2])
+        return _renamed(above, str(location[-2]), meant) or _drop(root, location[:-1])
     parent = _descend(root, location[:-1])
     match fault:
         case "extra_forbidden":

@@ -6,6 +6,7 @@ The pieces are put together again, so that the rest of the model is still read, 
 from __future__ import annotations
 
 from hsdsl.errors import Findings
+from hsdsl.names import shown
 from hsdsl.source.nodes import Node, Place, Scalar
 
 _MOST_PIECES = 100  # of one expression
@@ -37,6 +38,21 @@ def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> li
         joined.append((key, _one(run, findings)))
         at += len(run)
     return joined
+
+
+def spaced_entries(entries: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
+    """The entries of a mapping in braces, with ``name:value``, which YAML takes for a key, apart again."""
+    return [_spaced(key, value, findings) for key, value in entries]
+
+
+def _spaced(key: Node, value: Node, findings: Findings) -> tuple[Node, Node]:
+    if not (isinstance(key, Scalar) and key.plain and isinstance(value, Scalar) and value.plain and value.value == ""):
+        return key, value
+    name, colon, rest = key.value.partition(":")
+    if not (colon and rest and name.isidentifier()):
+        return key, value
+    findings.add(key.place.diagnostic("HS004", "a space is missing after the colon", f"write {name}: {shown(rest)}"))
+    return Scalar(name, True, key.place), Scalar(rest, True, key.place)
 
 
 def _run(nodes: list[Node]) -> list[Scalar] | list[Node]:

@@ -12,8 +12,8 @@ import yaml
 
 from hsdsl.errors import Diagnostic, Findings, ModelError, Span
 from hsdsl.names import INVISIBLE, normalised, shown
-from hsdsl.source.commas import rejoined_entries, rejoined_items
-from hsdsl.source.faults import explain
+from hsdsl.source.commas import rejoined_entries, rejoined_items, spaced_entries
+from hsdsl.source.faults import explain, quote
 from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence, absent
 from hsdsl.source.text import Text
 
@@ -132,7 +132,7 @@ class _Composer:
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
         if event.flow_style:
-            entries = rejoined_entries(entries, self.findings)
+            entries = rejoined_entries(spaced_entries(entries, self.findings), self.findings)
         return Mapping(self._unique(entries), place), nodes, height + 1
 
     def _unique(self, entries: list[tuple[Node, Node]]) -> dict[str, tuple[Key, Node]]:
@@ -155,7 +155,8 @@ class _Composer:
         place = self._place(event)
         if name not in self.anchors:
             message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` stands before it"
-            self._stop(place.diagnostic("HS007", message, "quote this expression"))
+            _, line, column = place.start
+            self._stop(place.diagnostic("HS007", message, quote(self.text.lines[line], column)))
         node, nodes, height = self.anchors[name]
         self.unused.pop(name, None)
         if node is None:

@@ -7,6 +7,7 @@ import re
 import yaml
 
 from hsdsl.errors import Diagnostic
+from hsdsl.names import shown
 from hsdsl.source.text import Text
 
 _VALUE = re.compile(r"^\s*(?:- +)*(?:[^\s:{\[,'\"][^:{\[,]*:\s+)?(?P<value>\S.*)$")
@@ -31,6 +32,9 @@ _MEANS = {
     "-": "an item of a list",
 }
 _QUOTE = "quote this expression"
+_NO_SPACE = re.compile(r"\s*(?:- +)?([^\W\d]\w*):(\S.*)")
+_EQUATION = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?:'|\(t\))?\s*=\s*([^=].*)|\s*(?:der|diff)\((\w+)\)\s*=\s*([^=].*)")
+_DASH = re.compile(r"(\s*)-([^\W\d].*:.*)")
 _COLON = "a key is followed by a colon and a space"
 
 
@@ -52,7 +56,7 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
         return _misread(text, *opened)
     if "could not find expected ':'" in problem:
         message = "this line is neither a key nor part of a value"
-        return text.diagnostic("HS004", message, text.span(*opened, 9999), _COLON)
+        return text.diagnostic("HS004", message, text.span(*opened, 9999), _with_colon(text.lines[opened[0] - 1]))
     if "flow" in (error.context or ""):
         return _in_brackets(text, (line, column), opened)
     return _in_block(text, problem, line, column)
@@ -75,7 +79,10 @@ def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, 
     if "escape" in problem or "hexdecimal" in problem or "hexadecimal" in problem:
         message = "the backslash here begins an escape that YAML does not know"
         return text.diagnostic("HS004", message, text.span(*here), "use single quotes, where a backslash is itself")
-    return text.diagnostic("HS004", "the quote that opens here is never closed", text.span(*opened))
+    mark = _character(text, *opened)
+    return text.diagnostic(
+        "HS004", "the quote that opens here is never closed", text.span(*opened), f"close it with `{mark}`"
+    )
 
 
 def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
@@ -101,7 +108,7 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
     if "mapping values" in problem:
         if _KEY_AND_VALUE.match(before):
             message = "a colon followed by a space cannot stand inside a value"
-            return text.diagnostic("HS007", message, text.span(line, column), f"{_QUOTE} or begin a new line")
+            return text.diagnostic("HS007", message, text.span(line, column), _two_colons(content, column))
         return _without_colon(text, line) or _indentation(text, line, len(content) - len(content.lstrip()) + 1)
     return _misread(text, line, column)
 
@@ -115,11 +122,38 @@ def _without_colon(text: Text, line: int) -> Diagnostic | None:
     if not content.strip() or ":" in content or content.lstrip()[0] in "-#":
         return None
     span = text.span(above, len(content) - len(content.lstrip()) + 1, 9999)
-    return text.diagnostic("HS004", "this line is neither a key nor part of a value", span, _COLON)
+    return text.diagnostic("HS004", "this line is neither a key nor part of a value", span, _with_colon(content))
+
+
+def _with_colon(content: str) -> str:
+    """The hint for a line that should have been a key with its value."""
+    found = _NO_SPACE.fullmatch(content)
+    if found:
+        return f"write a space after the colon: {shown(': '.join(found.groups()))}"
+    found = _EQUATION.fullmatch(content)
+    if found:
+        return f"write {shown(': '.join(part for part in found.groups() if part))}"
+    return _COLON
+
+
+def _two_colons(content: str, column: int) -> str:
+    """The hint for ``reset: v: -c*v``, and for a text or an expression with a colon in it."""
+    key, _, value = content.partition(": ")
+    if "?" in content[: column - 1]:
+        return "write a mode for each case, or use min, max, abs or sign"
+    if value[: column - len(key) - 3].isidentifier():
+        inner = f"{key.strip(' -')}: {{{value}}}"
+        return f"write {shown(inner)}, or quote it if it is a text"
+    return f"{_QUOTE} or begin a new line"
 
 
 def _indentation(text: Text, line: int, column: int) -> Diagnostic:
     content = text.lines[line - 1] if line <= len(text.lines) else ""
+    dash = _DASH.fullmatch(text.lines[line - 2]) if 2 <= line <= len(text.lines) else None
+    if dash:
+        message = "after the dash of a list item a space is missing"
+        span = text.span(line - 1, len(dash.group(1)) + 1, 9999)
+        return text.diagnostic("HS004", message, span, f"write - {shown(dash.group(2))}")
     if content.lstrip().startswith("- "):
         message = "a list item cannot stand here"
     else:
@@ -138,7 +172,16 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
     if first not in _MEANS:
         return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column))
     message = f"a value that begins with `{first}` is {_MEANS[first]} in YAML"
-    return text.diagnostic("HS007", message, text.span(line, start + 1, 9999), _QUOTE)
+    hint = "quote the whole expression, or none of it" if first in "'\"" else quote(content, start)
+    return text.diagnostic("HS007", message, text.span(line, start + 1, 9999), hint)
+
+
+def quote(content: str, start: int) -> str:
+    """The hint to quote what begins somewhere in a line, with the form where its end is known."""
+    value = content[start:].strip()
+    if set(content[:start]) & set("{[") or set(value) & set('"\\#'):
+        return _QUOTE
+    return f'{_QUOTE}: "{shown(value)}"'
 
 
 def _character(text: Text, line: int, column: int) -> str:

@@ -1,0 +1,166 @@
+"""What other languages write, with the right form here: signs, and names of functions and constants."""
+
+from __future__ import annotations
+
+import re
+
+from hsdsl.functions import FUNCTIONS
+
+CASES = "write a mode for each case, or use min, max, abs or sign"
+_DEGREES = "angles are in radians: write 30*pi/180 for 30 degrees"
+_SAMPLES = "give it as samples, under `inputs`"
+_DERIVATIVE = "a derivative is what `flow` gives a state: write that, or name it under `let`"
+_MEMORY = "nothing is remembered but states; a reset sees the values before the jump"
+
+# names: what to write instead
+NAMES = {
+    "e": "write exp(x) for a power of e, and exp(1) for e itself",
+    "π": "write pi",
+    "PI": "write pi",
+    "Pi": "write pi",
+    "time": "write t for the time",
+    "tau": "the time is t",
+    "inf": "every number is finite here",
+    "nan": "every number is finite here",
+    "on": "write true",
+    "yes": "write true",
+    "off": "write false",
+    "no": "write false",
+    "deg": _DEGREES,
+    "degrees": _DEGREES,
+    "rad": "angles are in radians: leave the unit out",
+    "arcsin": "write asin",
+    "arccos": "write acos",
+    "arctan": "write atan",
+    "arctan2": "write atan2",
+    "arcsinh": "write asinh",
+    "arccosh": "write acosh",
+    "arctanh": "write atanh",
+    "tg": "write tan",
+    "cot": "write 1/tan(x)",
+    "sec": "write 1/cos(x)",
+    "csc": "write 1/sin(x)",
+    "sind": _DEGREES,
+    "cosd": _DEGREES,
+    "ln": "write log",
+    "log10": "write log(x)/log(10)",
+    "log2": "write log(x)/log(2)",
+    "log1p": "write log(1 + x)",
+    "expm1": "write exp(x) - 1",
+    "fabs": "write abs",
+    "sgn": "write sign",
+    "signum": "write sign",
+    "pow": "write x**y",
+    "power": "write x**y",
+    "sqr": "write x**2",
+    "square": "write x**2",
+    "norm": "write sqrt(x**2 + y**2)",
+    "hypot": "write sqrt(x**2 + y**2)",
+    "ceil": "write -floor(-x)",
+    "round": "write floor(x + 1/2)",
+    "int": "write floor(x)",
+    "mod": "write x - y*floor(x/y) for a remainder",
+    "fmod": "write x - y*floor(x/y) for a remainder",
+    "rem": "write x - y*floor(x/y) for a remainder",
+    "cbrt": "write x**(1/3), for x that is not negative",
+    "clip": "write min(max(x, low), high)",
+    "sat": "write min(max(x, low), high)",
+    "saturate": "write min(max(x, low), high)",
+    "der": _DERIVATIVE,
+    "diff": _DERIVATIVE,
+    "dt": _DERIVATIVE,
+    "integral": "an integral is a state whose flow is the integrand",
+    "pre": _MEMORY,
+    "delay": _MEMORY,
+    "edge": _MEMORY,
+    "reinit": "a state is set by `reset` in a transition",
+    "interp": _SAMPLES,
+    "interp1": _SAMPLES,
+    "lookup": _SAMPLES,
+    "rand": "a model has no chance in it; " + _SAMPLES,
+    "random": "a model has no chance in it; " + _SAMPLES,
+    "randn": "a model has no chance in it; " + _SAMPLES,
+    "noise": "a model has no chance in it; " + _SAMPLES,
+    **dict.fromkeys(("if", "ifelse", "where", "piecewise", "Piecewise", "heaviside", "Heaviside", "step"), CASES),
+}
+
+# signs: its characters, a code, a sentence, the right form
+SIGNS: tuple[tuple[str, str, str, str], ...] = (
+    ("&&", "HS108", "`&&` is not an operator of the language", "write `and`"),
+    ("||", "HS108", "`||` is not an operator of the language", "write `or`"),
+    ("&", "HS108", "`&` is not an operator of the language", "write `and`"),
+    ("|", "HS108", "`|` is not an operator of the language", "write `or`, and abs(x) for an absolute value"),
+    ("!", "HS108", "`!` is not an operator of the language", "write `not`"),
+    ("~", "HS108", "`~` is not an operator of the language", "write `not`"),
+    ("^", "HS106", "`^` is not an operator of the language", "write `**` for a power"),
+    ("'", "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
+    ('"', "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
+    ("[", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
+    ("]", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
+    ("{", "HS109", "braces have no meaning in an expression", "use parentheses"),
+    ("}", "HS109", "braces have no meaning in an expression", "use parentheses"),
+    (".^", "HS106", "`.^` is not an operator of the language", "write `**` for a power"),
+    (".*", "HS109", "`.*` is not an operator of the language", "write `*`"),
+    ("./", "HS109", "`./` is not an operator of the language", "write `/`"),
+    (".", "HS109", "names have no dots in an expression", "write the name or the function alone: sin(x)"),
+    ("%", "HS109", "`%` is not an operator of the language", "write x - y*floor(x/y) for a remainder"),
+    (":", "HS109", "a colon has no meaning in an expression", "write plain arithmetic"),
+    (";", "HS109", "a semicolon has no meaning in an expression", "write one expression"),
+    ("?", "HS109", "a question mark has no meaning in an expression", CASES),
+    ("−", "HS101", "this is not the minus sign of expressions", "write `-`"),
+    ("–", "HS101", "this is not the minus sign of expressions", "write `-`"),
+    ("×", "HS101", "`×` is not an operator of the language", "write `*`"),
+    ("·", "HS101", "`·` is not an operator of the language", "write `*`"),
+    ("⋅", "HS101", "`⋅` is not an operator of the language", "write `*`"),
+    ("÷", "HS101", "`÷` is not an operator of the language", "write `/`"),
+    ("≥", "HS101", "`≥` is not an operator of the language", "write `>=`"),
+    ("≤", "HS101", "`≤` is not an operator of the language", "write `<=`"),
+    ("≠", "HS101", "`≠` is not an operator of the language", "write `!=`"),
+    ("²", "HS101", "`²` is not an operator of the language", "write `**2`"),
+    ("³", "HS101", "`³` is not an operator of the language", "write `**3`"),
+    ("°", "HS101", "angles are in radians", "write 30*pi/180 for 30 degrees"),
+    ("\\", "HS101", "a backslash has no meaning in an expression", "write the name alone: omega"),
+    ("$", "HS101", "a dollar sign has no meaning in an expression", "write the name alone"),
+    ("“", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
+    ("”", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
+    ("‘", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
+    ("’", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
+    ("∞", "HS101", "every number is finite here", "write a number"),
+    ("∧", "HS108", "`∧` is not an operator of the language", "write `and`"),
+    ("∨", "HS108", "`∨` is not an operator of the language", "write `or`"),
+    ("¬", "HS108", "`¬` is not an operator of the language", "write `not`"),
+    ("√", "HS101", "`√` is not a function of the language", "write `sqrt(x)`"),
+)
+
+_WORD_BEFORE = re.compile(r"([^\W\d]\w*)\s*$")
+_INDEX = re.compile(r"\[\s*([0-9]{1,4})\s*\]")
+
+
+def better(sign: str, text: str, at: int) -> str | None:
+    """The right form of what stands around a sign, where that is known."""
+    word = _WORD_BEFORE.search(text, 0, at)
+    name = word.group(1) if word else ""
+    if sign == "'" and name:
+        return f"write {name}: a reset sees the values before the jump, and derivatives are what `flow` gives"
+    if sign in ("^", ".^") and name == "e":
+        return "write exp(x) for a power of e"
+    if sign in ("^", ".^") and name in FUNCTIONS:
+        return power_of(name)
+    if sign == "[" and name in FUNCTIONS:
+        return f"write {name}(...)"
+    index = _INDEX.match(text, at)
+    if sign == "[" and name and index:
+        return f"write every component as a name of its own: {name}{index.group(1)}"
+    return None
+
+
+def power_of(function: str) -> str:
+    """The hint for ``sin**2(x)``."""
+    return f"write {function}(...)**2 for a power of a function"
+
+
+def derivative_of(name: str, known: object) -> str | None:
+    """The hint for ``dx`` and ``xdot``, where ``x`` is known."""
+    found = re.fullmatch(r"d_?(\w+)|(\w+?)_?d?dot|d(\w+)dt", name)
+    states = [part for part in found.groups() if part] if found else []
+    return _DERIVATIVE if any(part in known for part in states) else None  # pyright: ignore

@@ -1,0 +1,68 @@
+"""Typical mistakes of new users, and what each is told. `HSDSL_WRITE_GOLDEN=1` writes the answers anew."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from hsdsl.cli import main
+
+FOLDER = Path(__file__).parent
+DATA = yaml.safe_load((FOLDER / "mistakes.yaml").read_text(encoding="utf-8"))
+ANSWERS = FOLDER / "mistakes.txt"
+CASES = {f"{group}: {case['title']}": case for group, cases in DATA["groups"].items() for case in cases}
+MARK = "### "
+
+
+def known():
+    """The answers on record, by case."""
+    parts = ANSWERS.read_text(encoding="utf-8").split(MARK)[1:] if ANSWERS.exists() else []
+    return {part.split("\n", 1)[0]: part.split("\n", 1)[1].rstrip("\n") + "\n" for part in parts}
+
+
+@pytest.fixture
+def told(tmp_path, monkeypatch, capsys):
+    """What the command line says to a case."""
+
+    def tell(case):
+        text = DATA["base"]
+        if "for" in case:
+            assert text.count(case["for"]) >= 1
+            text = text.replace(case["for"], case["write"], 1)
+        (tmp_path / "model.yaml").write_text(case.get("file", text), encoding="utf-8")
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["hsdsl", *case.get("command", ["validate", "model.yaml"])])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        assert said.out == ""
+        return ended.value.code, said.err
+
+    return tell
+
+
+def test_there_are_enough_and_no_two_are_called_the_same():
+    assert len(CASES) == sum(map(len, DATA["groups"].values())) >= 60
+    assert list(known()) == list(CASES)
+
+
+@pytest.mark.skipif("HSDSL_WRITE_GOLDEN" not in os.environ, reason="writes the answers")
+def test_write(told):
+    ANSWERS.write_text("\n".join(f"{MARK}{name}\n{told(case)[1]}" for name, case in CASES.items()), encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_mistake_is_told(told, name):
+    code, said = told(CASES[name])
+    assert code in (1, 2)
+    assert said == known()[name]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_answer_says_what_to_write(name):
+    """A hint for the first error of each, but where the sentence itself leaves nothing to say."""
+    first = known()[name].split("\n\n")[0]
+    assert "hint: " in first or CASES[name].get("plain"), first
+    assert "Traceback" not in first
