@@ -6,6 +6,7 @@ python docs/generate.py --check   write nothing; name the pages that are stale a
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import typer.main
+import yaml
 
 from hsdsl import cli, errors, integrators, schema
 from hsdsl.functions import CONSTANTS, FUNCTIONS
@@ -23,6 +25,7 @@ from hsdsl.lint.rules import FAMILIES, RULES, family
 from hsdsl.model import requests
 
 REFERENCE = Path(__file__).parent / "reference"
+GOLDEN = Path(__file__).parents[1] / "tests" / "golden"
 NOTE = "<!-- Written by docs/generate.py: edit the code it reads, not this page. -->\n\n"
 
 LANGUAGE = """# Language
@@ -99,6 +102,15 @@ INTERPOLANTS = {
     "hermite": "the cubic Hermite polynomial of its ends",
     "dense": "dense output of order {order}, from the stages",
 }
+
+
+MISTAKES = """# Typical mistakes
+
+What people write who come from other tools or are new to YAML, and what they are told. Each row is a test: the model at
+the end with one passage written as in the row, a file of its own, or a command. The codes are explained on
+[their page](errors.md); `hsdsl explain HS106` prints the same.
+
+"""
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -282,6 +294,63 @@ def weights(label: str, row: Iterable[Fraction]) -> list[str]:
     return [label, *(node(value) for value in row)]
 
 
+def mistakes() -> str:
+    """Tabulate what is answered to typical mistakes, from the records that the tests compare with."""
+    data = yaml.safe_load((GOLDEN / "mistakes.yaml").read_text(encoding="utf-8"))
+    records = (GOLDEN / "mistakes.txt").read_text(encoding="utf-8").split("### ")[1:]
+    said = {record.split("\n", 1)[0]: record.split("\n", 1)[1] for record in records}
+    parts = [MISTAKES]
+    for group, cases in data["groups"].items():
+        rows = [(case["title"], written_as(case), answers(said[f"{group}: {case['title']}"])) for case in cases]
+        parts.append(f"## {group}\n\n" + table(("mistake", "written", "answer"), rows))
+    return "".join(parts) + f"## The model\n\n```yaml\n{data['base']}```\n"
+
+
+def written_as(case: Mapping[str, Any]) -> str:
+    """Show the lines of a mistake that differ from what they should be."""
+    if "command" in case:
+        return code("hsdsl " + " ".join(case["command"]))
+    lines = str(case.get("write", case.get("file"))).splitlines()
+    right = str(case.get("for", "")).splitlines()
+    wrong = [line for line in lines if line not in right] or lines
+    return "<br>".join(code(line.replace("\t", "→")) for line in wrong[:6] if line.strip()) or "nothing"
+
+
+def code(text: str) -> str:
+    """Set a text as code, whatever marks are in it."""
+    text = text.strip()
+    fence = "``" if "`" in text else "`"
+    space = " " if text.startswith("`") or text.endswith("`") else ""
+    return f"{fence}{space}{text}{space}{fence}"
+
+
+def answers(said: str) -> str:
+    """Set the messages of a record, each with its hint."""
+    found: list[str] = []
+    for line in said.splitlines():
+        message = re.match(r"[^ ]+:(\d+):(\d+): error (HS\d+): (.*)|(?:hsdsl|Error): (.*)", line)
+        if message and message[3]:
+            found.append(f"[{message[3]}](errors.md#{message[3].lower()}) {escaped(message[4])}")
+        elif message:
+            found.append(escaped(message[5]))
+        elif line.startswith("  hint: ") and found:
+            found[-1] += f"; *{escaped(line[8:])}*"
+    return "<br>".join(found)
+
+
+def escaped(text: str) -> str:
+    """Keep signs of a message from being marks of the page."""
+    return re.sub(r"([\\*_<\[\]{}]|^`(?=``))", r"\\\1", text) if "`" not in text else parted(text)
+
+
+def parted(text: str) -> str:
+    """As :func:`escaped`, but for what stands between backticks, which is code."""
+    if text.count("`") % 2 or "``" in text:
+        return re.sub(r"([\\*_<\[\]{}`])", r"\\\1", text)
+    pieces = text.split("`")
+    return "`".join(escaped(piece) if i % 2 == 0 else piece for i, piece in enumerate(pieces))
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "language.md": language,
     "command-line.md": command_line,
@@ -293,6 +362,7 @@ PAGES: dict[str, Callable[[], str]] = {
         if any(family(code) == name for code in RULES)
     },
     "integrators.md": integrator_page,
+    "mistakes.md": mistakes,
 }
 
 

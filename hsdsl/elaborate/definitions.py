@@ -11,6 +11,7 @@ from hsdsl.schema import ParameterEntry
 from hsdsl.source import Scalar
 from hsdsl.system import Parameter
 
+_UNDER_LET = "give it under `let`, which may use everything"
 _ONLY_PARAMETERS = "a parameter is an expression of earlier parameters"
 
 
@@ -18,7 +19,7 @@ def define_parameters(world: World) -> tuple[Parameter, ...]:
     """Every parameter; what its name means goes to ``world.values``."""
     refused: Values = {}
     earlier: Values = {}
-    scope = Scope(ChainMap(refused, earlier, world.scope((), _ONLY_PARAMETERS).values))  # pyright: ignore[reportArgumentType]
+    scope = Scope(ChainMap(refused, earlier, world.scope((), _ONLY_PARAMETERS, hint=_UNDER_LET).values))  # pyright: ignore[reportArgumentType]
     found: list[Parameter] = []
     for name in in_turn(world.document.parameters, "parameters", refused):
         entry = world.document.parameters[name]

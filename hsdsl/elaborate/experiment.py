@@ -11,7 +11,7 @@ from hsdsl.elaborate.world import World
 from hsdsl.errors import STEP_AND_TOLERANCE
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.names import did_you_mean, shown
-from hsdsl.source import Key, Scalar
+from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Experiment, Initial
 
 _POSITIVE = ("step", "tolerance", "relaxation")
@@ -61,10 +61,15 @@ def elaborate_experiment(world: World) -> Experiment:
     return Experiment(
         until=until,
         scheme=world.text(document.scheme),
-        method=world.text(document.method),
+        method=_placed(document.method),
         samples=_samples(world, scope, document.samples),
         **numbers,
     )
+
+
+def _placed(scalar: Scalar | None) -> Key | None:
+    """A word that knows its place: whether there is such a method only those above know."""
+    return None if scalar is None or scalar.value == ABSENT else Key.at(scalar.value, scalar.place)
 
 
 def _setting(world: World, scope: Scope, key: str, scalar: Scalar | None) -> Any:

@@ -18,7 +18,8 @@ from hsdsl.system import SampledInput
 
 def define_inputs(world: World) -> tuple[SampledInput, ...]:
     """The sampled inputs; what the name of every input means goes to ``world.values``."""
-    timed = world.scope(("time", "parameters"), "an input is an expression of t and parameters")
+    feedback = "what depends on states stands under `let`, or in `flow` itself"
+    timed = world.scope(("time", "parameters"), "an input is an expression of t and parameters", hint=feedback)
     constant = world.scope(("parameters",), "samples are numbers or expressions of parameters")
     found: list[SampledInput] = []
     for name, entry in world.document.inputs.items():

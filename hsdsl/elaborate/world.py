@@ -71,15 +71,17 @@ class World:
             message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
             self.reader.add(key.place, "HS301", message, "give one of them another name")
 
-    def scope(self, usable: tuple[str, ...], sentence: str, values: Values | None = None) -> Scope:
-        """A scope with names of some kinds; the others are refused with a sentence."""
-        found: Values = {"t": self.values["t"] if "time" in usable else _refused("t", "the time", sentence)}
+    def scope(
+        self, usable: tuple[str, ...], sentence: str, values: Values | None = None, hint: str | None = None
+    ) -> Scope:
+        """A scope with names of some kinds; the others are refused with a sentence and a hint."""
+        found: Values = {"t": self.values["t"] if "time" in usable else _refused("t", "the time", sentence, hint)}
         for name, kind in self.names.items():
             if kind in usable:
                 if name in self.values:
                     found[name] = self.values[name]
             else:
-                found[name] = _refused(name, KINDS[kind], sentence)
+                found[name] = _refused(name, KINDS[kind], sentence, hint)
         return Scope({**found, **(values or {})})
 
     def text(self, scalar: Scalar | None) -> str | None:
@@ -95,8 +97,8 @@ class World:
         return mode.final and mode.flow is None
 
 
-def _refused(name: str, kind: str, sentence: str) -> Refusal:
-    return Refusal("HS117", f"'{name}' is {kind}; {sentence}")
+def _refused(name: str, kind: str, sentence: str, hint: str | None) -> Refusal:
+    return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
 
 
 def in_turn(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
@@ -108,6 +110,6 @@ def in_turn(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
     for key in keys:
         refused[key] = Refusal("HS302", f"'{key}' is defined below; {kind} use earlier ones only", "move it up")
     for key in keys:
-        refused[key] = Refusal("HS302", f"'{key}' is defined by itself")
+        refused[key] = Refusal("HS302", f"'{key}' is defined by itself", "give one of the two another name")
         yield key
         del refused[key]

@@ -54,7 +54,7 @@ def parse(text: str, wanted: Wanted = "number") -> Tree:
     tokens = tokenize(text, wanted)
     if tokens[0].kind == "end":
         raise ExpressionError(
-            "HS121", "an expression is missing", 0, 1, "write a number or an expression behind the colon"
+            "HS121", "an expression is missing", 0, 1, "write a number or an expression"
         )
     with deep_stack():
         return _Parser(text, tokens).whole()
@@ -189,6 +189,7 @@ class _Parser:
         hint = "write `**` for a power" if before.text == "**" and token.text == "*" else None
         if before.text == "/" and token.text == "/":
             hint = "write floor(x/y) for a whole quotient"
+        hint = hint or f"write what follows `{before.text}`, or remove it"
         return ExpressionError("HS102", f"an operand is missing after `{before.text}`", before.start, before.end, hint)
 
     def unexpected(self, token: Token) -> ExpressionError:

@@ -127,7 +127,8 @@ class Scope:
         wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
         noun = "argument" if fewest == 1 else "arguments"
         message = f"`{node.function}` takes {wanted} {noun}, not {given}"
-        return ExpressionError("HS113", message, node.start, node.end)
+        arguments = "x" if most == fewest == 1 else "x, y"
+        return ExpressionError("HS113", message, node.start, node.end, f"write {node.function}({arguments})")
 
     def _hint(self, name: str) -> str | None:
         if name in NAMES:

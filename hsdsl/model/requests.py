@@ -13,11 +13,12 @@ from fractions import Fraction
 from typing import Any
 
 from hsdsl.arithmetic import Arithmetic
-from hsdsl.errors import UsageError
+from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate import SCHEMES
+from hsdsl.source import Key
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
 SCHEMES_TO_COME = ("located",)
@@ -28,6 +29,14 @@ DEFAULTS: dict[str, Any] = {
     "method": "auto",
     "relaxation": Fraction("1e-6"),
     "max_transitions": 10**6,
+}
+# what other tools call methods of this order
+ELSEWHERE = {
+    **dict.fromkeys(("ode45", "rk45", "dopri", "dormandprince", "tsit5"), "dopri5"),
+    **dict.fromkeys(("ode78", "dop8", "ode89"), "dop853"),
+    **dict.fromkeys(("rungekutta", "rungekutta4", "rk", "ode4"), "rk4"),
+    **dict.fromkeys(("ode1", "forwardeuler", "expliciteuler"), "euler"),
+    **dict.fromkeys(("rk2", "ode2"), "midpoint"),
 }
 DEFAULT_TOLERANCE = Fraction("1e-9")
 
@@ -113,14 +122,19 @@ def _scheme(asked: Asked) -> str:
     raise UsageError(f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES]))
 
 
+def _method_meant(name: str) -> str | None:
+    meant = ELSEWHERE.get(name.lower().replace("-", "").replace("_", ""))
+    return f"did you mean '{meant}'?" if meant in METHODS else did_you_mean(name, ["auto", *METHODS])
+
+
 def _method(asked: Asked, size_asked: Asked, size: str) -> Method:
     if asked.value == "auto":
         return METHODS[AUTO]
     if asked.value not in METHODS:
-        raise UsageError(
-            f"there is no method '{asked.value}' ({asked.place})",
-            did_you_mean(str(asked.value), ["auto", *METHODS]),
-        )
+        hint = _method_meant(str(asked.value))
+        if asked.place == FILE and isinstance(asked.value, Key):
+            raise ModelError([asked.value.place.diagnostic("HS204", f"there is no method '{asked.value}'", hint)])
+        raise UsageError(f"there is no method '{asked.value}' ({asked.place})", hint)
     table = METHODS[asked.value]
     if size == "step" or table.adaptive:
         return table

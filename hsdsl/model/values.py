@@ -12,6 +12,7 @@ from hsdsl.backends.python import PythonKernel, compile_routines
 from hsdsl.elaborate import parameter_expression
 from hsdsl.errors import UsageError
 from hsdsl.lower import lower_expressions
+from hsdsl.model.requests import KEYS
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show
@@ -78,7 +79,7 @@ def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
     program = values.program
     for name in overrides:
         if name not in program.parameters:
-            raise UsageError(f"the model has no parameter '{name}'", did_you_mean(name, program.parameters))
+            raise UsageError(f"the model has no parameter '{name}'", _elsewhere(name, program))
     for i, name in enumerate(program.parameters):
         if name in overrides:
             value = values.number(overrides[name], f"parameter {name}")
@@ -90,6 +91,15 @@ def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
         values = Values(values.system, program, values.kernel, (*values.parameters, value))
     _check_bounds(values)
     return values
+
+
+def _elsewhere(name: str, program: Program) -> str | None:
+    """The hint for a name that is no parameter: how settings and initial values are reached, or the nearest one."""
+    if name in KEYS:
+        return f"write experiment.{name}"
+    if name == "mode" or any(name in mode.states for mode in program.modes):
+        return f"write initial.{name}"
+    return did_you_mean(name, program.parameters)
 
 
 def _check_bounds(values: Values) -> None:

@@ -200,8 +200,8 @@ def _as_mapping(value: Any) -> str:
             return f"write {{{found.group(1)}: {shown(found.group(2))}}}"
         case Scalar(value=text) if ":" in text:
             return "a key is followed by a colon and a space"
-        case [dict() as first, *_] if isinstance(name := first.get("name"), Scalar):  # pyright: ignore[reportUnknownMemberType]
-            return f"write names as keys, without dashes: `{shown(name.value)}:`"
+        case [{"name": Scalar(value=name)}, *_]:
+            return f"write names as keys, without dashes: `{shown(name)}:`"
         case list():
             return "leave the dashes out: `name: value`, one on each line"
         case _:

@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 from hsdsl.errors import Diagnostic, Findings, Span
 from hsdsl.names import closest, shown
 from hsdsl.schema.documents import SHAPES, Model
-from hsdsl.schema.leaves import undifferentiated
+from hsdsl.schema.leaves import described, undifferentiated
 from hsdsl.schema.repair import repair
 from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
 
@@ -119,6 +119,9 @@ def _diagnostic(root: Node, details: ErrorDetails) -> Diagnostic:
         case code if code.startswith("HS"):
             context = details.get("ctx", {})
             place = _find(root, location)
+            if not location:
+                hint = "a model begins with hsdsl: 1; is this file one?"
+                return place.diagnostic(code, f"a model is wanted here, not {described(_plain(root))}", hint)
             return place.diagnostic(code, context["message"], context.get("hint"))
         case _:
             return _find(root, location).diagnostic("HS204", "this value is not possible here")

@@ -90,7 +90,8 @@ def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> 
     line, column = here
     closing = {"{": "}", "[": "]"}.get(bracket)
     if closing is None:
-        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column))
+        hint = "remove it, or quote the value it belongs to"
+        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column), hint)
     content = text.lines[line - 1] if line <= len(text.lines) else ""
     if column > len(content) or (line != opened[0] and _character(text, line, column) == ":"):
         message = f"the `{bracket}` that opens here is never closed"
@@ -170,7 +171,8 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
     if start >= column or first not in _MEANS:
         start, first = column - 1, content[column - 1 : column]
     if first not in _MEANS:
-        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column))
+        hint = "remove it, or quote the value it belongs to"
+        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column), hint)
     message = f"a value that begins with `{first}` is {_MEANS[first]} in YAML"
     hint = "quote the whole expression, or none of it" if first in "'\"" else quote(content, start)
     return text.diagnostic("HS007", message, text.span(line, start + 1, 9999), hint)

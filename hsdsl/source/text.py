@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
-from hsdsl.names import INVISIBLE
+from hsdsl.names import INVISIBLE, closest
 
 LARGEST_FILE = 1 << 20  # bytes
+_MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 _BREAK = re.compile("\r\n|\r|\n")
 _OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
 
@@ -52,7 +54,21 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         with Path(path).open("rb") as stream:
             return stream.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
-        raise UsageError(f"{os.fspath(path)}: {reason(error)}") from None
+        raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
+
+
+def _models_nearby(path: Path) -> str | None:
+    """The hint for a file that is not there, or for a folder: a model that is."""
+    try:
+        folder = path if path.is_dir() else path.parent
+        models = [entry for entry in islice(folder.iterdir(), _MOST_ENTRIES) if entry.suffix in (".yaml", ".yml")]
+    except (OSError, ValueError):
+        return None
+    names = {entry.name: str(entry) for entry in sorted(models)}
+    if path.is_dir():
+        return f"name a model, such as {next(iter(names.values()))}" if names else "name a model file"
+    near = closest(path.name, names)
+    return f"did you mean '{names[near]}'?" if near else None
 
 
 def reason(error: OSError | ValueError) -> str:

@@ -217,13 +217,13 @@ class TestOverrides:
             ("t", "--set c: 't' is the time; only parameters can be used here", None),
             ("c", "--set c: 'c' cannot be used here: only earlier parameters can", None),
             ("1/0", "--set c: nothing can be divided by 0", None),
-            ("nan", "--set c: `nan` is not a finite number", None),
-            ("", "--set c: an expression is missing", None),
+            ("nan", "--set c: `nan` is not a finite number", "every number is finite here"),
+            ("", "--set c: an expression is missing", "write a number or an expression"),
             ("2^3", "--set c: `^` is not an operator of the language", "write `**` for a power"),
             (
                 "omega > 1",
                 "--set c: `omega > 1` is a condition where a number is wanted",
-                "conditions stand under `if`",
+                "write a mode for each case, or use min, max, abs or sign",
             ),
         ],
     )
