@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
+from hsdsl.execution.same import same
 from hsdsl.model import Model
 from hsdsl.runtime.compiler import NoCompiler, find_compiler
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
@@ -46,3 +47,20 @@ def outcome(routine: Any, *arguments: float) -> list[int | str] | None:
         return bits(routine(*arguments))
     except DOMAIN_ERRORS:
         return None
+
+
+def assert_engines_agree(model: Model, kernel: bool = True, **arguments: Any) -> Any:
+    """Run by the Python loop over either kernel and by the compiled loop; all three must be one execution."""
+    python = model.simulate(**arguments, engine="python")
+    others = {"C loop": model.simulate(**arguments, engine="c")}
+    assert (python.engine, others["C loop"].engine) == ("python", "c")
+    if kernel:
+        others["Python loop over C kernel"] = over_compiled_kernel(model).simulate(**arguments, engine="python")
+    for name, other in others.items():
+        differing = [
+            field.name for field in fields(python) if field.compare and field.name not in ("engine", "seconds")
+            and not same(getattr(python, field.name), getattr(other, field.name))
+        ]  # fmt: skip
+        assert not differing, (name, differing, python.stop, other.stop, arguments)
+        assert alike(python) == alike(other)
+    return python

@@ -12,7 +12,7 @@ import typer
 from hsdsl.diagnose import as_json, render
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
 from hsdsl.report import dumps
-from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.recorder import Progress
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
 FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
@@ -51,12 +51,12 @@ def report_usage(error: UsageError, json: bool) -> None:
 
 
 @contextmanager
-def progress(quiet: bool) -> Generator[Callable[[Recorder], None] | None]:
+def progress(quiet: bool) -> Generator[Callable[[Progress], None] | None]:
     """Show how far a run is, on a terminal, once it takes longer than a moment. Yields the run's ``watch``."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    watched: list[Recorder] = []
+    watched: list[Progress] = []
     done = threading.Event()
 
     def show() -> None:
@@ -64,7 +64,7 @@ def progress(quiet: bool) -> Generator[Callable[[Recorder], None] | None]:
         while not done.wait(wait):
             wait = INTERVAL
             for recorder in watched:
-                _bar(float(recorder.now / recorder.until) if recorder.until else 1.0, len(recorder.transitions))
+                _bar(float(recorder.now / recorder.until) if recorder.until else 1.0, recorder.made)
 
     thread = threading.Thread(target=show, daemon=True)
     thread.start()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import shutil
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
@@ -12,7 +11,6 @@ import typer
 
 NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "typer", "rich", "matplotlib")
 OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
-COMPILERS = ("cc", "gcc", "clang")
 
 
 def doctor(json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
@@ -37,10 +35,30 @@ def _found() -> dict[str, Any]:
         "platform": platform.platform(),
         "packages": {name: _version(name) for name in NEEDED},
         "optional": {name: _version(name) for name in OPTIONAL},
-        "engines": ["python"],
-        "compilers": [name for name in COMPILERS if shutil.which(name)],
+        **_engines(),
         "schemes": list(SCHEMES),
         "methods": list(METHODS),
+    }
+
+
+def _engines() -> dict[str, Any]:
+    """Try what a compiled run needs: a compiler that compiles, and a folder to keep what it makes."""
+    from hsdsl import cache
+    from hsdsl.runtime.compiler import NoCompiler, find_compiler
+    from hsdsl.runtime.kernel import runtime
+
+    folder = cache.folder()
+    try:
+        compiler, failure = " ".join(find_compiler().command), None
+        runtime()
+    except NoCompiler as error:
+        compiler, failure = None, str(error)
+    return {
+        "engines": ["c", "python"] if compiler else ["python"],
+        "compiler": compiler,
+        "compiler_failure": failure,
+        "cache": str(folder),
+        "cache_refused": cache.private(folder),
     }
 
 
@@ -59,8 +77,9 @@ def _text(found: dict[str, Any]) -> str:
             f"  {name} {value}" if value else f"  {name}: not installed, needed for {OPTIONAL[name]}"
             for name, value in found["optional"].items()
         ),
-        "engine: python (there is no compiled engine yet"
-        + (f"; compilers here: {', '.join(found['compilers'])})" if found["compilers"] else ")"),
+        f"engines: {', '.join(found['engines'])}",
+        f"compiler: {found['compiler'] or found['compiler_failure']}",
+        f"compiled code: {found['cache_refused'] or found['cache']}",
         f"schemes: {', '.join(found['schemes'])}",
         f"methods: {', '.join(found['methods'])}",
     ]

@@ -38,7 +38,7 @@ def run(
     relaxation: Annotated[
         str | None, typer.Option(metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
     ] = None,
-    engine: Annotated[str, typer.Option(metavar="ENGINE", help="auto or python.")] = "auto",
+    engine: Annotated[str, typer.Option(metavar="ENGINE", help="auto, c or python.")] = "auto",
     precision: Annotated[
         int | None, typer.Option(metavar="DIGITS", help="Compute with this many decimal digits (mpmath).")
     ] = None,

@@ -17,6 +17,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.lower import lower
+from hsdsl.model import engines
 from hsdsl.model.estimate import Estimate, compare, finer_settings
 from hsdsl.model.mechanical import one_stop
 from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
@@ -24,14 +25,14 @@ from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
+from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Settings, simulate
-from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.recorder import Progress
 from hsdsl.system import HybridSystem
 
 if TYPE_CHECKING:
     from hsdsl.metrics.points import Place, PointDistance
 
-ENGINES = ("auto", "python", "c")
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
 
@@ -61,6 +62,7 @@ class Model:
     def __init__(self, system: HybridSystem, load_seconds: float = 0.0) -> None:
         self.system = system
         self._seconds = {"load": load_seconds, "compile": 0.0}
+        self._compiled: CompiledModel | None = None
         self._kernels: dict[int | None, PythonKernel] = {}
 
     def __repr__(self) -> str:
@@ -91,7 +93,7 @@ class Model:
         settings: Mapping[str, Any] | None = None,
         engine: str = "auto",
         precision: int | None = None,
-        watch: Callable[[Recorder], None] | None = None,
+        watch: Callable[[Progress], None] | None = None,
     ) -> Execution:
         """Run the model from t = 0.
 
@@ -115,8 +117,8 @@ class Model:
             Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed anew.
         settings : mapping, optional
             Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
-        engine : {"auto", "python"}
-            What runs it.
+        engine : {"auto", "c", "python"}
+            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         watch : callable, optional
@@ -142,13 +144,14 @@ class Model:
             max_transitions=max_transitions,
         )
         request = self.resolve(settings, asked)
-        _check_engine(engine)
+        engines.check(engine)
         values = with_parameters(self._values(_arithmetic(precision)), parameters or {})
         chosen = self._settings(request, values)
         mode, states, x = initial_state(values, initial or {})
         if request.method is None:
             chosen = replace(chosen, one_stop=one_stop(values, x))
-        execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch)
+        compiled = engines.choose(engine, chosen, precision, self._compile)
+        execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch, compiled)
         return replace(execution, title=self.system.title, seconds={**self._seconds, **execution.seconds})
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
@@ -239,6 +242,14 @@ class Model:
             self._seconds["compile"] += time.perf_counter() - began
         return Values(self.system, program, self._kernels[arithmetic.digits])
 
+    def _compile(self) -> CompiledModel:
+        if self._compiled is None:
+            program = self.program
+            began = time.perf_counter()
+            self._compiled = CompiledModel(program)
+            self._seconds["compile"] += time.perf_counter() - began
+        return self._compiled
+
     def _settings(self, request: Request, values: Values) -> Settings:
         def number(key: str) -> Number:
             asked = request.values[key]
@@ -320,10 +331,3 @@ def _arithmetic(precision: int | None) -> Arithmetic:
     if not LEAST_DIGITS <= precision <= MOST_DIGITS:
         raise UsageError(f"precision is {LEAST_DIGITS} to {MOST_DIGITS} decimal digits, not {precision}")
     return multiprecision(precision)
-
-
-def _check_engine(engine: str) -> None:
-    if engine not in ENGINES:
-        raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
-    if engine == "c":
-        raise UsageError("there is no compiled engine yet", "use engine 'python', or 'auto'")

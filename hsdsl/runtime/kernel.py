@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from functools import cache
 
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.backends.c import model_source
 from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Taylor, Vector
 from hsdsl.program import Program
+from hsdsl.runtime import tables
 from hsdsl.runtime.library import load
 
 Address = int | None
@@ -22,45 +24,42 @@ Doubles = ctypes.POINTER(ctypes.c_double)
 RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Doubles)
 
 
-class EdgeTable(ctypes.Structure):
-    """``hs_edge``."""
+@cache
+def runtime() -> ctypes.CDLL:
+    """The hand-written runtime, compiled.
 
-    _fields_ = (
-        *((name, ctypes.c_int) for name in ("target", "target_dimension", "conditional", "priority", "parts")),
-        ("condition", ctypes.POINTER(ctypes.c_void_p)),
-        ("reset", ctypes.c_void_p),
-        ("spread", ctypes.c_void_p),
-    )
-
-
-class ModeTable(ctypes.Structure):
-    """``hs_mode``."""
-
-    _fields_ = (
-        *((name, ctypes.c_int) for name in ("dimension", "edges", "surfaces", "final")),
-        *((name, ctypes.c_void_p) for name in ("flow", "values", "magnitudes", "outputs")),
-        ("gradients", ctypes.POINTER(ctypes.c_void_p)),
-        ("rates", ctypes.POINTER(ctypes.c_void_p)),
-        ("edge", ctypes.POINTER(EdgeTable)),
-    )
-
-
-class ModelTable(ctypes.Structure):
-    """``hs_model``."""
-
-    _fields_ = (
-        *((name, ctypes.c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data")),
-        ("mode", ctypes.POINTER(ModeTable)),
-    )
+    Raises
+    ------
+    NoCompiler
+        There is no compiler, or it fails.
+    """
+    library = load("runtime", lambda: '#include "hs.c"\n')
+    library.hs_workspace.restype = ctypes.c_int64
+    library.hs_simulate.restype = None
+    return library
 
 
 class CompiledModel:
-    """A program compiled to a library: ``table`` is its ``hs_model``."""
+    """A program compiled to a library: ``table`` is its ``hs_model``.
+
+    Raises
+    ------
+    NoCompiler
+        There is no compiler, or it fails.
+    """
 
     def __init__(self, program: Program) -> None:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
         self._library = load(repr((sizes, program.modes)), lambda: model_source(program))
-        self.table = ModelTable.in_dll(self._library, "hs_the_model")
+        self.table = tables.Model.in_dll(self._library, "hs_the_model")
+
+    def workspace(self, method: tables.Method) -> int:
+        """How many numbers a run needs for itself."""
+        return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method))
+
+    def simulate(self, task: tables.Task) -> None:
+        """Run a task to its end; the interpreter is free meanwhile."""
+        runtime().hs_simulate(ctypes.byref(task))
 
 
 class CompiledKernel:

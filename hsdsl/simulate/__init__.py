@@ -10,6 +10,10 @@
 `paoli_schatzman`   the rival: a two-step formula for one mass and one stop
 `run`               what stays for a whole run, and where it stands
 `recorder`          rows, arcs and transitions, and the execution's columns
+`stops`             how runs end, in sentences
+`compiled`          the same loop in C: what it is given and what it says
+`chunks`            what the compiled loop writes to
+`interrupt`         Ctrl-C while it runs
 ==================  ===========================================================================================
 """
 
@@ -23,14 +27,17 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import Number
-from hsdsl.execution import Execution, Point, Stop, Verdict
+from hsdsl.execution import Execution, Point, Stop, Transition, Verdict
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
+from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate.chunks import execution_columns, transitions_of
+from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.paoli_schatzman import NOTES, paoli_schatzman
-from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.recorder import Progress, Recorder
 from hsdsl.simulate.relaxed import relaxed
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
@@ -50,9 +57,10 @@ def simulate(
     mode: int,
     states: tuple[str, ...],
     x: State,
-    watch: Callable[[Recorder], None] | None = None,
+    watch: Callable[[Progress], None] | None = None,
+    compiled: CompiledModel | None = None,
 ) -> Execution:
-    """Run a program from mode and state ``x`` at t = 0.
+    """Run a program from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given.
 
     ``watch`` is given the recorder before the run starts, so that another thread can show how far it is.
     An interrupt (Ctrl-C) ends the run with what was computed.
@@ -61,6 +69,8 @@ def simulate(
     degree = settings.method.degree if settings.method else 0
     recorder = Recorder(kernel.arithmetic, settings.until, degree, len(program.outputs))
     run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
+    if compiled is not None:
+        return _by_compiled_loop(CompiledRun(run, compiled, mode, x), states, watch)
     if watch is not None:
         watch(recorder)
     zero = kernel.arithmetic.zero
@@ -72,7 +82,21 @@ def simulate(
         if not recorder.arcs:
             raise
         stop = interrupted(recorder.now)
-    return _execution(run, stop, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return _execution(run, stop, seconds, recorder.columns(), recorder.transitions)
+
+
+def _by_compiled_loop(
+    compiled: CompiledRun, states: tuple[str, ...], watch: Callable[[Progress], None] | None
+) -> Execution:
+    if watch is not None:
+        watch(compiled)
+    began = time.perf_counter()
+    stop = compiled.follow()
+    seconds = time.perf_counter() - began
+    columns = execution_columns(compiled.whole, compiled.run.program, states)
+    transitions = tuple(transitions_of(compiled.whole, compiled.run.program))
+    return _execution(compiled.run, stop, seconds, columns, transitions, engine="c")
 
 
 def _native(value: Any) -> Number:
@@ -80,9 +104,15 @@ def _native(value: Any) -> Number:
     return float(value) if isinstance(value, np.float64) else value
 
 
-def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
-    program, settings, recorder = run.program, run.settings, run.recorder
-    columns = recorder.columns()
+def _execution(
+    run: Run,
+    stop: Stop,
+    seconds: float,
+    columns: dict[str, Any],
+    transitions: Sequence[Transition],
+    engine: str = "python",
+) -> Execution:
+    program, settings = run.program, run.settings
     last, width = columns["arcs"][-1], len(columns["arcs"][-1].states)
     row = last.last
     final = Point(
@@ -96,14 +126,14 @@ def _execution(run: Run, stop: Stop, seconds: float) -> Execution:
     return Execution(
         model=program.path,
         digest=program.digest,
-        engine="python",
+        engine=engine,
         scheme=settings.scheme,
         method=settings.method.name if settings.method else "two-step",
         settings=described(settings),
         stop=stop,
-        transitions=tuple(recorder.transitions),
+        transitions=tuple(transitions),
         final=final,
-        verdict=verdict(recorder) if settings.one_stop is None else Verdict("unknown", NOTES),
+        verdict=verdict(transitions) if settings.one_stop is None else Verdict("unknown", NOTES),
         output_function=partial(output_values, run),
         output_names=program.outputs,
         seconds={"simulate": seconds},
@@ -133,10 +163,10 @@ def described(settings: Settings) -> dict[str, Any]:
     }
 
 
-def verdict(recorder: Recorder) -> Verdict:
+def verdict(transitions: Sequence[Transition]) -> Verdict:
     """Say what is known of the theorem's hypotheses for this run: nothing checks them yet, and it says so."""
     reasons = ["nothing checks yet whether the theorem's hypotheses hold for this run"]
-    at_once = [t for t in recorder.transitions if t.entry]
+    at_once = [t for t in transitions if t.entry]
     if at_once:
         first = at_once[0]
         reasons.append(

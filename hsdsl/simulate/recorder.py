@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -16,6 +16,17 @@ from hsdsl.execution import Arc, Array, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 
 Outputs = Callable[..., State]
+
+
+class Progress(Protocol):
+    """How far a run is, for another thread to look at."""
+
+    @property
+    def now(self) -> Number: ...
+    @property
+    def until(self) -> Number: ...
+    @property
+    def made(self) -> int: ...
 
 
 @dataclass
@@ -54,6 +65,11 @@ class Recorder:
     def now(self) -> Number:
         """Time of the last row written."""
         return self.arcs[-1].times[-1] if self.arcs else self.arithmetic.zero
+
+    @property
+    def made(self) -> int:
+        """How many transitions were made."""
+        return len(self.transitions)
 
     def begin(
         self,

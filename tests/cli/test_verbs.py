@@ -6,6 +6,7 @@ import json
 
 import pytest
 from cli.conftest import MODELS
+from engines import COMPILER
 
 import hsdsl
 
@@ -37,7 +38,8 @@ def test_schema_is_the_file(command):
 
 def test_doctor(command):
     answer = command("doctor", "--json")
-    assert answer.code == 0 and answer.json["engines"] == ["python"]
+    assert answer.code == 0 and answer.json["engines"] == ["c", "python"][not COMPILER :]
+    assert bool(answer.json["compiler"]) == COMPILER
     assert hsdsl.__version__ in command("doctor").out
 
 

@@ -1,0 +1,76 @@
+"""Which loop runs a model: the compiled one where there is a compiler and the run is one it knows, else the Python one.
+
+======== ==========================================================================
+auto     ``c`` where it can serve, ``python`` where it cannot
+c        the compiled loop, or a refusal that says why not
+python   the readable one
+======== ==========================================================================
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache
+
+from hsdsl.errors import UsageError
+from hsdsl.integrators import ButcherTableau
+from hsdsl.names import did_you_mean
+from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate import Settings
+from hsdsl.simulate.compiled import SCHEMES
+
+ENGINES = ("auto", "c", "python")
+
+
+def check(engine: str) -> None:
+    """Refuse an engine there is not.
+
+    Raises
+    ------
+    UsageError
+        It is not one of :data:`ENGINES`.
+    """
+    if engine not in ENGINES:
+        raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
+
+
+def choose(
+    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
+) -> CompiledModel | None:
+    """Return the compiled model that a run is for, None where the Python loop is to run it.
+
+    Raises
+    ------
+    UsageError
+        ``c`` is asked for and cannot serve.
+    """
+    if engine == "python":
+        return None
+    why = _refusal(settings, precision)
+    if why is None:
+        try:
+            return make()
+        except NoCompiler as error:
+            why = str(error)
+        if engine == "auto":
+            _say_once(why)
+    if engine == "c":
+        raise UsageError(f"engine 'c' cannot run this: {why}", "use engine 'python', or 'auto'")
+    return None
+
+
+def _refusal(settings: Settings, precision: int | None) -> str | None:
+    if precision is not None:
+        return "it computes with float64 only, and a precision is asked for"
+    if settings.scheme not in SCHEMES:
+        return f"scheme '{settings.scheme}' has no compiled loop"
+    if not isinstance(settings.method, ButcherTableau):
+        return "its method has no compiled form"
+    return None
+
+
+@cache
+def _say_once(why: str) -> None:
+    print(f"hsdsl: the Python engine runs this, which is slower: {why}", file=sys.stderr)

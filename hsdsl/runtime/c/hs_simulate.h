@@ -1,0 +1,151 @@
+/* What a caller gives a run and what it gets: plain data, all of it the caller's own memory.
+
+   A run writes rows, arcs and transitions into the chunk it was given. When one of them is full the caller is asked to
+   `flush`: to keep what is there and to make room. Row k's piece is the interpolant that leads to it. */
+
+#ifndef HS_SIMULATE_H
+#define HS_SIMULATE_H
+
+#include <stdint.h>
+
+#include "hs.h"
+
+/* One row of a Butcher tableau without its zeros. Stage number `stages` is the flow at the step's end; those behind it
+   are evaluated for the dense output alone. */
+typedef struct {
+  int terms;
+  const int *stage;
+  const double *weight;
+} hs_row;
+
+enum { HS_SECANT, HS_HERMITE, HS_DENSE };
+
+typedef struct {
+  int stages; /* to evaluate in a step */
+  int extra;  /* stages of the dense output's own */
+  int order;
+  int interpolant;
+  int degree; /* of the pieces that are kept; 0 for straight lines */
+  const double *c;
+  const hs_row *a;
+  hs_row b;
+  hs_row error;  /* weights less those of the embedded method */
+  hs_row coarse; /* and less those of a second one; no terms where there is none */
+  const hs_row *dense;
+} hs_method;
+
+/* Time cut at the samples of inputs; segment i has the numbers data[i*model->data ...] to bind routines to. */
+typedef struct {
+  int64_t segments;
+  const double *start;
+  const double *end;
+  const int32_t *jump; /* whether an input jumps at its start */
+  const double *data;
+} hs_timeline;
+
+typedef struct {
+  double step;      /* the first one, of an adaptive method */
+  double tolerance; /* 0 for a fixed step */
+  double largest;
+  double relaxation;
+  double until;
+  int64_t max_transitions;
+} hs_settings;
+
+enum { HS_FLOW, HS_STRIP };
+
+typedef struct {
+  int64_t first; /* row, counted from the start of the run */
+  int64_t jump;
+  int32_t mode;
+  int32_t kind;
+} hs_arc;
+
+typedef struct {
+  double time;
+  double resumed; /* not-a-number where the run ended first */
+  int32_t mode;
+  int32_t edge;
+  int32_t entry;
+  int32_t alternatives; /* how many of the chunk's are its */
+} hs_transition;
+
+typedef struct {
+  int64_t row_room, rows;
+  int64_t arc_room, arcs;
+  int64_t transition_room, transitions;
+  double *times;   /* (row) */
+  double *values;  /* (row, width) */
+  double *outputs; /* (row, outputs) */
+  double *depth;   /* (row), zero where not written */
+  double *pieces;  /* (row, degree, width), zero where not written */
+  hs_arc *arc;
+  hs_transition *transition;
+  double *before, *after;  /* (transition, width) */
+  int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's behind the other's */
+  int64_t alternatives_used;
+} hs_chunk;
+
+/* States that one chain of transitions at an instant has been in. */
+typedef struct {
+  int64_t room, count; /* of states; there are twice as many slots */
+  int32_t *mode;
+  double *state;
+  int64_t *slot; /* one more than the place of a state, or 0 */
+} hs_visited;
+
+typedef enum {
+  HS_UNTIL,
+  HS_UNTIL_IN_STRIP,
+  HS_UNTIL_ON_GUARD,
+  HS_FINAL,
+  HS_ZENO,
+  HS_LIMIT,
+  HS_RESET_NOT_FINITE,
+  HS_HERE_NOT_FINITE,
+  HS_ENTERED_OUTSIDE,
+  HS_STUCK,
+  HS_INTERRUPTED
+} hs_reason;
+
+typedef enum { HS_CLEAR, HS_WALL, HS_DEEP, HS_FLAT, HS_INWARD, HS_NOT_FINITE, HS_ERROR, HS_CREEPING } hs_obstacle;
+
+/* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size. */
+typedef struct {
+  int32_t reason;
+  int32_t mode;
+  int32_t dimension;
+  int32_t edge;
+  int32_t obstacle;
+  int32_t surface; /* -1 for none */
+  int64_t segment;
+  double time;
+  double h;
+  double *x, *slope;
+} hs_stop;
+
+typedef struct hs_task hs_task;
+
+struct hs_task {
+  const hs_model *model;
+  const hs_method *method;
+  const hs_timeline *timeline;
+  hs_settings settings;
+  int32_t mode, dimension; /* the start */
+  const double *x;
+  double *workspace; /* hs_workspace() numbers */
+  hs_chunk chunk;
+  hs_visited visited;
+  int (*flush)(hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
+  int (*poll)(hs_task *);                       /* asked now and then: not 0 to stop */
+  int (*grow)(hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
+  double now;                                   /* to be looked at while it runs */
+  int64_t made;
+  hs_stop stop;
+};
+
+extern HS_EXPORT const int64_t hs_sizes[];
+HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method);
+HS_EXPORT void hs_simulate(hs_task *task);
+
+#endif

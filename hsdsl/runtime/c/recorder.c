@@ -1,0 +1,83 @@
+/* Rows, arcs and transitions, written to the caller's chunk. See hsdsl/simulate/recorder.py. */
+
+/* Whether there is room for one more of each; the caller is asked for it where there is not. */
+static int room(hs_run *run) {
+  hs_chunk *chunk = &run->task->chunk;
+  if (chunk->rows < chunk->row_room && chunk->arcs < chunk->arc_room && chunk->transitions < chunk->transition_room)
+    return 1;
+  if (run->full) return 0;
+  const int answer = run->task->flush(run->task);
+  if (answer) run->interrupted = 1;
+  if (answer == 2) run->full = 1;
+  return !run->full;
+}
+
+static void write_row(hs_run *run, double t, const double *x, const hs_polynomial *piece, double depth,
+                      hs_routine *outputs, const double *p) {
+  hs_chunk *chunk = &run->task->chunk;
+  const int n = run->here.dimension, w = run->width, m = run->model->outputs;
+  if (!room(run)) return;
+  const int64_t row = chunk->rows;
+  double *values = chunk->values + row * w;
+  chunk->times[row] = t;
+  copy(values, x, n);
+  for (int s = n; s < w; s++) values[s] = NAN;
+  if (depth != 0.0) chunk->depth[row] = depth;
+  if (m && (!outputs || outputs(p, t, x, chunk->outputs + row * m)))
+    for (int i = 0; i < m; i++) chunk->outputs[row * m + i] = NAN;
+  if (piece && run->method->degree > 0) {
+    double *kept = chunk->pieces + row * run->method->degree * w;
+    for (int i = 0; i < piece->degree; i++) copy(kept + i * w, piece->c + i * w, n);
+  }
+  chunk->rows++;
+  run->row++;
+  run->task->now = t;
+}
+
+/* Add the piece that leads to a row, and the row. */
+static inline void append(hs_run *run, double t, const double *x, const hs_polynomial *piece) {
+  write_row(run, t, x, piece, 0.0, run->here.outputs, run->here.outputs_p);
+}
+
+/* Open an arc; its first row is written by the caller. */
+static void begin(hs_run *run, int kind) {
+  if (!room(run)) return;
+  hs_arc *arc = &run->task->chunk.arc[run->task->chunk.arcs++];
+  arc->first = run->row;
+  arc->jump = run->jump;
+  arc->mode = run->here.mode;
+  arc->kind = kind;
+}
+
+/* Write a strip: the state waits at q while time and depth pass through `rows`; inputs go on. */
+static void strip(hs_run *run, int rows, double (*row)[2], const double *q) {
+  const hs_here *here = &run->here;
+  const int further = row[rows - 1][0] > run->task->timeline->end[here->segment];
+  begin(run, HS_STRIP);
+  for (int i = 0; i < rows; i++) {
+    const double *p = here->outputs_p;
+    if (further) p = segment_data(run, segment_at(run->task->timeline, row[i][0]));
+    write_row(run, row[i][0], q, 0, row[i][1], here->outputs, p);
+  }
+}
+
+/* Write one transition down; `after` is 0 where the run ended before it was made. */
+static void record(hs_run *run, const hs_crossing *crossing, double resumed, const double *after, int entry) {
+  hs_chunk *chunk = &run->task->chunk;
+  const int w = run->width;
+  run->jump++;
+  run->task->made = run->jump;
+  if (!room(run)) return;
+  const int64_t i = chunk->transitions++;
+  hs_transition *transition = &chunk->transition[i];
+  transition->time = crossing->time;
+  transition->resumed = resumed;
+  transition->mode = run->here.mode;
+  transition->edge = crossing->edge;
+  transition->entry = entry;
+  transition->alternatives = run->alternatives_count;
+  for (int a = 0; a < run->alternatives_count; a++)
+    chunk->alternatives[chunk->alternatives_used++] = run->alternatives[a];
+  copy(chunk->before + i * w, crossing->state, run->here.dimension);
+  if (after) copy(chunk->after + i * w, after, run->here.table->edge[crossing->edge].target_dimension);
+}

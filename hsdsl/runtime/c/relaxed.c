@@ -1,0 +1,205 @@
+/* The relaxed scheme: Burden et al. 2013, Fig. 12. See hsdsl/simulate/relaxed.py. */
+
+#define ALMOST (1 - 0x1p-30)
+#define MOST_HALVINGS 122 /* 16 - 2 log2(u) */
+#define POLL_STEPS 256u
+#define POLL_SHARE 50 /* seconds / 50 */
+
+enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and reasons to stop */
+
+/* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
+static hs_found attempt(hs_run *run, double h, double t1) {
+  const hs_here *here = &run->here;
+  const hs_mode *mode = here->table;
+  hs_trial *trial = &run->trial;
+  const int n = here->dimension, m = mode->surfaces;
+  hs_found found;
+  trial->t = here->t, trial->h = h, trial->t1 = t1;
+  trial->looked = trial->ends = trial->has_piece = 0;
+  if (step(run, here->t, h) || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
+  double largest = m ? run->ahead[0] : 0.0;
+  for (int k = 1; k < m; k++) largest = hs_max(largest, run->ahead[k]);
+  if (largest <= 0) {
+    if (mode->flow(here->p, t1, run->z, run->end)) return NOT_FINITE;
+    trial->looked = trial->ends = 1;
+    return hs_finite(sum(run->z, n) + sum(run->ahead, m) + sum(run->end, n)) ? CLEAR : NOT_FINITE;
+  }
+  if (!hs_finite(sum(run->z, n) + sum(run->ahead, m))) return NOT_FINITE;
+  if (judge(run, run->ahead, &found)) return trial->ends = 0, NOT_FINITE;
+  if (found.obstacle != HS_CLEAR || found.crossings || ends(run, trial)) {
+    ends(run, trial);
+    return found;
+  }
+  return trial->ends = 0, NOT_FINITE;
+}
+
+/* The sizes of the numbers that a point between x and z is computed from, to run->landed. */
+static void sizes(hs_run *run, const double *x, const double *z) {
+  for (int s = 0; s < run->here.dimension; s++) {
+    const double still = z[s] == run->entered[s] ? run->scale[s] : fabs(z[s]);
+    run->landed[s] = hs_max(hs_max(fabs(x[s]), fabs(z[s])), still);
+  }
+}
+
+/* Guards that the state stands on, to round-off or a tie relative to the time passed, as crossings. */
+static int standing_on(hs_run *run) {
+  int count = 0;
+  standing(run, run->here.t, run->x, HS_TIE * run->here.t, run->tied);
+  for (int k = 0; k < run->here.table->edges; k++) {
+    if (!run->tied[k]) continue;
+    hs_crossing *crossing = &run->crossings[count++];
+    crossing->edge = k;
+    crossing->theta = crossing->depth = 0.0;
+    crossing->time = run->here.t;
+    copy(crossing->state, run->x, run->here.dimension);
+    crossing->piece.degree = 0;
+  }
+  return count;
+}
+
+/* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
+static int stuck(hs_run *run, hs_obstacle kind, int surface) {
+  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING;
+  const int count = may_stand ? standing_on(run) : 0;
+  if (count) {
+    choose(run, count);
+    sizes(run, run->x, run->x);
+    run->landed_at = run->here.t;
+    return LANDED;
+  }
+  run->task->stop.obstacle = kind;
+  run->task->stop.surface = surface;
+  copy(run->task->stop.slope, run->slope, run->here.dimension);
+  return stopped(run, HS_STUCK, run->here.t);
+}
+
+/* Whether to go on: the caller is asked now and then. */
+static int interrupted(hs_run *run) {
+  if (++run->steps % POLL_STEPS == 0 && clock() - run->ticks > CLOCKS_PER_SEC / POLL_SHARE) {
+    run->ticks = clock();
+    if (run->task->poll(run->task)) run->interrupted = 1;
+  }
+  return run->interrupted;
+}
+
+/* Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9). */
+static int flow(hs_run *run) {
+  hs_here *here = &run->here;
+  hs_control *control = &run->control;
+  const int n = here->dimension, adaptive = control->tolerance > 0, curved = run->method->degree > 0;
+  const double limit = run->task->timeline->end[here->segment];
+  run->patience.reached = NAN;
+  run->patience.idle = run->patience.creeping = 0;
+  if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
+  while (here->t < limit) {
+    double h = control->h, t1, ratio = NAN;
+    int halvings = 0;
+    hs_found found, last = TOO_WRONG;
+    if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
+    for (;;) {
+      if (h < (limit - here->t) * ALMOST)
+        t1 = here->t + h;
+      else
+        h = limit - here->t, t1 = limit;
+      found = attempt(run, h, t1);
+      if (adaptive && run->trial.ends && found.obstacle == HS_CLEAR) {
+        local_error(run, h);
+        ratio = error_ratio(run);
+        if (ratio > 1)
+          found = TOO_WRONG;
+        else if (!found.crossings)
+          found = excursion(run, &run->trial);
+      }
+      if (found.obstacle == HS_CLEAR) break;
+      last = found;
+      if (found.obstacle == HS_ERROR && halvings == 0) {
+        reject(control, h, ratio);
+        h = control->h;
+      } else {
+        h = h / 2, halvings++;
+      }
+      if (halvings > MOST_HALVINGS ||
+          (found.obstacle == HS_ERROR && (struggles(control) || !(here->t + h > here->t))))
+        return stuck(run, found.obstacle, found.surface);
+    }
+    if (ratio == ratio && halvings == 0) accept(control, h, ratio);
+    if (found.crossings || !run->trial.ends) {
+      choose(run, found.crossings);
+      sizes(run, run->x, run->z);
+      run->landed_at = t1;
+      return LANDED;
+    }
+    if (halvings || !(t1 > here->t)) {
+      const hs_obstacle given_up = patience_ends(run, halvings, last.obstacle, last.surface, t1);
+      if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
+    }
+    if (here->standing) leave(run, t1, run->z);
+    append(run, t1, run->z, curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0);
+    here->t = t1;
+    copy(run->x, run->z, n);
+    copy(run->slope, run->end, n);
+  }
+  return AT_BOUNDARY;
+}
+
+static int in_strip(hs_run *run, hs_reason reason, double t) {
+  run->task->stop.edge = run->chosen.edge;
+  return stopped(run, reason, t);
+}
+
+/* Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14). */
+static int through_strip(hs_run *run) {
+  const hs_crossing *crossing = &run->chosen;
+  const double t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
+  const hs_edge *edge = &run->here.table->edge[crossing->edge];
+  if (crossing->theta > 0) append(run, t, crossing->state, &crossing->piece);
+  if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
+  double resumed = t1 + (run->epsilon - depth);
+  const int without_value = reset(run, run->landed);
+  if (resumed > until + tie(until)) {
+    double rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
+    strip(run, 3, rows, crossing->state);
+    record(run, crossing, NAN, 0, 0);
+    return in_strip(run, HS_UNTIL_IN_STRIP, until);
+  }
+  if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);
+  resumed = hs_min(resumed, until);
+  double rows[3][2] = {{t, depth * 0}, {t1, depth}, {resumed, run->epsilon}};
+  strip(run, 3, rows, crossing->state);
+  record(run, crossing, resumed, run->after, 0);
+  copy(run->x, run->after, edge->target_dimension);
+  copy(run->scale, run->both, edge->target_dimension);
+  return enter(run, edge->target, edge->target_dimension, resumed, 1);
+}
+
+/* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
+static int at_boundary(hs_run *run) {
+  const double t = run->here.t;
+  const int standing_before = run->here.standing;
+  if (t < run->until) {
+    const int64_t segment = segment_at(run->task->timeline, t);
+    if (run->task->timeline->jump[segment]) return enter(run, run->here.mode, run->here.dimension, t, 0);
+    place(run, run->here.mode, run->here.dimension, t, 0);
+    run->here.standing = standing_before;
+    return GOES_ON;
+  }
+  const int count = standing_on(run);
+  if (!count) return stopped(run, HS_UNTIL, t);
+  if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
+  choose(run, count);
+  double rows[1][2] = {{t, 0.0}};
+  strip(run, 1, rows, run->x);
+  record(run, &run->chosen, NAN, 0, 0);
+  return in_strip(run, HS_UNTIL_ON_GUARD, t);
+}
+
+/* Follow the relaxed execution from where the run stands until it stops. */
+static void relaxed(hs_run *run, int outcome) {
+  while (outcome == GOES_ON) {
+    outcome = run->interrupted ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : flow(run);
+    if (outcome == LANDED)
+      outcome = through_strip(run);
+    else if (outcome == AT_BOUNDARY)
+      outcome = at_boundary(run);
+  }
+}

@@ -1,0 +1,85 @@
+/* Entering a mode, choosing among crossings, resets. See hsdsl/simulate/run.py. */
+
+static hs_reason stopped(hs_run *run, hs_reason reason, double t) {
+  hs_stop *stop = &run->task->stop;
+  stop->reason = reason;
+  stop->time = t;
+  stop->mode = run->here.mode;
+  stop->dimension = run->here.dimension;
+  stop->segment = run->here.segment;
+  stop->h = run->control.h;
+  copy(stop->x, run->x, run->here.dimension);
+  return reason;
+}
+
+/* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
+   A final mode without a flow has the states, and so the outputs, of the mode before it. */
+static void place(hs_run *run, int mode, int dimension, double t, const hs_here *before) {
+  hs_here here;
+  here.mode = mode;
+  here.dimension = dimension;
+  here.table = &run->model->mode[mode];
+  here.segment = segment_at(run->task->timeline, t);
+  here.p = segment_data(run, here.segment);
+  here.outputs = here.table->dimension == dimension ? here.table->outputs : 0;
+  here.outputs_p = here.p;
+  if (!here.outputs && before && before->table->dimension == dimension) {
+    here.outputs = before->table->outputs;
+    here.outputs_p = before->p;
+  }
+  here.standing = 0;
+  here.t = t;
+  run->here = here;
+  begin(run, HS_FLOW);
+  append(run, t, run->x, 0);
+  copy(run->entered, run->x, dimension);
+}
+
+static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }
+
+/* Whether edge `a` goes before edge `b` of those tied: the higher priority, then the file's order. */
+static int goes_before(const hs_mode *mode, int a, int b) {
+  const int p = mode->edge[a].priority, q = mode->edge[b].priority;
+  return p != q ? p > q : a < b;
+}
+
+/* Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
+   Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. */
+static void choose(hs_run *run, int count) {
+  const hs_mode *mode = run->here.table;
+  hs_crossing *first = &run->crossings[0];
+  for (int i = 1; i < count; i++)
+    if (run->crossings[i].time < first->time) first = &run->crossings[i];
+  const double since = tie(first->time);
+  double depth = first->depth;
+  int chosen = first->edge;
+  standing(run, first->time, first->state, since, run->tied);
+  for (int i = 0; i < count; i++)
+    if (run->crossings[i].time - first->time <= since) run->tied[run->crossings[i].edge] = 2 + i;
+  for (int k = 0; k < mode->edges; k++)
+    if (run->tied[k] && goes_before(mode, k, chosen)) chosen = k;
+  if (run->tied[chosen] >= 2) depth = run->crossings[run->tied[chosen] - 2].depth;
+  run->alternatives_count = 0;
+  for (int k = 0; k < mode->edges; k++)
+    if (run->tied[k] && k != chosen) run->alternatives[run->alternatives_count++] = k;
+  run->chosen = *first;
+  run->chosen.edge = chosen;
+  run->chosen.depth = depth;
+}
+
+/* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state behind
+   it to run->after, and to run->both the sizes of the numbers it came from. Not 0 where it has no finite value. */
+static int reset(hs_run *run, double *scale) {
+  const hs_crossing *crossing = &run->chosen;
+  const hs_edge *edge = &run->here.table->edge[crossing->edge];
+  const int n = run->here.dimension, to = edge->target_dimension;
+  double *const sizes = run->error;
+  if (edge->reset(run->here.p, crossing->time, crossing->state, run->after)) return 1;
+  if (!all_finite(run->after, to)) return 1;
+  copy(run->both, crossing->state, n);
+  copy(run->both + n, scale, n);
+  if (edge->spread(run->here.p, crossing->time, run->both, sizes) || !all_finite(sizes, to))
+    for (int s = 0; s < to; s++) sizes[s] = fabs(run->after[s]); /* where it is infinitely steep, no more is known */
+  copy(run->both, sizes, to);
+  return 0;
+}

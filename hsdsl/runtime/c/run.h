@@ -1,0 +1,112 @@
+/* A run under way: what stays, and where it is. See hsdsl/simulate/run.py. */
+
+#ifndef HS_RUN_H
+#define HS_RUN_H
+
+#include <time.h>
+
+#include "hs_math.h"
+#include "hs_simulate.h"
+
+#define HS_UNIT 0x1p-53
+#define HS_TIE 1e-12
+
+/* A step's interpolant: x + c_1 s + c_2 s**2 + ..., power m at c[m*width]. */
+typedef struct {
+  int degree;
+  double *c;
+} hs_polynomial;
+
+typedef struct {
+  int edge;
+  double theta, time, depth;
+  double *state;
+  hs_polynomial piece; /* of degree 0 where the crossing is the step's start */
+} hs_crossing;
+
+/* Where a run stands, ready to flow. */
+typedef struct {
+  int mode, dimension;
+  const hs_mode *table;
+  int64_t segment;
+  const double *p;
+  hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
+  const double *outputs_p;
+  int standing;            /* number of surfaces in stood_on */
+  double t;
+} hs_here;
+
+/* One step as tried, from (t, x) to (t1, z). */
+typedef struct {
+  double t, h, t1;
+  int looked, ends; /* whether the flow at the end has been asked for, and has a value */
+  int has_piece;
+  hs_polynomial piece;
+} hs_trial;
+
+/* What a trial step found: crossings, an obstacle, or nothing. */
+typedef struct {
+  hs_obstacle obstacle;
+  int surface;
+  int crossings;
+} hs_found;
+
+typedef struct {
+  double h, tolerance, largest;
+  int order;
+  int64_t accepted, rejected;
+} hs_control;
+
+typedef struct {
+  double reached;
+  int idle, creeping;
+} hs_patience;
+
+typedef struct {
+  hs_task *task;
+  const hs_model *model;
+  const hs_method *method;
+  int width;
+  double epsilon, until;
+  hs_here here;
+  hs_trial trial;
+  hs_control control;
+  hs_patience patience;
+  /* in the workspace, a state's room each unless said otherwise */
+  double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  double **k;          /* stages, then the flow at the end */
+  double *values, *ahead, *magnitudes, *noise; /* one for each surface */
+  int *stood_on, *beyond;
+  int *tied;           /* one for each edge */
+  double *gradient;    /* width + 1 */
+  double *both;        /* 2 width: states and sizes */
+  hs_crossing *crossings; /* one for each edge */
+  hs_polynomial cubic;
+  hs_crossing chosen;
+  int *alternatives, alternatives_count;
+  double landed_at;    /* the end of a step into a strip */
+  int64_t row, jump;   /* counted from the start of the run */
+  int interrupted, full;
+  clock_t ticks;
+  unsigned steps;
+} hs_run;
+
+static inline double tie(double t) { return HS_TIE * hs_max(1.0, fabs(t)); }
+
+static inline int all_finite(const double *v, int n) {
+  for (int i = 0; i < n; i++)
+    if (!hs_finite(v[i])) return 0;
+  return 1;
+}
+
+static inline double sum(const double *v, int n) {
+  double total = 0.0;
+  for (int i = 0; i < n; i++) total += v[i];
+  return total;
+}
+
+static inline void copy(double *to, const double *from, int n) {
+  for (int i = 0; i < n; i++) to[i] = from[i];
+}
+
+#endif

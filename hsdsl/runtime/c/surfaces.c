@@ -1,0 +1,327 @@
+/* Geometry of a trial step against a mode's surfaces: round-off, depth, and where a surface was crossed.
+   See hsdsl/simulate/surfaces.py. A function that returns a status returns 0, or RAISED where a routine has no value. */
+
+#define ROUNDOFF_UNITS 32
+#define SCAN 8
+#define ROOT_ITERATIONS 200
+#define ROOT_SHARE (1.0 / 16)
+
+enum { RAISED = -1 };
+
+static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0}, TOO_WRONG = {HS_ERROR, -1, 0};
+
+static hs_found obstacle(hs_obstacle kind, int surface) {
+  const hs_found found = {kind, surface, 0};
+  return found;
+}
+
+/* Evaluate a step's interpolant at s = theta, to `value`. */
+static void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
+  const int w = run->width, last = piece->degree - 1;
+  for (int s = 0; s < run->here.dimension; s++) {
+    double v = piece->c[last * w + s] * theta;
+    for (int m = last - 1; m >= 0; m--) v = (piece->c[m * w + s] + v) * theta;
+    value[s] = run->x[s] + v;
+  }
+}
+
+/* The part of an interpolant before theta, over [0, 1] again. */
+static void shortened(const hs_run *run, const hs_polynomial *piece, double theta, hs_polynomial *part) {
+  double power = theta;
+  part->degree = piece->degree;
+  for (int m = 0; m < piece->degree; m++) {
+    for (int s = 0; s < run->here.dimension; s++)
+      part->c[m * run->width + s] = piece->c[m * run->width + s] * power;
+    power = power * theta;
+  }
+}
+
+/* Value of surface k at a point. */
+static int surface(hs_run *run, int k, double t, const double *x, double *r) {
+  if (run->here.table->values(run->here.p, t, x, run->values)) return RAISED;
+  *r = run->values[k];
+  return 0;
+}
+
+/* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
+static int noise_of(hs_run *run, int k, double t, const double *x, int entry, double *noise) {
+  const hs_here *here = &run->here;
+  const int n = here->dimension;
+  if (here->table->magnitudes(here->p, t, x, run->magnitudes)) return RAISED;
+  double total = run->magnitudes[k];
+  double *const g = run->gradient;
+  if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
+    const int scaled = entry || run->stood_on[k];
+    for (int s = 0; s < n; s++) total = total + fabs(g[s + 1]) * hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0);
+  }
+  *noise = ROUNDOFF_UNITS * HS_UNIT * total;
+  return 0;
+}
+
+/* Look at the surfaces on entry: mark in `beyond` those the state is beyond, and note those it stands on. */
+static int enter_surfaces(hs_run *run, double t, const double *values, int *beyond) {
+  for (int k = 0; k < run->here.table->surfaces; k++) {
+    double noise;
+    run->stood_on[k] = beyond[k] = 0;
+    if (noise_of(run, k, t, run->x, 1, &noise)) return RAISED;
+    if (values[k] > noise)
+      beyond[k] = 1;
+    else if (values[k] >= -noise)
+      run->stood_on[k] = 1, run->here.standing++;
+  }
+  return 0;
+}
+
+/* Forget the surfaces that the state stood on and has left inwards. */
+static void leave(hs_run *run, double t, const double *x) {
+  for (int k = 0; k < run->here.table->surfaces; k++) {
+    double r, noise;
+    if (!run->stood_on[k] || surface(run, k, t, x, &r) || noise_of(run, k, t, x, 0, &noise)) continue;
+    if (r < -noise) run->stood_on[k] = 0, run->here.standing--;
+  }
+}
+
+/* |grad r| in (t, x). */
+static int norm_of(hs_run *run, double t, const double *x, int k, double *norm) {
+  double total = 0.0;
+  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
+  for (int s = 0; s <= run->here.dimension; s++) total = total + run->gradient[s] * run->gradient[s];
+  *norm = sqrt(total);
+  return 0;
+}
+
+/* Whether the `if` of edge k holds: 1, 0, or RAISED. A part that is false decides, whatever another has no value for. */
+static int condition(hs_run *run, int k, double t, const double *x) {
+  const hs_edge *edge = &run->here.table->edge[k];
+  int answer = 1;
+  for (int i = 0; i < edge->parts; i++) {
+    double holds;
+    if (edge->condition[i](run->here.p, t, x, &holds))
+      answer = RAISED;
+    else if (holds == 0.0)
+      return 0;
+  }
+  return answer;
+}
+
+/* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
+   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
+static int standing(hs_run *run, double t, const double *x, double since, int *found) {
+  int count = 0;
+  for (int k = 0; k < run->here.table->edges; k++) {
+    double r, rate, noise;
+    found[k] = 0;
+    if (surface(run, k, t, x, &r) || run->here.table->rates[k](run->here.p, t, x, &rate)) continue;
+    if (noise_of(run, k, t, x, 0, &noise)) continue;
+    if (fabs(r) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1) found[k] = 1, count++;
+  }
+  return count;
+}
+
+/* Ask for the flow at a trial's end once; beyond a guard it need not have a value. */
+static int ends(hs_run *run, hs_trial *trial) {
+  if (!trial->looked) {
+    trial->looked = 1;
+    trial->ends = 0;
+    if (!run->here.table->flow(run->here.p, trial->t1, run->z, run->end)) {
+      const double total = sum(run->end, run->here.dimension);
+      trial->ends = total - total == 0;
+    }
+  }
+  return trial->ends;
+}
+
+/* The step's interpolant, to trial->piece. */
+static int piece_of(hs_run *run, hs_trial *trial) {
+  if (trial->has_piece) return 0;
+  if (!ends(run, trial))
+    secant(run, &trial->piece);
+  else if (method_piece(run, trial->t, trial->h, &trial->piece))
+    return RAISED;
+  trial->has_piece = 1;
+  return 0;
+}
+
+static int beyond_within(hs_run *run, hs_trial *trial, int k) {
+  const hs_mode *mode = run->here.table;
+  double r, noise;
+  if (surface(run, k, trial->t, run->x, &r) || noise_of(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+  if (r > noise) return 0; /* transparent, and beyond already */
+  for (int i = 1; i < SCAN; i++) {
+    const double s = (0.0 + i) / SCAN, t = trial->t + s * trial->h;
+    if (piece_of(run, trial)) return RAISED;
+    at(run, &trial->piece, s, run->at);
+    if (surface(run, k, t, run->at, &r) || noise_of(run, k, t, run->at, 0, &noise)) return RAISED;
+    if (r > noise) return k >= mode->edges ? 1 : condition(run, k, t, run->at);
+  }
+  return 0;
+}
+
+static int rate_along(hs_run *run, int k, double t, const double *x, const double *flow, double *rate) {
+  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
+  *rate = run->gradient[0];
+  for (int s = 0; s < run->here.dimension; s++) *rate = *rate + run->gradient[s + 1] * flow[s];
+  return 0;
+}
+
+/* Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant. */
+static hs_found excursion(hs_run *run, hs_trial *trial) {
+  if (!ends(run, trial)) return CLEAR;
+  for (int k = 0; k < run->here.table->surfaces; k++) {
+    double out, back;
+    if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
+    if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
+    if (out > 0 && 0 >= back && beyond_within(run, trial, k) == 1) return obstacle(HS_DEEP, k);
+  }
+  return CLEAR;
+}
+
+/* Close a bracket f(a) <= 0 < f(b) of surface k on an interpolant (Illinois). */
+static int close_bracket(hs_run *run, const hs_polynomial *piece, int k, double a, double fa, double b, double fb,
+                         double small, double *theta) {
+  double weight_a = fa, weight_b = fb;
+  int side = 0;
+  *theta = a;
+  for (int i = 0; i < ROOT_ITERATIONS; i++) {
+    if (-fa <= small || b - a <= 4 * HS_UNIT) break;
+    if (fb <= small) {
+      *theta = b;
+      break;
+    }
+    if (weight_b - weight_a == 0) return RAISED;
+    double s = a - weight_a * (b - a) / (weight_b - weight_a), f;
+    if (!(a < s && s < b)) s = (a + b) / 2;
+    at(run, piece, s, run->at);
+    if (surface(run, k, run->trial.t + s * run->trial.h, run->at, &f)) return RAISED;
+    if (f <= 0) {
+      if (side < 0) weight_b = weight_b / 2;
+      a = s, fa = f, weight_a = f, side = -1;
+    } else {
+      if (side > 0) weight_a = weight_a / 2;
+      b = s, fb = f, weight_b = f, side = 1;
+    }
+    *theta = a;
+  }
+  return 0;
+}
+
+/* Find the last s in [0, 1] where surface k rises through zero on an interpolant, knowing that it ends above;
+   not-a-number if it never does. */
+static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, double small, double *theta) {
+  double a, fa, b = 1.0, fb;
+  at(run, piece, b, run->at);
+  if (surface(run, k, run->trial.t + b * run->trial.h, run->at, &fb)) return RAISED;
+  for (int i = SCAN - 1; i >= 0; i--) {
+    a = 1.0 * i / SCAN;
+    at(run, piece, a, run->at);
+    if (surface(run, k, run->trial.t + a * run->trial.h, run->at, &fa)) return RAISED;
+    if (fa <= 0) return close_bracket(run, piece, k, a, fa, b, fb, small, theta);
+    b = a, fb = fa;
+  }
+  *theta = NAN;
+  return 0;
+}
+
+/* How close to zero a crossing of this step can be told: round-off of its own numbers, no older ones. */
+static int smallest(hs_run *run, int k, double *small) {
+  double *const sizes = run->at;
+  for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
+  if (noise_of(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
+  *small = *small * ROOT_SHARE;
+  return 0;
+}
+
+/* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
+static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
+  const hs_trial *trial = &run->trial;
+  double small, theta, r, noise;
+  if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
+  if (theta != theta) {
+    if (run->here.table->edge[k].conditional) {
+      at(run, piece, 0.0, run->at);
+      if (surface(run, k, trial->t + 0.0 * trial->h, run->at, &r)) return RAISED;
+      if (noise_of(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+      if (r > noise) return 0;
+    }
+    theta = 0.0; /* on the surface to round-off: it is crossed as the step begins */
+  }
+  crossing->theta = theta;
+  crossing->time = theta == 0 ? trial->t : trial->t + theta * trial->h;
+  if (theta == 0)
+    copy(crossing->state, run->x, run->here.dimension);
+  else
+    at(run, piece, theta, crossing->state);
+  return 1;
+}
+
+/* How far the flow at a crossing would take r back inside over this step; 0 when not beyond round-off. */
+static int inward_of(hs_run *run, int k, const hs_crossing *crossing, double *inward) {
+  double rate;
+  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
+  *inward = -rate * run->trial.h;
+  if (!(*inward > run->noise[k])) *inward = 0.0;
+  return 0;
+}
+
+/* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
+static int too_deep(hs_run *run, int k, const double *values, hs_found *found) {
+  double norm;
+  if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
+  if (!(norm > 0)) return *found = obstacle(HS_FLAT, k), 1;
+  if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
+  return *found = obstacle(HS_DEEP, k), 1;
+}
+
+/* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an obstacle. */
+static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *crossing, hs_found *found) {
+  hs_trial *trial = &run->trial;
+  const hs_polynomial *piece = &trial->piece;
+  double norm, inward;
+  int status = piece_of(run, trial);
+  if (status) return status;
+  status = crossed_on(run, piece, k, crossing);
+  if (status != 1) return status;
+  if (norm_of(run, trial->t1, run->z, k, &norm) || inward_of(run, k, crossing, &inward)) return RAISED;
+  if (inward != 0 && inward <= run->epsilon * norm) {
+    if (trial->ends) {
+      hermite(run, trial->h, &run->cubic);
+      piece = &run->cubic;
+    }
+    if (crossed_on(run, piece, k, crossing) == RAISED || inward_of(run, k, crossing, &inward)) return RAISED;
+  }
+  if (inward != 0) return *found = obstacle(HS_INWARD, k), 0;
+  status = condition(run, k, crossing->time, crossing->state);
+  if (status != 1) return status;
+  status = too_deep(run, k, values, found);
+  if (status) return status == RAISED ? RAISED : 0;
+  crossing->edge = k;
+  crossing->depth = hs_min(run->epsilon, values[k] / norm);
+  shortened(run, piece, crossing->theta, &crossing->piece);
+  return 1;
+}
+
+/* Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
+   `values` are those of the surfaces there. */
+static int judge(hs_run *run, const double *values, hs_found *found) {
+  const hs_mode *mode = run->here.table;
+  *found = CLEAR;
+  for (int k = 0; k < mode->surfaces; k++)
+    if (!(values[k] <= 0) && noise_of(run, k, run->trial.t1, run->z, 0, &run->noise[k])) return RAISED;
+  for (int k = 0; k < mode->surfaces; k++) {
+    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
+    if (k >= mode->edges) return *found = obstacle(HS_WALL, k), 0;
+    if (mode->edge[k].conditional) continue;
+    const int status = too_deep(run, k, values, found);
+    if (status) return status == RAISED ? RAISED : 0;
+  }
+  int count = 0;
+  for (int k = 0; k < mode->edges; k++) {
+    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
+    const int status = crossing_of(run, k, values, &run->crossings[count], found);
+    if (status == RAISED) return RAISED;
+    if (found->obstacle != HS_CLEAR) return 0;
+    count += status;
+  }
+  found->crossings = count;
+  return 0;
+}

@@ -1,0 +1,18 @@
+/* Sampled inputs over time. See hsdsl/simulate/timeline.py. */
+
+/* The segment that time is in; at a boundary the later one. */
+static int64_t segment_at(const hs_timeline *timeline, double t) {
+  int64_t low = 0, high = timeline->segments;
+  while (low < high) {
+    const int64_t middle = (low + high) / 2;
+    if (t < timeline->start[middle])
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  return low > 0 ? low - 1 : 0;
+}
+
+static const double *segment_data(const hs_run *run, int64_t segment) {
+  return run->task->timeline->data + segment * run->model->data;
+}

@@ -1,0 +1,262 @@
+"""The structures of ``hs.h`` and ``hs_simulate.h`` as ctypes sees them, and a method's table as one of them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_void_p
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.integrators import ButcherTableau
+
+ARC = np.dtype([("first", "i8"), ("jump", "i8"), ("mode", "i4"), ("kind", "i4")])
+TRANSITION = np.dtype(
+    [("time", "f8"), ("resumed", "f8"), ("mode", "i4"), ("edge", "i4"), ("entry", "i4"), ("alternatives", "i4")]
+)
+INTERPOLANTS = ("secant", "hermite", "dense")
+KINDS = ("flow", "strip")
+REASONS = (
+    "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
+    "entered outside", "stuck", "interrupted",
+)  # fmt: skip
+OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping")
+
+
+class Edge(ctypes.Structure):
+    """``hs_edge``."""
+
+    target_dimension: int
+    parts: int
+    condition: Any
+    reset: int | None
+    spread: int | None
+
+    _fields_ = (
+        *((name, c_int) for name in ("target", "target_dimension", "conditional", "priority", "parts")),
+        ("condition", POINTER(c_void_p)),
+        ("reset", c_void_p),
+        ("spread", c_void_p),
+    )
+
+
+class Mode(ctypes.Structure):
+    """``hs_mode``."""
+
+    dimension: int
+    edges: int
+    surfaces: int
+    flow: int | None
+    values: int | None
+    magnitudes: int | None
+    outputs: int | None
+    gradients: Any
+    rates: Any
+    edge: Any
+
+    _fields_ = (
+        *((name, c_int) for name in ("dimension", "edges", "surfaces", "final")),
+        *((name, c_void_p) for name in ("flow", "values", "magnitudes", "outputs")),
+        ("gradients", POINTER(c_void_p)),
+        ("rates", POINTER(c_void_p)),
+        ("edge", POINTER(Edge)),
+    )
+
+
+class Model(ctypes.Structure):
+    """``hs_model``."""
+
+    width: int
+    surfaces: int
+    edges: int
+    outputs: int
+    mode: Any
+
+    _fields_ = (
+        *((name, c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data")),
+        ("mode", POINTER(Mode)),
+    )
+
+
+class Row(ctypes.Structure):
+    """``hs_row``."""
+
+    _fields_ = (("terms", c_int), ("stage", POINTER(c_int)), ("weight", POINTER(c_double)))
+
+
+class Method(ctypes.Structure):
+    """``hs_method``."""
+
+    _fields_ = (
+        *((name, c_int) for name in ("stages", "extra", "order", "interpolant", "degree")),
+        ("c", POINTER(c_double)),
+        ("a", POINTER(Row)),
+        ("b", Row),
+        ("error", Row),
+        ("coarse", Row),
+        ("dense", POINTER(Row)),
+    )
+
+
+class Timeline(ctypes.Structure):
+    """``hs_timeline``."""
+
+    _fields_ = (("segments", c_int64), *((name, c_void_p) for name in ("start", "end", "jump", "data")))
+
+
+class Settings(ctypes.Structure):
+    """``hs_settings``."""
+
+    _fields_ = (
+        *((name, c_double) for name in ("step", "tolerance", "largest", "relaxation", "until")),
+        ("max_transitions", c_int64),
+    )
+
+
+CHUNK_COLUMNS = (
+    "times", "values", "outputs", "depth", "pieces", "arc", "transition", "before", "after", "alternatives",
+)  # fmt: skip
+
+
+class Chunk(ctypes.Structure):
+    """``hs_chunk``."""
+
+    row_room: int
+    rows: int
+    arc_room: int
+    arcs: int
+    transition_room: int
+    transitions: int
+    alternatives_used: int
+
+    _fields_ = (
+        *((name, c_int64) for name in ("row_room", "rows", "arc_room", "arcs", "transition_room", "transitions")),
+        *((name, c_void_p) for name in CHUNK_COLUMNS),
+        ("alternatives_used", c_int64),
+    )
+
+
+class Visited(ctypes.Structure):
+    """``hs_visited``."""
+
+    room: int
+    count: int
+    mode: Any
+    state: Any
+    slot: Any
+
+    _fields_ = (("room", c_int64), ("count", c_int64), *((name, c_void_p) for name in ("mode", "state", "slot")))
+
+
+class Stop(ctypes.Structure):
+    """``hs_stop``."""
+
+    reason: int
+    mode: int
+    dimension: int
+    edge: int
+    obstacle: int
+    surface: int
+    segment: int
+    time: float
+    h: float
+    x: Any
+    slope: Any
+
+    _fields_ = (
+        *((name, c_int32) for name in ("reason", "mode", "dimension", "edge", "obstacle", "surface")),
+        ("segment", c_int64),
+        ("time", c_double),
+        ("h", c_double),
+        ("x", c_void_p),
+        ("slope", c_void_p),
+    )
+
+
+Ask = ctypes.CFUNCTYPE(c_int, c_void_p)
+Grow = ctypes.CFUNCTYPE(c_int, c_void_p, POINTER(Visited))
+
+
+class Task(ctypes.Structure):
+    """``hs_task``."""
+
+    model: Any
+    method: Any
+    timeline: Any
+    settings: Settings
+    mode: int
+    dimension: int
+    x: Any
+    workspace: Any
+    chunk: Chunk
+    visited: Visited
+    flush: Any
+    poll: Any
+    grow: Any
+    now: float
+    made: int
+    stop: Stop
+
+    _fields_ = (
+        ("model", POINTER(Model)),
+        ("method", POINTER(Method)),
+        ("timeline", POINTER(Timeline)),
+        ("settings", Settings),
+        ("mode", c_int32),
+        ("dimension", c_int32),
+        ("x", c_void_p),
+        ("workspace", c_void_p),
+        ("chunk", Chunk),
+        ("visited", Visited),
+        ("flush", Ask),
+        ("poll", Ask),
+        ("grow", Grow),
+        ("now", c_double),
+        ("made", c_int64),
+        ("stop", Stop),
+    )
+
+
+STRUCTURES = (Edge, Mode, Model, Row, Method, Timeline, Settings, Chunk, Visited, Stop, Task)  # as in hs_sizes
+
+
+@cache
+def method_table(table: ButcherTableau) -> Method:
+    """Write an integrator's table as the runtime takes it: numbers instead of fractions, rows without their zeros."""
+    stages = table.stages - table.last_is_next
+    end: tuple[Fraction, ...] = ()
+    rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
+    dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
+    return Method(
+        stages=stages,
+        extra=len(table.extra),
+        order=table.order,
+        interpolant=INTERPOLANTS.index(table.interpolant),
+        degree=table.degree,
+        c=(c_double * len(rows))(*(_node(table, row) for row in rows)),
+        a=(Row * len(rows))(*map(_row, rows)),
+        b=_row(table.b),
+        error=_row(_difference(table.b, table.embedded)),
+        coarse=_row(_difference(table.b, table.coarse)),
+        dense=(Row * max(1, len(dense)))(*map(_row, dense)),
+    )
+
+
+def _node(table: ButcherTableau, row: Sequence[Fraction]) -> float:
+    node = sum(row, Fraction(0))
+    at_end = abs(node - 1) <= (0 if table.digits is None else Fraction(1, 10**table.digits))
+    return 1.0 if at_end else FLOAT64.constant(node)
+
+
+def _difference(b: Sequence[Fraction], other: Sequence[Fraction] | None) -> Sequence[Fraction]:
+    return () if other is None else [v - w for v, w in zip(b, other, strict=True)]
+
+
+def _row(weights: Sequence[Fraction]) -> Row:
+    terms = [(i, FLOAT64.constant(w)) for i, w in enumerate(weights) if w]
+    count = max(1, len(terms))
+    return Row(len(terms), (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms)))

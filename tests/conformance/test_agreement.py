@@ -1,0 +1,47 @@
+"""Every engine gives the same execution, to the last bit: on every case, on every model, by every method.
+
+Three are compared: the Python loop over the Python kernel, the Python loop over the compiled kernel, and the compiled
+loop. Where the second differs the printer of C is wrong, where only the third does the C runtime.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conformance.test_conformance import CASES, SETTINGS, Run, model, read
+from engines import assert_engines_agree, needs_compiler
+
+import hsdsl
+from hsdsl.integrators import INTEGRATORS
+
+pytestmark = needs_compiler
+MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
+FLOATS = {name: setting for name, setting in SETTINGS.items() if "precision" not in setting}
+LONG = ("m4-chattering", "zeno-ball")  # tens of thousands of transitions
+OVER_BOTH = ("midpoint", "adaptive")
+# steps that fall on nothing, a relaxation large enough for strips to be seen, few transitions: the loop is what counts
+STEPS: list[dict[str, Any]] = [{"step": 0.017, "relaxation": 3e-4}, {"step": "1/16", "relaxation": "1/1024"}]
+
+
+def arguments(run: Run, setting: dict[str, str]) -> dict[str, Any]:
+    asked = {**setting, **run.arguments, "scheme": "relaxed"}
+    return asked | ({"max_transitions": int(asked["max_transitions"])} if "max_transitions" in asked else {})
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in CASES])
+def test_every_case_in_every_setting(name: str) -> None:
+    for run in map(Run.of, read(CASES[name])["runs"]):
+        if "relaxed" in run.scheme:
+            for key, setting in FLOATS.items():
+                assert_engines_agree(model(name), kernel=key in OVER_BOTH, **arguments(run, setting))
+
+
+@pytest.mark.parametrize("method", INTEGRATORS)
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_by_every_method(name: str, method: str) -> None:
+    loaded = hsdsl.load(MODELS[name])
+    settings = [*STEPS, *([{"tolerance": 1e-7, "relaxation": 1e-6}] if INTEGRATORS[method].adaptive else [])]
+    for number, setting in enumerate(settings):
+        assert_engines_agree(loaded, kernel=number == 0, method=method, max_transitions=40, **setting)

@@ -1,0 +1,95 @@
+"""The compiled engine around its loop: structures, memory that grows, Ctrl-C, progress, a choice of engines."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+from engines import assert_engines_agree, needs_compiler
+
+import hsdsl
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import UsageError
+from hsdsl.model import Model
+from hsdsl.runtime import tables
+from hsdsl.runtime.kernel import runtime
+from hsdsl.simulate import chunks
+
+MODELS = Path(__file__).parents[2] / "models"
+OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
+
+
+def model(text: str) -> Model:
+    return Model(elaborate("model.yaml", text=text.encode()))
+
+
+@needs_compiler
+def test_both_sides_have_one_idea_of_every_structure():
+    sizes = (ctypes.c_int64 * len(tables.STRUCTURES)).in_dll(runtime(), "hs_sizes")
+    assert list(sizes) == [ctypes.sizeof(structure) for structure in tables.STRUCTURES]
+
+
+@needs_compiler
+def test_rows_in_many_chunks_are_the_same_rows(monkeypatch):
+    monkeypatch.setattr(chunks, "LEAST_ROWS", 16)
+    monkeypatch.setattr(chunks, "MOST_ROWS", 64)
+    oscillator = hsdsl.load(OSCILLATOR)
+    for settings in ({"tolerance": 1e-6}, {"method": "rk4", "step": 0.02}, {"method": "midpoint", "step": 0.02}):
+        run = assert_engines_agree(oscillator, kernel=False, until=40, **settings)
+        assert len(run.times) > 500
+
+
+COUNTDOWN = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: 0, y: 1}
+    transitions:
+      - {name: down, when: x >= 0, to: b, reset: {x: x - 1}}
+  b:
+    flow: {x: 0, y: 1}
+    transitions:
+      - {name: on, when: x >= 0, to: a}
+initial: {mode: a, x: 700, y: 0}
+experiment: {until: 1}
+"""
+
+
+@needs_compiler
+def test_a_long_chain_at_one_instant_needs_more_room():
+    run = assert_engines_agree(model(COUNTDOWN), method="euler", step=0.25)
+    assert len(run.transitions) > 1000 and run.stop.reason == "until"
+    circle = model(COUNTDOWN.replace("x: x - 1", "x: 'x + 1 - 500*max(0, sign(x - 1100))'"))
+    run = assert_engines_agree(circle, method="euler", step=0.25)
+    assert run.stop.reason == "zeno" and len(run.transitions) > 1000
+
+
+@needs_compiler
+def test_control_c_keeps_what_was_computed():
+    oscillator = hsdsl.load(OSCILLATOR)
+    oscillator.simulate(until=1, engine="c")
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    run = oscillator.simulate(until=1e9, method="dop853", step=1e-4, relaxation=1e-9, max_transitions=10**9, engine="c")
+    assert run.stop.reason == "interrupted" and run.stop.time == run.times[-1] > 1
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@needs_compiler
+def test_a_run_can_be_watched():
+    seen = []
+    run = hsdsl.load(OSCILLATOR).simulate(watch=seen.append, engine="c")
+    assert (seen[0].now, seen[0].made, seen[0].until) == (run.stop.time, len(run.transitions), run.stop.time)
+
+
+def test_without_a_compiler_python_runs_and_one_line_says_so(monkeypatch, capsys):
+    monkeypatch.setenv("CC", "/no/such/compiler")
+    oscillator = hsdsl.load(OSCILLATOR)
+    assert [oscillator.simulate(until=0.1).engine for _ in range(2)] == ["python"] * 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "/no/such/compiler" in said
+    with pytest.raises(UsageError, match="engine 'c' cannot run this"):
+        oscillator.simulate(until=0.1, engine="c")
