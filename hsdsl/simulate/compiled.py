@@ -14,6 +14,7 @@ import numpy as np
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Stop
+from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
@@ -48,7 +49,7 @@ class CompiledRun:
 
     def __post_init__(self) -> None:
         model, settings = self.compiled.table, self.run.settings
-        assert settings.method is not None
+        assert isinstance(settings.method, ButcherTableau)
         method = tables.method_table(settings.method)
         self._task = tables.Task()
         self._numbers = _Numbers(self.run, model, self.compiled.workspace(method), self.x)
