@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -19,7 +19,7 @@ from hsdsl.store.atomic import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["GuardLine", "plot"]
+__all__ = ["GuardLine", "plot", "save"]
 
 FORMATS = (".png", ".svg", ".html")
 
@@ -89,6 +89,30 @@ def plot(
             file.write(page(execution, picture.getvalue().decode(), title).encode())
         else:
             _print(figure, file, suffix[1:])
+
+
+def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
+    """Make a figure in the house's style and write it, ``.png`` or ``.svg`` by each path's suffix.
+
+    Parameters
+    ----------
+    draw : callable
+        Makes the figure; called once.
+    *paths : path
+        Where to.
+
+    Raises
+    ------
+    UsageError
+        For a file that cannot be written.
+    """
+    import matplotlib.style
+
+    with matplotlib.style.context(["default", STYLE]):
+        figure = draw()
+        for path in map(Path, paths):
+            with replacing(path) as file:
+                _print(figure, file, path.suffix[1:].lower())
 
 
 def _print(figure: Figure, file: BinaryIO, kind: str) -> None:

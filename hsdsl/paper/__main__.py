@@ -1,0 +1,76 @@
+"""``python -m hsdsl.paper``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from hsdsl.errors import ModelError, UsageError
+from hsdsl.paper.parts import PARTS
+from hsdsl.paper.results import Desk, Finding, say
+
+MODELS = Path(__file__).parents[2] / "models"  # of a checkout
+HEADER = ("where", "what", "here", "known")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute the parts that are asked for; return 0, or 2 for wrong usage."""
+    asked = _parser().parse_args(arguments)
+    models = asked.models or (MODELS if MODELS.is_dir() else Path("models"))
+    try:
+        asked.out.mkdir(parents=True, exist_ok=True)
+        findings = _run(Desk(asked.out, models, asked.quick), asked.only or list(PARTS))
+    except OSError as error:
+        say(f"hsdsl.paper: cannot make the folder {asked.out}: {error.strerror}")
+        return 2
+    except (UsageError, ModelError) as error:
+        hint = getattr(error, "hint", None)
+        say(f"hsdsl.paper: {error}" + (f"\n  hint: {hint}" if hint else ""))
+        return 2
+    except KeyboardInterrupt:
+        say("interrupted; what was written is complete")
+        return 130
+    print(summary(findings))
+    return 0
+
+
+def _run(desk: Desk, names: Sequence[str]) -> list[Finding]:
+    findings: list[Finding] = []
+    for i, name in enumerate(names, 1):
+        began = time.perf_counter()
+        say(f"[{i}/{len(names)}] {name}: {PARTS[name].summary}")
+        findings += PARTS[name].run(desk)
+        say(f"  {time.perf_counter() - began:.1f} s")
+    rows = [(f.figure, f.quantity, f.here, f.known) for f in findings]
+    desk.table("summary", HEADER, rows)
+    return findings
+
+
+def summary(findings: Sequence[Finding]) -> str:
+    """Set the findings as a table."""
+    rows = [HEADER, *(finding.cells for finding in findings)]
+    widths = [max(len(row[k]) for row in rows) for k in range(4)]
+    return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m hsdsl.paper",
+        description="Compute and draw all figures and tables of the paper's Section V; print what is found and known.",
+    )
+    parser.add_argument("--out", type=Path, default=Path("paper-figures"), help="folder for PNG, SVG and CSV files")
+    parser.add_argument("--only", action="append", choices=list(PARTS), metavar="NAME", help=_choices())
+    parser.add_argument("--quick", action="store_true", help="coarser grids: seconds instead of minutes")
+    parser.add_argument("--models", type=Path, help="folder of the paper's models (default: that of the checkout)")
+    return parser
+
+
+def _choices() -> str:
+    return "one part, may be repeated: " + ", ".join(PARTS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""Fig. 14d and 14e: errors against the step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from hsdsl.paper.accuracy import RATIOS, Point, Rival
+from hsdsl.paper.drawing.axes import MARKERS, letter, loglog, order, shades
+from hsdsl.plot.colours import ALARM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CEILING = 300  # larger errors are those of an unstable method and are not drawn
+
+
+def draw_rho(points: Sequence[Point]) -> Figure:
+    """Draw rho against the step, a line for each relaxation over step, and what a reversed velocity makes of it."""
+    figure = Figure(figsize=(10.0, 4.4), layout="constrained")
+    for axis, example in zip(figure.subplots(1, 2), (1, 2), strict=True):
+        loglog(axis, "step $h$", r"$\rho^\varepsilon_{[0,\,t_{max}]}$" if example == 1 else "")
+        _lines(axis, [p for p in points if p.example == example], lambda p: p.rho_upper)
+        mine = [p for p in points if p.example == example and p.ratio == RATIOS[-1] and p.rho_reversed < CEILING]
+        mine = mine or [p for p in points if p.example == example and p.ratio == RATIOS[0] and p.rho_reversed < CEILING]
+        axis.plot([p.step for p in mine], [p.rho_reversed for p in mine], ":", color=ALARM, linewidth=1.8,
+                  label="velocity reversed\nin each step")  # fmt: skip
+        letter(axis, _title(points, example))
+        if example == 1:
+            axis.legend(frameon=False, fontsize=8, loc="upper left")
+        _triangles(axis)
+    return figure
+
+
+def draw_rho_hat(points: Sequence[Point], rivals: Sequence[Rival]) -> Figure:
+    """Draw rho-hat against the step, beside Paoli and Schatzman's scheme."""
+    figure = Figure(figsize=(10.0, 4.4), layout="constrained")
+    for axis, example in zip(figure.subplots(1, 2), (1, 2), strict=True):
+        loglog(axis, "step $h$", r"$\hat\rho$" if example == 1 else "")
+        _lines(axis, [p for p in points if p.example == example], lambda p: p.rho_hat)
+        mine = [r for r in rivals if r.example == example]
+        axis.plot([r.step for r in mine], [r.rho_hat for r in mine], "--", marker="x", markersize=4, color="#000000",
+                  label="Paoli-Schatzman")  # fmt: skip
+        letter(axis, _title(points, example))
+        if example == 2:
+            axis.legend(frameon=False, fontsize=8, loc="upper left")
+        _triangles(axis)
+    return figure
+
+
+def _title(points: Sequence[Point], example: int) -> str:
+    """Head a panel, and say which steps are not drawn."""
+    left_out = {p.step for p in points if p.example == example and p.rho_hat >= CEILING}
+    steps = ", ".join(f"{step:g}" for step in sorted(left_out))
+    return f"Example {example}" + (f" ($h = {steps}$: unstable, not drawn)" if left_out else "")
+
+
+def _lines(axis: Axes, points: Sequence[Point], value: Callable[[Point], float]) -> None:
+    palette = shades([f"{ratio:g}" for ratio in RATIOS])
+    for marker, ratio in zip(MARKERS, RATIOS, strict=False):
+        mine = [p for p in points if p.ratio == ratio and value(p) < CEILING]
+        axis.plot([p.step for p in mine], [value(p) for p in mine], "-", marker=marker, markersize=3.2,
+                  color=palette[f"{ratio:g}"], label=rf"$\varepsilon = {_power(ratio)}\, h$")  # fmt: skip
+
+
+def _power(number: float) -> str:
+    digits, exponent = f"{number:.0e}".split("e")
+    return rf"{digits} \cdot 10^{{{int(exponent)}}}"
+
+
+def _triangles(axis: Axes) -> None:
+    """Draw slopes 1 and 2 in the lower right corner, where errors are never so small."""
+    (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
+    x = left * (right / left) ** 0.70
+    floor = low * (high / low) ** 0.04
+    order(axis, x, floor, 2, 0.45)
+    order(axis, x * 0.17, floor, 1, 0.45)
+    axis.set_xlim(left, right)
+    axis.set_ylim(low, high)
