@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from hsdsl.diagnose import render
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.paper.parts import PARTS
 from hsdsl.paper.results import Desk, Finding, say
@@ -17,7 +18,7 @@ HEADER = ("where", "what", "here", "known")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the parts that are asked for; return 0, or 2 for wrong usage."""
+    """Compute the parts that are asked for; return the exit code, as the verbs of ``hsdsl`` do."""
     asked = _parser().parse_args(arguments)
     models = asked.models or (MODELS if MODELS.is_dir() else Path("models"))
     try:
@@ -26,9 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         say(f"hsdsl.paper: cannot make the folder {asked.out}: {error.strerror}")
         return 2
-    except (UsageError, ModelError) as error:
-        hint = getattr(error, "hint", None)
-        say(f"hsdsl.paper: {error}" + (f"\n  hint: {hint}" if hint else ""))
+    except ModelError as error:
+        say("\n\n".join(render(diagnostic) for diagnostic in error.diagnostics))
+        return 1
+    except UsageError as error:
+        say(f"hsdsl.paper: {error}" + (f"\n  hint: {error.hint}" if error.hint else ""))
         return 2
     except KeyboardInterrupt:
         say("interrupted; what was written is complete")

@@ -25,7 +25,7 @@ def table_1(desk: Desk) -> list[Finding]:
         read = parameters(model)
         rows.append((example, *(read[name] for name in TABLE[example])))
         worst = max(abs(read[name] - value) for name, value in TABLE[example].items())
-        where = f"Table I, example {example}: largest difference of the model's parameters"
+        where = f"example {example}: largest difference of the model's parameters"
         found.append(Finding("Table I", where, worst, "0"))
     desk.table("table-1", ("example", *TABLE[1]), rows)
     return found

@@ -145,8 +145,8 @@ def events(stride: str, coarse: Execution, fine: Execution) -> list[tuple[object
 def guard_curves(th: Array) -> dict[str, list[float]]:
     """Return the height z at which each touchdown guard lies, not-a-number where the angle is another guard's.
 
-    A foot is on the ground where z +- d/2 sin(theta) = l cos(psi + theta). Tilted back (theta < 0) the left foot, the
-    one in front, is the lower one and touches first.
+    A foot is on the ground where z +- d/2 sin(theta) = l cos(psi + theta). Nose down (theta < 0) the left foot, the one
+    in front, is the lower one and touches first.
     """
     left = L * np.cos(PSI + th) - D / 2 * np.sin(th)
     right = L * np.cos(PSI + th) + D / 2 * np.sin(th)

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import log10
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
 from hsdsl.paper.accuracy import RATIOS, Point, Rival
-from hsdsl.paper.drawing.axes import MARKERS, letter, loglog, order, shades
+from hsdsl.paper.drawing.axes import MARKERS, letter, loglog, order, power, shades
 from hsdsl.plot.colours import ALARM
 
 if TYPE_CHECKING:
@@ -63,21 +64,17 @@ def _lines(axis: Axes, points: Sequence[Point], value: Callable[[Point], float])
     palette = shades([f"{ratio:g}" for ratio in RATIOS])
     for marker, ratio in zip(MARKERS, RATIOS, strict=False):
         mine = [p for p in points if p.ratio == ratio and value(p) < CEILING]
+        if not mine:
+            continue
         axis.plot([p.step for p in mine], [value(p) for p in mine], "-", marker=marker, markersize=3.2,
-                  color=palette[f"{ratio:g}"], label=rf"$\varepsilon = {_power(ratio)}\, h$")  # fmt: skip
-
-
-def _power(number: float) -> str:
-    digits, exponent = f"{number:.0e}".split("e")
-    return rf"{digits} \cdot 10^{{{int(exponent)}}}"
+                  color=palette[f"{ratio:g}"], label=rf"$\varepsilon = {power(ratio)}\, h$")  # fmt: skip
 
 
 def _triangles(axis: Axes) -> None:
-    """Draw slopes 1 and 2 in the lower right corner, where errors are never so small."""
+    """Draw slopes 1 and 2 low in the right half, where no error is; not where the axes are too short for them."""
     (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
-    x = left * (right / left) ** 0.70
-    floor = low * (high / low) ** 0.04
-    order(axis, x, floor, 2, 0.45)
-    order(axis, x * 0.17, floor, 1, 0.45)
-    axis.set_xlim(left, right)
-    axis.set_ylim(low, high)
+    decades = 0.16 * log10(right / left)
+    for slope, at in ((1, 0.46), (2, 0.74)):
+        if slope * decades < 0.28 * log10(high / low):
+            order(axis, left * (right / left) ** at, low * (high / low) ** 0.04, slope, decades)
+    axis.set(xlim=(left, right), ylim=(low, high))

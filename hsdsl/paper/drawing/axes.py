@@ -43,3 +43,9 @@ def order(axis: Axes, x: float, y: float, slope: int, decades: float = 0.6) -> N
 def letter(axis: Axes, text: str) -> None:
     """Head a panel."""
     axis.set_title(text, loc="left", fontsize=9.5)
+
+
+def power(number: float) -> str:
+    """Set a number of one digit as a multiple of a power of ten."""
+    digits, exponent = f"{number:.0e}".split("e")
+    return rf"{digits} \cdot 10^{{{int(exponent)}}}"

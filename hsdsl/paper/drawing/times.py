@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from hsdsl.paper.drawing.axes import MARKERS, letter, loglog, shades
+from hsdsl.paper.drawing.axes import MARKERS, letter, loglog, power, shades
 from hsdsl.paper.times import RATIOS, Timing
 
 if TYPE_CHECKING:
@@ -46,11 +46,6 @@ def _lines(axis: Axes, timings: Sequence[Timing], by_step: bool) -> None:
             chosen.sort(key=lambda t: t.step)
             x = [t.step if by_step else t.seconds for t in chosen]
             y = [t.seconds if by_step else t.rho_hat for t in chosen]
-            name = "Paoli-Schatzman" if ratio is None else rf"relaxed, $\varepsilon = {_power(ratio)}\, h$"
+            name = "Paoli-Schatzman" if ratio is None else rf"relaxed, $\varepsilon = {power(ratio)}\, h$"
             axis.plot(x, y, style, marker=marker, markersize=3.6, color=palette[str(ratio)],
                       label=f"{name}, {engine} engine")  # fmt: skip
-
-
-def _power(number: float) -> str:
-    digits, exponent = f"{number:.0e}".split("e")
-    return rf"{digits} \cdot 10^{{{int(exponent)}}}"
