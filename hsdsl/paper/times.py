@@ -8,7 +8,8 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.model import ENGINES, Model
+from hsdsl.model import Model
+from hsdsl.model.engines import ENGINES
 from hsdsl.paper.accuracy import rho_hat
 from hsdsl.paper.results import Desk, Finding, say
 
