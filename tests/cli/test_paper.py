@@ -111,7 +111,7 @@ def runner_events_are_late_by_the_strips_alone(out):
             assert -2e-5 <= float(row["time"]) - float(time) <= 1e-2 * k + 2e-5
 
 
-def test_the_guards_drawn_are_the_models(quick):
+def test_the_guards_drawn_are_the_models():
     """The states at which the simulated runner touches down lie on the curves."""
     model = load(ROOT / "models" / "pronking-runner.yaml")
     run = model.simulate(initial={"w": -0.4})
