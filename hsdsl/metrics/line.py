@@ -6,7 +6,7 @@ import numpy as np
 
 from hsdsl.metrics.geometry import Array
 
-HALVINGS = 64
+ITERATIONS = 100
 
 
 def minimise_on_line(
@@ -41,7 +41,7 @@ def minimise_on_line(
     lower = best.copy()
     if wide.size:
         some = [o[wide] for o in offsets]
-        low_wide, value, at = _bisect(matrices, some, a[wide], b[wide])
+        low_wide, value, at = _newton(matrices, some, a[wide], b[wide])
         better = value < best[wide]
         best[wide] = np.where(better, value, best[wide])
         where[wide] = np.where(better, at, where[wide])
@@ -49,34 +49,52 @@ def minimise_on_line(
     return lower, best, where
 
 
-def _bisect(matrices: list[Array], offsets: list[Array], a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Halve by the sign of the slope; the lower bound is where the slopes at the two ends meet."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (a + b)
-        if np.all((middle <= a) | (middle >= b)):
-            break
-        rising = _slope(matrices, offsets, middle) > 0
-        a, b = np.where(rising, a, middle), np.where(rising, middle, b)
-    at_a, at_b = _length(matrices, offsets, a), _length(matrices, offsets, b)
+def _newton(matrices: list[Array], offsets: list[Array], a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Newton's method on the slope, between a and b, halving where it leaves them.
+
+    The sum is convex, so its tangent at any point bounds it from below.
+    """
+    s, lower, value = 0.5 * (a + b), np.full(len(a), -np.inf), np.full(len(a), np.inf)
+    where = s.copy()
     steepest = sum(float(np.linalg.norm(m)) for m in matrices)
-    value = np.minimum(at_a, at_b)
-    return value - steepest * (b - a), value, np.where(at_a <= at_b, a, b)
+    left = np.arange(len(a))
+    for _ in range(ITERATIONS):
+        some = [o[left] for o in offsets]
+        at, slope, bend = _expanded(matrices, some, s)
+        loose = 4e-16 * steepest * (b - a)
+        below = at + np.minimum(slope * (a - s), slope * (b - s)) - loose
+        better = at < value[left]
+        where[left] = np.where(better, s, where[left])
+        value[left], lower[left] = np.minimum(value[left], at), np.maximum(lower[left], below)
+        a, b = np.where(slope > 0, a, s), np.where(slope > 0, s, b)
+        middle = 0.5 * (a + b)
+        step = s - np.divide(slope, bend, out=np.full_like(s, np.inf), where=bend > 0)
+        s = np.where((step > a) & (step < b), step, middle)
+        open_ = (value[left] - lower[left] > 2 * loose + 2e-16 * value[left]) & (middle > a) & (middle < b)
+        left, a, b, s = left[open_], a[open_], b[open_], s[open_]
+        if not left.size:
+            break
+    return np.minimum(lower, value), value, where
+
+
+def _expanded(matrices: list[Array], offsets: list[Array], s: Array) -> tuple[Array, Array, Array]:
+    """The sum, its slope and its second derivative."""
+    total, slope, bend = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s))
+    for m, o in zip(matrices, offsets, strict=True):
+        parts = [o[:, i] + m[i] * s for i in range(len(m))]
+        size = _norm(parts)
+        inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+        along = sum((m[i] * parts[i] for i in range(len(m))), np.zeros(len(s))) * inverse
+        total += size
+        slope += along
+        bend += (float(m @ m) - along * along) * inverse
+    return total, slope, bend
 
 
 def _length(matrices: list[Array], offsets: list[Array], s: Array) -> Array:
     total = np.zeros(len(s))
     for m, o in zip(matrices, offsets, strict=True):
         total += _norm([o[:, i] + m[i] * s for i in range(len(m))])
-    return total
-
-
-def _slope(matrices: list[Array], offsets: list[Array], s: Array) -> Array:
-    total = np.zeros(len(s))
-    for m, o in zip(matrices, offsets, strict=True):
-        parts = [o[:, i] + m[i] * s for i in range(len(m))]
-        size = _norm(parts)
-        along = sum((m[i] * parts[i] for i in range(len(m))), np.zeros(len(s)))
-        total += np.divide(along, size, out=np.zeros_like(size), where=size > 0)
     return total
 
 

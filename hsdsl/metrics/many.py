@@ -82,11 +82,12 @@ def search_many(pairs: Pairs, hops: int) -> None:
                 continue
             if space.passages[sequence[-1]].target == pairs.target:
                 _finish(pairs, sequence, active)
-            if len(sequence) >= hops:
+            longer = [(*sequence, g) for g in followers(space, sequence[-1])] if len(sequence) < hops else []
+            if not longer:
                 continue
             active = _still_open(pairs, sequence, pairs.open(floor[active], active), leaves, between)
             if active.size:
-                following += [((*sequence, g), active) for g in followers(space, sequence[-1])]
+                following += [(one, active) for one in longer]
         layer = following
 
 
