@@ -1,7 +1,7 @@
 """How fast distances are: point distances in one call, rho between long runs, and how the cost grows.
 
-Run as ``python benchmarks/distances.py``; prints a table in Markdown. Processor time of the calling thread and its helpers,
-least of three.
+Run as ``python benchmarks/distances.py``; prints tables in Markdown. Processor time, where it is repeated the least of
+three.
 """
 
 from __future__ import annotations
