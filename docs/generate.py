@@ -18,11 +18,11 @@ import typer.main
 import yaml
 
 from hsdsl import cli, errors, integrators, schema
+from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.integrators import ButcherTableau
 from hsdsl.lint.pages import error_pages
 from hsdsl.lint.rules import FAMILIES, RULES, family
-from hsdsl.model import requests
 
 REFERENCE = Path(__file__).parent / "reference"
 GOLDEN = Path(__file__).parents[1] / "tests" / "golden"
@@ -40,7 +40,7 @@ parentheses and functions. An *inequality* has an expression on either side of o
 
 """
 
-DEFAULTS = """## Defaults of `experiment`
+DEFAULTS_OF_EXPERIMENT = """## Defaults of `experiment`
 
 A call or an option counts before `--set`, `--set` before the file, the file before these. `step` and `tolerance`
 exclude each other: the stronger one removes the other, and a method that only the file names and that cannot
@@ -128,7 +128,7 @@ def language() -> str:
         parts.append(f"## {name}\n\n")
         parts.append(f"{node['description']}\n\n" if "description" in node else "")
         parts.append(keys_of(node) if "properties" in node else f"Value: {value_of(node)}.\n\n")
-    parts.append(DEFAULTS + table(("key", "default"), defaults()))
+    parts.append(DEFAULTS_OF_EXPERIMENT + table(("key", "default"), defaults()))
     parts.append("## Functions and constants\n\n" + table(("name", "arguments"), callables()))
     return "".join(parts)
 
@@ -172,7 +172,7 @@ def typed(node: Mapping[str, Any]) -> str:
 
 def defaults() -> Iterator[tuple[str, str]]:
     """List what an experiment is when nothing is said."""
-    for key, value in (requests.DEFAULTS | {"tolerance": requests.DEFAULT_TOLERANCE}).items():
+    for key, value in (DEFAULTS | {"tolerance": DEFAULT_TOLERANCE}).items():
         text = value if isinstance(value, str) else f"{float(value):g}".replace("e-0", "e-").replace("e+0", "e")
         yield f"`{key}`", f"`{text}`"
 

@@ -53,9 +53,7 @@ def parse(text: str, wanted: Wanted = "number") -> Tree:
     """
     tokens = tokenize(text, wanted)
     if tokens[0].kind == "end":
-        raise ExpressionError(
-            "HS121", "an expression is missing", 0, 1, "write a number or an expression"
-        )
+        raise ExpressionError("HS121", "an expression is missing", 0, 1, "write a number or an expression")
     with deep_stack():
         return _Parser(text, tokens).whole()
 

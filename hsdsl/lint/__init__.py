@@ -9,15 +9,19 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
+from hsdsl import limits
 from hsdsl.elaborate import elaborate_with_places
 from hsdsl.errors import Diagnostic
 from hsdsl.expression.stack import deep_stack
+from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.ignores import Ignored, sift
 from hsdsl.lint.rules import RULES
 from hsdsl.lint.selection import Selection, configured
 from hsdsl.lint.subject import Subject
 from hsdsl.system import HybridSystem
+
+UNDECIDED = "HS492"
 
 __all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "configured", "lint"]
 
@@ -59,10 +63,25 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
 
 
 def _findings(subject: Subject, code: str) -> list[Diagnostic]:
-    rule, lines = RULES[code], subject.reading.text.lines
-    if rule.check is None:
-        return []
-    return [
-        Diagnostic(code, f.message, f.span, f.hint, lines[f.span.line - 1], rule.severity, f.decided, f.fix)
-        for f in dict.fromkeys(rule.check(subject))
-    ]
+    """What one rule finds; where it cannot be decided, that is said instead of nothing."""
+    check = RULES[code].check
+    found: dict[Finding, None] = {}
+    problem = None
+    try:
+        with timebox(limits.current().seconds / PARTS):
+            for finding in check(subject) if check else ():
+                found[finding] = None
+    except OutOfTime:
+        problem = "takes too long"
+    except Exception as error:  # whatever SymPy raises for something unheard of: the other rules go on
+        problem = f"came to {type(error).__name__}"
+    diagnostics = [_diagnostic(subject, code, finding) for finding in found]
+    if problem:
+        message = f"whether {code} ({RULES[code].name}) finds something here is not known: it {problem}"
+        diagnostics.append(_diagnostic(subject, UNDECIDED, Finding(subject.root.place.span, message)))
+    return diagnostics
+
+
+def _diagnostic(subject: Subject, code: str, f: Finding) -> Diagnostic:
+    line = subject.reading.text.lines[f.span.line - 1] if f.span.path == subject.system.path else None
+    return Diagnostic(code, f.message, f.span, f.hint, line, RULES[code].severity, f.decided, f.fix)

@@ -9,13 +9,15 @@ from typing import Any
 
 from hsdsl import schema
 from hsdsl.elaborate import Reading
-from hsdsl.expression import symbolic
+from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
+from hsdsl.lint.influence import Influence, influence
+from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
 from hsdsl.lint.uses import Definition, unused
 from hsdsl.lint.written import Written, written
-from hsdsl.source import Key, Mapping, Node, Sequence
-from hsdsl.system import Edge, HybridSystem, Mode
+from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
+from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,11 @@ class Subject:
         return unused(self.document, self.expressions)
 
     @cached_property
+    def influence(self) -> Influence:
+        """What can influence what is seen of the model."""
+        return influence(self.system)
+
+    @cached_property
     def starts(self) -> tuple[str, ...]:
         """The modes in which runs of this file start: the initial one, and those that a `reference` sets."""
         set_by = (reference.settings.get("initial.mode") for reference in self.document.reference)  # pyright: ignore
@@ -86,7 +93,7 @@ class Subject:
     @cached_property
     def reachable(self) -> frozenset[str]:
         """The modes that transitions lead to from where runs start, taking every transition to be possible."""
-        targets = {mode.name: {edge.target for edge in mode.edges} for mode in self.system.modes}
+        targets = {m.name: {edge.target for edge in m.edges if not m.final} for m in self.system.modes}
         found: set[str] = set()
         waiting = list(self.starts)
         while waiting:
@@ -103,6 +110,36 @@ class Subject:
         for parameter in self.system.parameters:
             found[symbol(parameter.name)] = parameter.value.subs(found)
         return found
+
+    @cached_property
+    def numbers(self) -> dict[Any, Number]:
+        """The value of each parameter in this file, as a number; see `hsdsl.lint.numbers`."""
+        found: dict[Any, Number] = {}
+        for parameter in self.system.parameters:
+            found[symbol(parameter.name)] = evaluate(parameter.value, found)
+        return found
+
+    @cached_property
+    def start(self) -> dict[Any, Number]:
+        """The point at which a run of this file starts: parameters, initial values, inputs, and the time 0."""
+        found = {**self.numbers, TIME: rational(0)}
+        found.update({symbol(i.name): sample_at(i, found[TIME], found) for i in self.system.inputs})
+        found.update({symbol(name): evaluate(value, self.numbers) for name, value in self.system.initial.values})
+        return found
+
+    def mode(self, name: str) -> ModePart:
+        """The mode of a name."""
+        return next(part for part in self.modes if part.mode.name == name)
+
+    def setting(self, name: str) -> Number:
+        """A number of `experiment`; None where the file says nothing."""
+        value = getattr(self.system.experiment, name)
+        return None if value is None else evaluate(value, self.numbers)
+
+    def read(self, scalar: Scalar) -> Number:
+        """The number that an expression of parameters stands for in this file."""
+        value = symbolic.number(parse(scalar.value), self.reading.top, scalar.value)
+        return evaluate(value.expr, self.numbers)
 
     def value(self, expression: Written, node: Tree | None = None) -> Any:
         """The SymPy expression of a part of an expression, `let` and inputs substituted."""

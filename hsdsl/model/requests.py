@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from hsdsl.arithmetic import Arithmetic
+from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
 from hsdsl.names import did_you_mean
@@ -24,12 +24,6 @@ KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples
 SCHEMES_TO_COME = ("located",)
 OWN_FORMULA = ("paoli-schatzman",)
 FILE = "the file"
-DEFAULTS: dict[str, Any] = {
-    "scheme": "relaxed",
-    "method": "auto",
-    "relaxation": Fraction("1e-6"),
-    "max_transitions": 10**6,
-}
 # what other tools call methods of this order
 ELSEWHERE = {
     **dict.fromkeys(("ode45", "rk45", "dopri", "dormandprince", "tsit5"), "dopri5"),
@@ -38,7 +32,6 @@ ELSEWHERE = {
     **dict.fromkeys(("ode1", "forwardeuler", "expliciteuler"), "euler"),
     **dict.fromkeys(("rk2", "ode2"), "midpoint"),
 }
-DEFAULT_TOLERANCE = Fraction("1e-9")
 
 
 @dataclass(frozen=True)

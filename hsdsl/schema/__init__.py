@@ -1,6 +1,6 @@
 """The shape of a model file: pydantic documents, their faults in the language's own words, and the JSON Schema."""
 
-from hsdsl.schema.documents import Experiment, Mode, Model, ParameterEntry, Reference, Transition
+from hsdsl.schema.documents import Experiment, Mode, Model, ParameterEntry, Reference, ReferenceTransition, Transition
 from hsdsl.schema.inputs import InputFile, InputSamples
 from hsdsl.schema.jsonschema import json_schema
 from hsdsl.schema.read import read
@@ -13,6 +13,7 @@ __all__ = [
     "Model",
     "ParameterEntry",
     "Reference",
+    "ReferenceTransition",
     "Transition",
     "json_schema",
     "read",

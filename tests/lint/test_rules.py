@@ -17,6 +17,7 @@ import pytest
 import yaml
 from lint.fragments import completed, examples
 
+from hsdsl.expression.timebox import OutOfTime
 from hsdsl.lint import RULES, Selection, lint
 from hsdsl.lint.fix import fix
 from hsdsl.lint.rules import FAMILIES, family
@@ -27,6 +28,9 @@ SECTIONS = ("What it does", "Why it is bad", "Example", "Use instead", "How it i
 CASES = {path.stem: yaml.load(path.read_text("utf-8"), yaml.BaseLoader) for path in FOLDER.glob("cases/*.yaml")}
 BAD = [(name, n) for name, case in CASES.items() for n in range(len(case["bad"]))]
 GOOD = [(name, n) for name, case in CASES.items() for n in range(len(case["good"]))]
+
+
+TOLD = [code for code in RULES if code != "HS492"]  # undecided: no model of ordinary size is; tested below
 
 
 def code_of(name: str) -> str:
@@ -46,7 +50,7 @@ def test_every_file_is_registered_once():
 
 
 def test_every_rule_has_cases():
-    assert set(CASES) == {rule.name for rule in RULES.values()}
+    assert set(CASES) == {RULES[code].name for code in TOLD}
 
 
 def test_codes_are_in_families_and_in_order():
@@ -63,7 +67,7 @@ def test_page_is_whole(code):
     assert all(part.split("\n", 1)[1].strip() for part in page.split("## ")[1:])
 
 
-@pytest.mark.parametrize("code", RULES)
+@pytest.mark.parametrize("code", TOLD)
 def test_examples_of_the_page(code):
     bad, good = (examples(RULES[code].page, heading) for heading in ("Example", "Use instead"))
     assert bad and good
@@ -96,3 +100,24 @@ def test_fixes(name, number, tmp_path):
 @pytest.mark.parametrize(("name", "number"), GOOD)
 def test_good_models(name, number):
     assert found(code_of(name), CASES[name]["good"][number]) == []
+
+
+MODELS = sorted((FOLDER.parent.parent / "models").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_models_are_clean_or_say_why_not(path):
+    report = lint(path)
+    assert [f"{f.code} {f.span.line}: {f.message}" for f in report.findings] == []
+    assert all(ignored.reason for ignored in report.ignored)
+
+
+@pytest.mark.parametrize(("raised", "says"), [(OutOfTime(), "takes too long"), (ValueError("x"), "ValueError")])
+def test_a_rule_that_gives_up_says_so_and_the_others_go_on(monkeypatch, raised, says):
+    def fails(subject):
+        raise raised
+
+    monkeypatch.setattr(RULES["HS421"].module, "check", fails)
+    model = "parameters: {p: 1}\nmodes: {m: {flow: {x: 1}}}\n"
+    found = lint("model.yaml", Selection.of(["HS401", "HS421"]), text=completed(model).encode()).findings
+    assert [f.code for f in found] == ["HS492", "HS401"] and says in found[0].message

@@ -8,7 +8,45 @@ from types import ModuleType
 from typing import Literal
 
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.rules import identity_reset, unknown_ignore, unreachable_mode, unused_ignore, unused_parameter
+from hsdsl.lint.rules import (
+    after_the_end,
+    confusable_names,
+    constant_condition,
+    constant_state,
+    dead_end,
+    duplicate_transition,
+    empty_section,
+    ends_on_event,
+    identity_reset,
+    idle_parameter,
+    idle_priority,
+    idle_state,
+    invented_state,
+    large_relaxation,
+    late_reference,
+    lost_state,
+    misleading_name,
+    misnamed_output,
+    missing_reset,
+    odd_samples,
+    odd_step,
+    repeated_default,
+    repeated_wall,
+    shadowed_name,
+    shadowed_transition,
+    starts_on_guard,
+    starts_outside,
+    twin_modes,
+    undecided,
+    uneven_relaxation,
+    unknown_ignore,
+    unreachable_mode,
+    unused_ignore,
+    unused_input,
+    unused_let,
+    unused_parameter,
+    unused_state,
+)
 from hsdsl.lint.subject import Subject
 
 FAMILIES = {
@@ -61,10 +99,44 @@ def family(code: str) -> str:
 RULES: dict[str, Rule] = {
     # names
     "HS401": Rule(unused_parameter),
+    "HS402": Rule(unused_input),
+    "HS403": Rule(unused_let),
+    "HS404": Rule(unused_state),
+    "HS405": Rule(shadowed_name, severity="note"),
     "HS406": Rule(unreachable_mode),
+    "HS407": Rule(confusable_names),
+    "HS408": Rule(misleading_name),
+    "HS409": Rule(misnamed_output),
     # shape
     "HS421": Rule(identity_reset),
+    "HS422": Rule(missing_reset),
+    "HS423": Rule(lost_state),
+    "HS424": Rule(invented_state),
+    "HS425": Rule(dead_end),
+    "HS426": Rule(duplicate_transition),
+    "HS427": Rule(shadowed_transition),
+    "HS428": Rule(constant_condition),
+    "HS429": Rule(empty_section, severity="note"),
+    "HS430": Rule(idle_priority),
+    # scene
+    "HS441": Rule(idle_state, severity="note"),
+    "HS442": Rule(idle_parameter, severity="note"),
+    "HS443": Rule(twin_modes),
+    "HS444": Rule(constant_state, severity="note"),
+    "HS445": Rule(repeated_default, severity="note"),
+    "HS446": Rule(repeated_wall),
+    "HS447": Rule(after_the_end),
+    # experiment
+    "HS461": Rule(starts_outside),
+    "HS462": Rule(starts_on_guard, severity="note"),
+    "HS463": Rule(ends_on_event, severity="note"),
+    "HS464": Rule(large_relaxation),
+    "HS465": Rule(uneven_relaxation),
+    "HS466": Rule(odd_samples),
+    "HS467": Rule(odd_step),
+    "HS468": Rule(late_reference),
     # comments
     "HS490": Rule(unused_ignore),
     "HS491": Rule(unknown_ignore),
+    "HS492": Rule(undecided, severity="note"),
 }

@@ -1,0 +1,14 @@
+"""What an experiment is where nobody says anything."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+DEFAULTS: dict[str, Any] = {
+    "scheme": "relaxed",
+    "method": "auto",
+    "relaxation": Fraction("1e-6"),
+    "max_transitions": 10**6,
+}
+DEFAULT_TOLERANCE = Fraction("1e-9")
