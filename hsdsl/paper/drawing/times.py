@@ -43,6 +43,8 @@ def _lines(axis: Axes, timings: Sequence[Timing], by_step: bool) -> None:
     for style, engine in zip(STYLES, engines, strict=False):
         for marker, ratio in zip(MARKERS, ratios, strict=False):
             chosen = [t for t in timings if t.engine == engine and t.ratio == ratio]
+            if not chosen:
+                continue
             chosen.sort(key=lambda t: t.step)
             x = [t.step if by_step else t.seconds for t in chosen]
             y = [t.seconds if by_step else t.rho_hat for t in chosen]
