@@ -12,11 +12,12 @@ from hsdsl.schema.leaves import Document, Expression, Hold, Items, Label
 class InputSamples(Document):
     """An input given by samples in the file."""
 
-    times: Items[Expression] = Field(description="The times of the samples, increasing.")
-    values: Items[Expression] = Field(description="The values at those times.")
+    times: Items[Expression] = Field(description="The times of the samples, increasing.", examples=[[0, 1, 2]])
+    values: Items[Expression] = Field(description="The values at those times.", examples=[[0, 5, 0]])
     hold: Hold = Field(
         "zero",
         description="Between samples: `zero` keeps the last sample's value, `linear` joins them by straight lines.",
+        examples=["linear"],
     )
 
 
@@ -24,11 +25,13 @@ class InputFile(Document):
     """An input given by samples in a CSV file."""
 
     file: Label = Field(
-        description="A CSV file with the header `time,NAME`, by its path from the model's own folder, inside it."
+        description="A CSV file with the header `time,NAME`, by its path from the model's own folder, inside it.",
+        examples=["u.csv"],
     )
     hold: Hold = Field(
         "zero",
         description="Between samples: `zero` keeps the last sample's value, `linear` joins them by straight lines.",
+        examples=["linear"],
     )
 
 

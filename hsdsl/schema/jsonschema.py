@@ -34,6 +34,7 @@ def json_schema() -> dict[str, Any]:
     item = reference.pop("items")
     root["properties"]["reference"] = {
         "description": reference.pop("description"),
+        "examples": reference.pop("examples"),
         "anyOf": [item, {"type": ["array", "null"], "items": item}],
     }
     return {"$schema": _DRAFT, **root, "definitions": definitions}

@@ -60,6 +60,30 @@ def test_every_key_is_described():
         assert prop.get("description", "").endswith("."), name
 
 
+def test_every_key_has_examples_that_fit_it():
+    schema = json_schema()
+    for name, prop in parts(schema):
+        assert prop.get("examples"), name
+        here = {**prop, "definitions": schema["definitions"]}
+        for example in prop["examples"]:
+            assert list(jsonschema.Draft7Validator(here).iter_errors(example)) == [], (name, example)
+
+
+def test_hover_and_completion_find_every_key_of_a_transition():
+    """What an editor does: follow the schema down a path, and offer the properties it finds there."""
+    schema = json_schema()
+
+    def resolved(part):
+        reference = part.get("$ref") or next((p["$ref"] for p in part.get("allOf", []) if "$ref" in p), None)
+        return schema["definitions"][reference.rsplit("/", 1)[1]] if reference else part
+
+    mode = resolved(schema["properties"]["modes"]["additionalProperties"])
+    transition = resolved(mode["properties"]["transitions"]["items"])
+    assert set(transition["properties"]) == {"when", "if", "to", "reset", "name", "priority"}
+    assert transition["required"] == ["when", "to"]
+    assert "surface" in transition["properties"]["when"]["description"]
+
+
 @pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
 def test_models_are_valid(path):
     document = yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
