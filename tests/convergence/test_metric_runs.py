@@ -112,22 +112,6 @@ def test_first_order_in_the_relaxation(name, metric):
     assert abs(slope(relaxations, found) - 1) <= 0.02, found
 
 
-ORDERS = {"euler": 1, "midpoint": 2, "rk4": 4}
-
-
-@pytest.mark.parametrize("method", ORDERS)
-def test_order_in_the_step(method):
-    """Thermostat: rho between a run and a fine one falls with the method's order, the relaxation far below."""
-    scene = model("thermostat")
-    fine = scene.simulate(tolerance=1e-13, method="dopri5", relaxation=1e-12, until=8)
-    steps = [0.4, 0.2, 0.1, 0.05]
-    found = [
-        distance(scene.simulate(method=method, step=h, relaxation=1e-12, until=8), fine, model=scene) for h in steps
-    ]
-    assert all(d.upper <= 1.05 * d.lower + 1e-12 for d in found), found
-    assert slope(steps, [d.middle for d in found]) == pytest.approx(ORDERS[method], abs=0.25), found
-
-
 def test_other_steps_and_lengths_of_the_oscillator():
     """One mode, impacts at other times: the states differ by 50 at an impact, the runs by an error of the method."""
     scene = model("oscillator-with-stop-1")
