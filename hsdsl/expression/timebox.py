@@ -66,7 +66,7 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
         In the block, once the time is spent.
     """
     box = Box(seconds, parts)
-    done = threading.Event()
+    done, sent = threading.Event(), threading.Event()
     lock = threading.Lock()
     thread = threading.get_ident()
 
@@ -74,6 +74,7 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
         while not done.wait(max(0.01, box.left())):
             with lock:
                 if not done.is_set() and box.left() <= 0:
+                    sent.set()
                     _raise_in(thread, OutOfTime)
                     return
 
@@ -84,7 +85,10 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
     finally:
         with lock:
             done.set()
-        _raise_in(thread, None)  # one that was sent and has not arrived
+        if (
+            sent.is_set()
+        ):  # and perhaps has not arrived; to ask for none without need leaves CPython looking for it for ever
+            _raise_in(thread, None)
         watcher.join()
 
 
