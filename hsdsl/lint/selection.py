@@ -30,9 +30,11 @@ class Selection:
         Raises
         ------
         UsageError
-            For a name that no rule has.
+            For a name that no rule has, and for a selection of nothing.
         """
         chosen = set(RULES) if select is None else codes_of(select, "select")
+        if not chosen:
+            raise UsageError("select: no rule is named", "leave it out to use all rules")
         dropped = set[str]() if ignore is None else codes_of(ignore, "ignore")
         return cls(tuple(code for code in RULES if code in chosen - dropped))
 

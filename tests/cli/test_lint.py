@@ -112,7 +112,8 @@ def test_github(command, model, bad, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--select", "HS999"], ["--ignore", "nothing"], ["--format", "xml"], ["--select", "HS301"]]
+    "arguments",
+    [["--select", "HS999"], ["--ignore", "nothing"], ["--format", "xml"], ["--select", "HS301"], ["--select", ""]],
 )
 def test_wrong_usage(command, bad, arguments):
     assert command("lint", bad, *arguments).code == 2

@@ -121,3 +121,16 @@ def test_a_rule_that_gives_up_says_so_and_the_others_go_on(monkeypatch, raised, 
     model = "parameters: {p: 1}\nmodes: {m: {flow: {x: 1}}}\n"
     found = lint("model.yaml", Selection.of(["HS401", "HS421"]), text=completed(model).encode()).findings
     assert [f.code for f in found] == ["HS492", "HS401"] and says in found[0].message
+
+
+@pytest.mark.parametrize(
+    ("model", "code", "says"),
+    [
+        ("oscillator-with-stop-2", "HS462", "starts on the guard of 'impact' with the flow pointing out"),
+        ("digital-control", "HS425", "'D3' is entered and never left"),
+    ],
+)
+def test_what_is_known_of_the_paper_scenes_is_found(model, code, says):
+    (path,) = [path for path in MODELS if path.stem == model]
+    found = [ignored for ignored in lint(path).ignored if ignored.diagnostic.code == code]
+    assert len(found) == 1 and says in found[0].diagnostic.message and found[0].reason
