@@ -35,12 +35,15 @@ class Stepper:
         The flow is asked only where the dense output has stages of its own.
     error : callable or None
         ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
+    gain : float
+        By how much a step can enlarge the round-off of its stages: the sum of the absolute weights.
     """
 
     name: str
     step: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]]
     piece: Callable[[Flow, Number, Number, State, State, Stages, State, State], Polynomial]
     error: Callable[[Number, Stages, State], State] | None
+    gain: float = 1.0
 
 
 @cache
@@ -52,6 +55,7 @@ def stepper(table: ButcherTableau, dimension: int, arithmetic: Arithmetic) -> St
         writer.compile("step", writer.step()),
         writer.compile("piece", writer.piece()),
         writer.compile("error", writer.error()) if table.adaptive else None,
+        float(sum(map(abs, table.b))),
     )
 
 

@@ -21,7 +21,6 @@ from hsdsl.simulate import SCHEMES
 from hsdsl.source import Key
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
-SCHEMES_TO_COME = ("located",)
 OWN_FORMULA = ("paoli-schatzman",)
 FILE = "the file"
 # what other tools call methods of this order
@@ -107,11 +106,6 @@ def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:
 def _scheme(asked: Asked) -> str:
     if asked.value in SCHEMES:
         return asked.value
-    if asked.value in SCHEMES_TO_COME:
-        raise UsageError(
-            f"scheme '{asked.value}' ({asked.place}) is part of the language but not built yet; it is not imitated",
-            "use scheme 'relaxed'",
-        )
     raise UsageError(f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES]))
 
 

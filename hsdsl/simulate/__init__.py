@@ -2,6 +2,10 @@
 
 ==================  ===========================================================================================
 `relaxed`           the loop: step, strip, reset (Fig. 12)
+`located`           the other loop: step, crossing, reset (Fig. 8)
+`spans`             its steps, with states and surfaces as polynomials along them
+`along`, `isolate`  surfaces along a step; where polynomials change sign
+`rest`, `tails`     rest on a guard, and Zeno tails that end in it (M11)
 `entry`             entering a mode: transitions that fire at once
 `surfaces`          round-off, depth, and where a step crossed a surface
 `control`           the step size
@@ -36,6 +40,7 @@ from hsdsl.simulate.chunks import execution_columns, transitions_of
 from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.entry import enter
+from hsdsl.simulate.located import located
 from hsdsl.simulate.paoli_schatzman import NOTES, paoli_schatzman
 from hsdsl.simulate.recorder import Progress, Recorder
 from hsdsl.simulate.relaxed import relaxed
@@ -44,7 +49,11 @@ from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted, show
 from hsdsl.simulate.timeline import make_timeline
 
-SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {"relaxed": relaxed, "paoli-schatzman": paoli_schatzman}
+SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {
+    "relaxed": relaxed,
+    "located": located,
+    "paoli-schatzman": paoli_schatzman,
+}
 
 __all__ = ["SCHEMES", "Settings", "simulate"]
 
@@ -133,7 +142,7 @@ def _execution(
         stop=stop,
         transitions=tuple(transitions),
         final=final,
-        verdict=verdict(transitions) if settings.one_stop is None else Verdict("unknown", NOTES),
+        verdict=verdict(transitions, run.recorder) if settings.one_stop is None else Verdict("unknown", NOTES),
         output_function=partial(output_values, run),
         output_names=program.outputs,
         seconds={"simulate": seconds},
@@ -163,9 +172,11 @@ def described(settings: Settings) -> dict[str, Any]:
     }
 
 
-def verdict(transitions: Sequence[Transition]) -> Verdict:
-    """Say what is known of the theorem's hypotheses for this run: nothing checks them yet, and it says so."""
-    reasons = ["nothing checks yet whether the theorem's hypotheses hold for this run"]
+def verdict(transitions: Sequence[Transition], recorder: Recorder) -> Verdict:
+    """Say what is known of the theorem's hypotheses for this run: what nothing checks yet is said."""
+    if recorder.departures:
+        return Verdict("left", (*recorder.departures, *recorder.doubts))
+    reasons = [*recorder.doubts, "nothing checks yet whether the theorem's hypotheses hold for this run"]
     at_once = [t for t in transitions if t.entry]
     if at_once:
         first = at_once[0]

@@ -24,8 +24,12 @@ def enter(
     x: State,
     scale: State,
     before: Here | None = None,
+    since: Number = 0,
 ) -> Here | Stop:
-    """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops."""
+    """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops.
+
+    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point.
+    """
     visited: set[tuple[int, State]] = set()
     while True:
         here = run.place(mode, states, t, x, scale, before)
@@ -37,7 +41,7 @@ def enter(
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
-            outside = here.surfaces.enter(t, x, values)
+            outside = here.surfaces.enter(t, x, values, since)
         except DOMAIN_ERRORS:
             return not_finite(run, here, t, (x,))
         if not finite:

@@ -60,6 +60,8 @@ class Recorder:
     output_count: int
     arcs: list[OpenArc] = field(default_factory=list[OpenArc])
     transitions: list[Transition] = field(default_factory=list[Transition])
+    departures: list[str] = field(default_factory=list[str])  # where the run left what the theorem is about, and why
+    doubts: list[str] = field(default_factory=list[str])  # what could not be checked, and where
 
     @property
     def now(self) -> Number:

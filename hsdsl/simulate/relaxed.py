@@ -161,13 +161,9 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
 
 def at_boundary(run: Run, here: Here) -> Here | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
-    t, x, until = here.t, here.x, run.settings.until
-    mode = run.program.modes.index(here.mode)
-    if t < until:
-        scale = here.surfaces.scale
-        if run.timeline.at(t).jump:
-            return enter(run, mode, here.mode.states, t, x, scale)
-        return run.place(mode, here.mode.states, t, x, scale, stood_on=here.surfaces.stood_on)
+    if here.t < run.settings.until:
+        return go_on(run, here)
+    t, x = here.t, here.x
     standing = standing_on(run, here)
     if standing and (stop := run.limit_reached(t)):
         return stop
@@ -177,6 +173,14 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
         run.record(here, chosen, None, None, alternatives)
         return reached_in_strip(t, here.mode.edges[chosen.edge].name, on_guard=True)
     return reached(t)
+
+
+def go_on(run: Run, here: Here) -> Here | Stop:
+    """Enter the next segment of the inputs: anew where one of them jumps."""
+    t, x, mode, surfaces = here.t, here.x, run.program.modes.index(here.mode), here.surfaces
+    if run.timeline.at(t).jump:
+        return enter(run, mode, here.mode.states, t, x, surfaces.scale)
+    return run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:

@@ -137,11 +137,16 @@ class Surfaces:
         scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
         return roundoff(unit, magnitude, gradient, x, scale)
 
-    def enter(self, t: Number, x: State, values: Vector) -> list[int]:
-        """Look at the surfaces on entry: return those the state is beyond, and note those it stands on."""
+    def enter(self, t: Number, x: State, values: Vector, since: Number = 0) -> list[int]:
+        """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.
+
+        A surface that the flow passes within the time ``since`` counts as stood on.
+        """
         beyond: list[int] = []
         for k, r in enumerate(values):
             noise = self.noise(k, t, x, entry=True)
+            if since and abs(r) > noise:
+                noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
             if r > noise:
                 beyond.append(k)
             elif r >= -noise:

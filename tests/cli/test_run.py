@@ -99,7 +99,7 @@ USAGE = {
     "step and tolerance": (["--step", "1", "--tolerance", "1"], "exclude"),
     "method": (["--method", "tsit6"], "no method"),
     "fixed method": (["--method", "rk4"], "cannot keep a tolerance"),
-    "scheme": (["--scheme", "located"], "not built yet"),
+    "scheme": (["--scheme", "locate"], "no scheme 'locate'"),
     "no method": (["--scheme", "paoli-schatzman", "--step", "1e-3", "--method", "rk4"], "no method"),
     "engine": (["--engine", "fortran"], "no engine 'fortran'"),
     "engine c with digits": (["--engine", "c", "--precision", "30"], "float64 only"),

@@ -41,7 +41,6 @@ REFUSED = {
     "file against itself": (({"method": "rk4", "tolerance": 1}, {}, {}), "cannot keep a tolerance"),
     "unknown method": (({}, {}, {"method": "rk5"}), "no method 'rk5'"),
     "unknown scheme": (({}, {}, {"scheme": "relax"}), "no scheme 'relax'"),
-    "scheme to come": (({}, {}, {"scheme": "located"}), "not built yet"),
     "own formula, explicit method": (({"step": 1}, {}, {**OWN, "method": "rk4"}), "no method"),
     "own formula, --set method": (({**OWN, "step": 1}, {"method": "rk4"}, {}), "no method"),
     "own formula, explicit relaxation": (({"step": 1}, {}, {**OWN, "relaxation": 1}), "no relaxation"),

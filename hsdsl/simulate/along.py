@@ -1,0 +1,152 @@
+"""Surfaces along one step, as polynomials of the share s of the step: what crossings are isolated on.
+
+With a Taylor method they are the surface's own series, if it is smooth. Otherwise the surface is interpolated on the
+step's dense output, at equidistant nodes, and held against itself between them: where that residual is too large the
+piece is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.simulate.isolate import Coefficients, last_root, rises, value
+
+LEAST_DEGREE = 4
+MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
+FAR = 16  # residuals: a surface this far from zero at all nodes has no root between them
+ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
+Function = Callable[[Number], Number]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A surface on the part [start, start + width] of a step, by powers of the share of that part.
+
+    ``certain`` is False where the surface would not settle on a polynomial (a kink or jump inside a tiny part).
+    """
+
+    start: Number
+    width: Number
+    coefficients: Coefficients
+    certain: bool = True
+
+
+@dataclass(frozen=True)
+class Rise:
+    """Where a surface rises above its level: the root before it, its slope there, by the share of the step."""
+
+    share: Number
+    slope: Number
+    certain: bool
+
+
+def deflated(pieces: list[Piece]) -> list[Piece]:
+    """Take the first piece to begin at zero: the state stands on the surface, to round-off."""
+    first = pieces[0]
+    zero = first.coefficients[0] * 0
+    return [Piece(first.start, first.width, [zero, *first.coefficients[1:]], first.certain), *pieces[1:]]
+
+
+def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Number) -> Iterator[Rise]:
+    """Give the points, in order, where the surface rises through zero and goes on above its level.
+
+    A surface that begins above its level counts from where it has come back to zero. One that begins within it and
+    rises without a root crosses where it begins. ``risen`` says that it is above
+    round-off at the end of the step: then it has crossed by then, so that no later step begins beyond it.
+    """
+    outside = pieces[0].coefficients[0] > level
+    for piece in pieces:
+        c, at = piece.coefficients, piece.start * 0
+        above = max(level, ROUNDING * unit * sum(map(abs, c)))
+        while True:
+            if outside:
+                below = rises([-a for a in c], at, at, unit)
+                if below is None:
+                    break
+                at, outside = below, False
+            high = rises(c, above, at, unit)
+            if high is None and piece is pieces[-1] and risen:
+                high = at * 0 + 1
+            if high is None:
+                break
+            root = _root(c, at, high, unit)
+            yield Rise(piece.start + root * piece.width, _slope(c, root) / piece.width, piece.certain)
+            at, outside = high, True
+
+
+def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
+    """The last root before ``end``; a series that begins with zero has it taken out, so that tiny roots stay exact."""
+    if start == 0 and c[0] == 0 and len(c) > 1:
+        return last_root(c[1:], start, end, unit) or start
+    root = last_root(c, start, end, unit)
+    return start if root is None else root
+
+
+def _slope(c: Coefficients, s: Number) -> Number:
+    total = s * 0
+    for k in range(len(c) - 1, 0, -1):
+        total = k * c[k] + s * total
+    return total
+
+
+def interpolated(
+    functions: Callable[[Number], Sequence[Number]],
+    count: int,
+    degree: int,
+    allowed: Sequence[Number],
+    share: Number,
+    arithmetic: Arithmetic,
+) -> list[list[Piece]]:
+    """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``allowed`` or
+    ``share`` of their largest value.
+    """
+    degree = max(LEAST_DEGREE, degree)
+    nodes = [arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1)]
+    tests = [arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1)]
+    matrix = _to_powers(degree, arithmetic)
+    zero = arithmetic.zero
+    parts: list[tuple[Number, Number, int]] = [(zero, zero + 1, 0)]
+    found: list[list[Piece]] = [[] for _ in range(count)]
+    while parts and count:
+        start, width, halvings = parts.pop()
+        rows = list(zip(*(functions(start + width * s) for s in nodes), strict=True))
+        checks = list(zip(*(functions(start + width * s) for s in tests), strict=True))
+        pieces = [[sum((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
+        settled = [
+            _settled(max(abs(value(c, s) - w) for s, w in zip(tests, check, strict=True)), row, limit, share)
+            for c, row, check, limit in zip(pieces, rows, checks, allowed, strict=True)
+        ]
+        if not all(settled) and halvings < MOST_HALVINGS:
+            half = width / 2
+            parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]
+            continue
+        for k, row in enumerate(rows):
+            c = pieces[k] if settled[k] else [row[0], row[-1] - row[0]]
+            found[k].append(Piece(start, width, c, settled[k]))
+    return found
+
+
+def _settled(residual: Number, row: Sequence[Number], allowed: Number, share: Number) -> bool:
+    """Whether a residual is small enough, or the surface too far from zero for it to matter."""
+    return bool(
+        residual <= allowed + share * max(map(abs, row)) or max(row) < -FAR * residual or min(row) > FAR * residual
+    )
+
+
+@cache
+def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...], ...]:
+    """The matrix from values at i/degree to coefficients of powers, solved in fractions."""
+    columns: list[list[Fraction]] = []
+    for i in range(degree + 1):
+        c = [Fraction(1)]
+        for j in range(degree + 1):
+            if j != i:
+                scale = Fraction(i - j, degree)
+                shifted, kept = [Fraction(0), *c], [*c, Fraction(0)]
+                c = [(a - Fraction(j, degree) * b) / scale for a, b in zip(shifted, kept, strict=True)]
+        columns.append(c)
+    return tuple(tuple(arithmetic.constant(c[k]) for c in columns) for k in range(degree + 1))

@@ -1,0 +1,140 @@
+"""Where polynomials change sign on [0, 1], with the Bernstein form as the certificate.
+
+A polynomial's Bernstein coefficients on an interval enclose its values there, and it has at most as many roots inside
+as they have changes of sign, and as many up to an even number (Descartes' rule). An interval is cut until these decide;
+no root between two samples can be missed. See R. T. Farouki, The Bernstein polynomial basis: a centennial
+retrospective, Computer Aided Geometric Design 29, 2012 (doi:10.1016/j.cagd.2012.03.001).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+from math import comb
+
+from hsdsl.arithmetic import Number
+
+Coefficients = Sequence[Number]  # of 1, s, s**2, ...
+MOST_REFINEMENTS = 300
+
+
+@cache
+def _weights(degree: int) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """For each Bernstein coefficient i the quotients C(i, k) / C(degree, k), k = 0 to i."""
+    return tuple(tuple((comb(i, k), comb(degree, k)) for k in range(i + 1)) for i in range(degree + 1))
+
+
+def bernstein(c: Coefficients) -> list[Number]:
+    """Return the Bernstein coefficients on [0, 1] of c_0 + c_1 s + ..."""
+    found: list[Number] = []
+    for row in _weights(len(c) - 1):
+        total = c[0]
+        for k in range(1, len(row)):
+            total = total + c[k] * row[k][0] / row[k][1]
+        found.append(total)
+    return found
+
+
+def split(b: list[Number], s: Number) -> tuple[list[Number], list[Number]]:
+    """Cut an interval at the share s: Bernstein coefficients on both parts (de Casteljau)."""
+    left, right, row = [b[0]], [b[-1]], b
+    rest = 1 - s
+    while len(row) > 1:
+        row = [rest * a + s * c for a, c in pairwise(row)]
+        left.append(row[0])
+        right.append(row[-1])
+    right.reverse()
+    return left, right
+
+
+def value(c: Coefficients, s: Number) -> Number:
+    """Evaluate c_0 + c_1 s + ... (Horner)."""
+    total = c[-1]
+    for k in range(len(c) - 2, -1, -1):
+        total = c[k] + s * total
+    return total
+
+
+def changes(b: list[Number]) -> int:
+    """Count the changes of sign of a list of numbers, zeros left out."""
+    signs = [x > 0 for x in b if x != 0]
+    return sum(one != two for one, two in pairwise(signs))
+
+
+def rises(c: Coefficients, level: Number, start: Number, tiny: Number) -> Number | None:
+    """Find a point from ``start`` on where the polynomial is above ``level``, not having come back down before it.
+
+    None where it is nowhere above, up to intervals shorter than ``tiny``.
+    """
+    if c[0] + sum(a for a in c[1:] if a > 0) <= level:
+        return None
+    b = [x - level for x in bernstein(c)]
+    if max(b) <= 0:
+        return None
+    pieces = [((split(b, start)[1] if start > 0 else b), start, start * 0 + 1)]
+    while pieces:
+        b, low, high = pieces.pop()
+        if max(b) <= 0:
+            continue
+        if b[0] > 0:
+            return low
+        if b[-1] > 0 and (changes(b) == 1 or high - low <= tiny):
+            return high
+        if high - low > tiny:
+            left, right = split(b, (low * 0 + 1) / 2)
+            middle = (low + high) / 2
+            pieces += [(right, middle, high), (left, low, middle)]
+    return None
+
+
+def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Number | None:
+    """Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at ``end``.
+
+    None where it is positive all the way.
+    """
+    one = end * 0 + 1
+    b = bernstein(c)
+    if end < 1:
+        b = split(b, end)[0]
+    if start > 0:
+        b = split(b, start / end)[1]
+    pieces = [(b, start, end)]
+    while pieces:
+        b, low, high = pieces.pop()
+        if min(b) > 0:
+            continue
+        if b[0] <= 0 < b[-1] and changes(b) <= 1:
+            return _refined(c, low, high)
+        if high - low <= tiny:
+            return low
+        left, right = split(b, one / 2)
+        middle = (low + high) / 2
+        pieces += [(left, low, middle), (right, middle, high)]
+    return None
+
+
+def _refined(c: Coefficients, a: Number, b: Number) -> Number:
+    """Close a bracket P(a) <= 0 < P(b) of one root to the last bits (Illinois; bisection where that creeps)."""
+    fa, fb = value(c, a), value(c, b)
+    if not fa < 0:
+        return a
+    if not fb > 0:
+        return b
+    weight_a, weight_b, side = fa, fb, 0
+    for count in range(MOST_REFINEMENTS):
+        s = a - weight_a * (b - a) / (weight_b - weight_a)
+        if not a < s < b or count % 8 == 7:
+            s = (a + b) / 2
+            if not a < s < b:
+                break
+        f = value(c, s)
+        if f == 0:
+            return s
+        if f < 0:
+            weight_b = weight_b / 2 if side < 0 else weight_b
+            a, weight_a, side = s, f, -1
+        else:
+            weight_a = weight_a / 2 if side > 0 else weight_a
+            b, weight_b, side = s, f, 1
+    return a

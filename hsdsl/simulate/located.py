@@ -1,0 +1,207 @@
+"""The located scheme: the execution itself, its transitions at the crossings (Burden et al. 2013, Fig. 8, Sec. IV-A).
+
+A step is as long as its error allows. Every crossing of every surface inside it is isolated on the surface's own
+polynomial; the earliest goes, at its own instant, and flow goes on from its reset. A cascade at one instant costs no
+time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in a strip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Stop
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.along import Rise, deflated, rises_along
+from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
+from hsdsl.simulate.rest import hold, rests
+from hsdsl.simulate.run import Here, Run, choose, reset
+from hsdsl.simulate.spans import Span, stepping
+from hsdsl.simulate.stops import reached, reached_in_strip, show
+from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
+from hsdsl.simulate.tails import close_tail, contraction
+
+FREE = 16  # transitions within the relaxation that cost no time
+MOST_CORRECTIONS = 8
+
+
+def located(run: Run, here: Here | Stop) -> Stop:
+    """Follow the execution from ``here`` until it stops."""
+    while not isinstance(here, Stop):
+        if (edge := rests(run, here)) is not None:
+            here = hold(run, here, edge)
+        outcome = flow(run, here) if here.t < here.segment.end else here
+        if isinstance(outcome, Landing):
+            here = jump(run, here, outcome)
+        elif isinstance(outcome, Here):
+            here = at_boundary(run, outcome)
+        else:
+            here = outcome
+    return here
+
+
+def flow(run: Run, here: Here) -> Landing | Here | Stop:
+    """Step until a surface is crossed, or to the segment's end."""
+    t, x, limit, arc, steps = here.t, here.x, here.segment.end, here.arc, stepping(run, here)
+    before: Span | None = None
+    while t < limit:
+        span = steps.next(t, x, limit)
+        if isinstance(span, Obstacle):
+            return stuck(run, here.moved(t, x), span)
+        try:
+            if event := first_event(run, here, before, span):
+                return event
+        except DOMAIN_ERRORS:
+            return not_finite(run, here.moved(t, x), t, (x, span.z))
+        if here.surfaces.stood_on:
+            here.surfaces.leave(span.t1, span.z)
+        arc.append(span.t1, span.z, span.piece)
+        t, x, before = span.t1, span.z, span
+    return here.moved(t, x)
+
+
+def first_event(run: Run, here: Here, before: Span | None, span: Span) -> Landing | Stop | None:
+    """Say what happens first along a step: a guard, a wall with no guard on it, or nothing."""
+    edges = len(here.mode.edges)
+    found = [c for k in range(len(span.curves)) if (c := first_crossing(run, here, span, k))]
+    guards, walls = [c for c in found if c.edge < edges], [c for c in found if c.edge >= edges]
+    wall = min(walls, key=lambda c: c.time, default=None)
+    if wall and not any(c.time <= wall.time + run.tie(wall.time) for c in guards):
+        standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
+        if not standing:
+            write(here, span, wall)
+            return left_domain(here, wall.edge, wall.time, "leaves it, and no transition is possible there")
+        guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
+    if not guards:
+        return None
+    chosen, alternatives = choose(here, guards, run)
+    write(here, span, chosen)
+    return Landing(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
+
+
+def largest(here: Here, before: Span | None, span: Span, crossing: Crossing) -> State:
+    """The sizes of the numbers behind a crossing's state: the terms of its step and of the one before."""
+    found = tuple(map(max, sizes(span.x, crossing.state, here), span.sizes(crossing.theta)))
+    if before is not None:
+        found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
+    if crossing.edge in here.surfaces.stood_on:  # it is off the surface by as much as the state was that it came from
+        found = tuple(map(max, found, here.surfaces.scale))
+    return found
+
+
+def write(here: Here, span: Span, crossing: Crossing) -> None:
+    """Record the part of a step that leads to a crossing."""
+    if crossing.theta > 0:
+        here.arc.append(crossing.time, crossing.state, span.cut(crossing.theta))
+
+
+def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
+    """Find the first point of a step where surface k is crossed and its condition holds."""
+    zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
+    if span.ends[k] <= 0 and all(
+        p.coefficients[0] + sum(a for a in p.coefficients[1:] if a > 0) <= 0 for p in span.curves[k]
+    ):
+        return None
+    stands = k in surfaces.stood_on
+    first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
+    pieces = deflated(span.curves[k]) if stands else span.curves[k]
+    for rise in rises_along(pieces, max(first, last), span.ends[k] > last, unit):
+        theta, time, q = settled(here, span, k, rise)
+        if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
+            if not rise.certain:
+                run.recorder.doubts.append(f"a surface would not settle on a polynomial around t = {show(time)}")
+            return Crossing(k, theta, time, q, zero)
+    return None
+
+
+def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
+    """Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket."""
+    stands, s, best = k in here.surfaces.stood_on, rise.share, None
+
+    def residual(s: Number) -> tuple[Number, Number]:
+        time, q = span.point(s)
+        r = here.kernel.surfaces(time, *q)[k]
+        return r, abs(r) - here.surfaces.noise(k, time, q, entry=stands)
+
+    for _ in range(MOST_CORRECTIONS):
+        r, excess = residual(s)
+        if best is not None and not abs(r) < best[0]:
+            break
+        best = (abs(r), s)
+        if excess <= 0 or rise.slope == 0:
+            return s, *span.point(s)
+        s = min(s * 0 + 1, max(s * 0, s - r / rise.slope))
+    assert best is not None
+    s = bracketed(lambda s: residual(s)[0], best[1], here)
+    return s, *span.point(s)
+
+
+def bracketed(residual: Callable[[Number], Number], s: Number, here: Here) -> Number:
+    """Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there."""
+    unit = here.surfaces.arithmetic.unit
+    width, one = 8 * unit * max(s, unit), s * 0 + 1
+    while width < 1:
+        low, high = max(s * 0, s - width), min(one, s + width)
+        below, above = residual(low), residual(high)
+        if below < 0 and above == 0:
+            return high
+        if below <= 0 < above:
+            return close_bracket(residual, (low, below), (high, above), s * 0, unit * s)
+        width = width * 16
+    return s
+
+
+def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
+    """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
+    crossing, until = landing.crossing, run.settings.until
+    t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
+    if stop := run.limit_reached(t):
+        return stop
+    outcome, resumed = reset(here, crossing, landing.scale, run), t
+    if crowded(run, t):
+        resumed = t + run.settings.relaxation
+        if resumed > until + run.tie(until):
+            run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
+            run.record(here, crossing, None, None, landing.alternatives)
+            return reached_in_strip(until, edge.name)
+        resumed = min(resumed, until)
+    if isinstance(outcome, Stop):
+        return outcome
+    if resumed > t:
+        run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
+    after, scale = outcome
+    run.record(here, crossing, resumed, after, landing.alternatives)
+    since = run.tie(t) if landing.alternatives else run.arithmetic.zero
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since)
+    return entered if isinstance(entered, Stop) else close_tail(run, entered, crossing.edge)
+
+
+def crowded(run: Run, t: Number) -> bool:
+    """Whether as many transitions as cost no time have fallen within the relaxation, and do not run to a limit."""
+    made = run.recorder.transitions
+    return len(made) >= FREE and t - made[-FREE].time <= run.settings.relaxation and contraction(made) is None
+
+
+def at_boundary(run: Run, here: Here) -> Here | Stop:
+    """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
+    if here.t < run.settings.until:
+        return go_on(run, here)
+    standing = [] if rests(run, here) is not None else standing_on(run, here)
+    if not standing:
+        return reached(here.t)
+    chosen, alternatives = choose(here, standing, run)
+    return jump(run, here, Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
+
+
+def stuck(run: Run, here: Here, obstacle: Obstacle) -> Landing | Stop:
+    """No step is short enough: take a guard that the state stands on, or stop and say why."""
+    if obstacle.kind == "not finite" and (standing := standing_on(run, here)):
+        chosen, alternatives = choose(here, standing, run)
+        return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+    try:
+        slope = here.kernel.flow(here.t, *here.x)
+    except DOMAIN_ERRORS:
+        return not_finite(run, here, here.t, (here.x,))
+    return no_way_on(run, here, obstacle, slope)

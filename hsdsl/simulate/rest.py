@@ -1,0 +1,120 @@
+"""Rest on a guard: a state that its own reset keeps in place while the flow pushes it out (M11).
+
+At such a point q the reset is the identity, the target is the same mode, and the flow leaves the domain in the
+direction that the reset takes back, and in no other. The execution stays there until the flow no longer pushes out.
+"""
+
+from __future__ import annotations
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.along import interpolated, rises_along
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.stops import show
+
+SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
+ZERO_UNITS = 16  # of round-off: a rate that counts as zero
+PARALLEL = 1e-6
+DEGREE, SHARE, CORRECTIONS = 8, 1e-13, 8
+
+
+def rests(run: Run, here: Here) -> int | None:
+    """Return the edge on whose guard the state rests; None where it moves."""
+    if not here.surfaces.stood_on or not here.t < run.settings.until or here.mode.states != here.arc.states:
+        return None
+    mode = run.program.modes.index(here.mode)
+    for k in sorted(here.surfaces.stood_on):
+        if k < len(here.mode.edges) and here.mode.edges[k].target == mode:
+            try:
+                if stays(run, here, k) and is_pushed(run, here, k) and moves_alone(run, here, k):
+                    return k
+            except DOMAIN_ERRORS:
+                continue
+    return None
+
+
+def stays(run: Run, here: Here, k: int) -> bool:
+    """Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move."""
+    t, x, kernel = here.t, here.x, here.kernel
+    after = kernel.resets[k](t, *x)
+    still = all(abs(a - b) <= SAME_UNITS * run.arithmetic.unit * (1 + abs(b)) for a, b in zip(after, x, strict=True))
+    return still and kernel.gradients[k](t, *x)[0] == 0 and bool(kernel.conditions[k](t, *x)[0])
+
+
+def is_pushed(run: Run, here: Here, k: int) -> bool:
+    """Whether the flow leaves the domain through surface k: by its rate, or where that is zero by the next one."""
+    order = push_order(run, here, k)
+    return order is not None and push(run, here, k, order, here.t) > 0
+
+
+def push_order(run: Run, here: Here, k: int) -> int | None:
+    """Which derivative of the surface along the flow decides; None where the first one points inwards."""
+    slope, gradient = here.kernel.flow(here.t, *here.x), here.kernel.gradients[k](here.t, *here.x)
+    rate = here.kernel.rates[k](here.t, *here.x)[0]
+    size = sum((abs(g) * (1 + abs(f)) for g, f in zip(gradient[1:], slope, strict=True)), run.arithmetic.zero)
+    if abs(rate) <= ZERO_UNITS * run.arithmetic.unit * size:
+        return 2
+    return 1 if rate > 0 else None
+
+
+def push(run: Run, here: Here, k: int, order: int, t: Number) -> Number:
+    """The first or second derivative of surface k along the flow from the present state, at time t."""
+    x, kernel = here.x, here.kernel
+    if order == 1:
+        return kernel.rates[k](t, *x)[0]
+    series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
+    row = None if series is None else series.surfaces(2, series.flow(2, t, x))[k]
+    if row is not None:
+        return 2 * row[2]
+    slope = kernel.flow(t, *x)  # a kinked flow has no second derivative at hand: the rate's difference along it
+    small = run.arithmetic.sqrt(run.arithmetic.unit) / (1 + max(map(abs, slope)))
+    ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
+    return (kernel.rates[k](t + small, *ahead)[0] - kernel.rates[k](t, *x)[0]) / small
+
+
+def moves_alone(run: Run, here: Here, k: int) -> bool:
+    """Whether the flow moves the state only in the direction that the reset takes back."""
+    t, x = here.t, here.x
+    slope = here.kernel.flow(t, *x)
+    largest = max(map(abs, slope))
+    if not largest > 0:
+        return False
+    small = run.arithmetic.sqrt(run.arithmetic.unit) * (1 + max(map(abs, x))) / largest
+    ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
+    back = tuple(a - b for a, b in zip(here.kernel.resets[k](t, *ahead), ahead, strict=True))
+    along = max(range(len(slope)), key=lambda i: abs(slope[i]))
+    share = back[along] / slope[along]
+    return share < 0 and all(
+        abs(b - share * f) <= PARALLEL * abs(share) * largest for b, f in zip(back, slope, strict=True)
+    )
+
+
+def hold(run: Run, here: Here, k: int) -> Here:
+    """Stay at rest until the flow no longer pushes out, or to the end of the inputs' segment."""
+    end, order = here.segment.end, push_order(run, here, k)
+    assert order is not None
+    release = released(run, here, k, order, end)
+    edge, until = here.mode.edges[k].name, end if release is None else release
+    here.arc.append(until, here.x, (tuple(run.arithmetic.zero for _ in here.x),))
+    run.recorder.departures.append(f"at rest on the guard of {edge} from t = {show(here.t)} to t = {show(until)}")
+    if release is None:
+        return here.moved(end, here.x)
+    mode = run.program.modes.index(here.mode)
+    return run.place(mode, here.mode.states, until, here.x, here.surfaces.scale, stood_on={k})
+
+
+def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | None:
+    """When the push falls through zero: isolated on an interpolant over time, then solved on the push itself."""
+    t, span = here.t, end - here.t
+
+    def inward(s: Number) -> State:
+        return (-push(run, here, k, order, t + s * span),)
+
+    pieces = interpolated(inward, 1, DEGREE, (run.arithmetic.zero,), SHARE, run.arithmetic)[0]
+    rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
+    if rise is None:
+        return None
+    s = rise.share
+    for _ in range(CORRECTIONS):
+        s = min(s * 0 + 1, max(s * 0, s - inward(s)[0] / rise.slope)) if rise.slope != 0 else s
+    return t + s * span

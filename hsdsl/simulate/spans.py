@@ -1,0 +1,264 @@
+"""One accepted step of the located scheme, with what happens along it: states and surfaces as polynomials.
+
+A step is bounded by its error alone; where surfaces are crossed inside is asked afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import log2
+from typing import Protocol
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.integrators import TaylorMethod
+from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
+from hsdsl.integrators.taylor import proposed_step
+from hsdsl.kernel import Series, Taylor
+from hsdsl.simulate.along import Piece, interpolated
+from hsdsl.simulate.isolate import value
+from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.surfaces import Obstacle, at, shortened
+
+RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
+UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
+DEGREE = 8  # of the interpolation of a surface along a Taylor step
+
+
+@dataclass(frozen=True)
+class Span:
+    """A step from (t, x) to (t1, z).
+
+    ``curves`` has the pieces of each surface and ``ends`` its value at z. ``point(s)`` is the time and state at the
+    share s of the step, ``cut(s)`` the interpolant of the states up to there, over [0, 1], and ``sizes(s)`` the sums of
+    the absolute terms that the state there is computed from.
+    """
+
+    t: Number
+    h: Number
+    t1: Number
+    x: State
+    z: State
+    piece: Polynomial
+    curves: list[list[Piece]]
+    ends: State
+    point: Callable[[Number], tuple[Number, State]]
+    cut: Callable[[Number], Polynomial]
+    sizes: Callable[[Number], State]
+
+
+class Stepping(Protocol):
+    """What makes steps in one mode, on one segment of the inputs."""
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+        """Make one step that the error allows, not beyond ``limit``; or say what stands in the way."""
+        ...
+
+
+def stepping(run: Run, here: Here) -> Stepping:
+    """Choose by the method."""
+    if isinstance(run.settings.method, TaylorMethod):
+        series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
+        assert series is not None
+        return SeriesSteps(run, here, run.settings.method, series)
+    return TableSteps(run, here, run.stepper(here))
+
+
+@dataclass
+class TableSteps:
+    """Steps of a Runge-Kutta method; surfaces are interpolated on its dense output.
+
+    A crossing's state is that of a step of the method that ends there, which is as accurate as any of its steps.
+    """
+
+    run: Run
+    here: Here
+    method: Stepper
+    slope: State | None = None
+    at_time: Number = None
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+        """Make one step: rejected by the error estimate, halved where something has no value."""
+        control, flow, halvings = self.run.control, self.here.kernel.flow, 0
+        try:
+            slope = self.slope if self.slope is not None and self.at_time == t else flow(t, *x)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        h = control.h
+        while True:
+            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
+            if isinstance(tried, tuple):
+                ratio, span = tried
+                if control.tolerance is not None and halvings == 0:
+                    control.accept(h, ratio)
+                return span
+            if tried is TOO_WRONG and halvings == 0:
+                control.reject(h, self._ratio)
+                h = control.h
+            else:
+                h, halvings = h / 2, halvings + 1
+            if halvings > most_halvings(self.run) or not t + h > t or control.struggles:
+                return tried
+
+    _ratio: Number = 1
+
+    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | Obstacle:
+        flow, method, control = self.here.kernel.flow, self.method, self.run.control
+        try:
+            z, stages = method.step(flow, t, h, x, slope)
+            end = flow(t1, *z)
+            if not self.run.arithmetic.isfinite(sum(z) + sum(end)):
+                return NOT_FINITE
+            if control.tolerance is not None and method.error is not None:
+                self._ratio = control.ratio(method.error(h, stages, end), x, z)
+                if not self._ratio <= 1:
+                    return TOO_WRONG
+            piece = method.piece(flow, t, h, x, z, stages, slope, end)
+            curves = interpolate(self.run, self.here, t, h, x, z, piece, max(4, len(piece)))
+            ends = self.here.kernel.surfaces(t1, *z)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        self.slope, self.at_time = end, t1
+
+        def point(s: Number) -> tuple[Number, State]:
+            return (t1, z) if s == 1 else (t + s * h, method.step(flow, t, s * h, x, slope)[0] if s > 0 else x)
+
+        def cut(s: Number) -> Polynomial:
+            try:
+                q, shorter = method.step(flow, t, s * h, x, slope)
+                return method.piece(flow, t, s * h, x, q, shorter, slope, flow(t + s * h, *q))
+            except DOMAIN_ERRORS:
+                return shortened(piece, s)
+
+        def sizes(s: Number) -> State:
+            largest = (max(map(abs, column)) for column in zip(*stages, strict=True))
+            return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
+
+        return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
+
+
+@dataclass
+class SeriesSteps:
+    """Steps of Taylor's method; smooth surfaces have series of their own."""
+
+    run: Run
+    here: Here
+    method: TaylorMethod
+    series: Taylor
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+        """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
+        run, order = self.run, self.method.order
+        try:
+            lines = self.series.flow(order, t, x)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        stages = tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
+        h = self._longest(stages, x)
+        for _ in range(most_halvings(run)):
+            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            if not t1 > t:
+                break
+            tried = self._try(t, h, t1, x, stages, lines)
+            if isinstance(tried, Span):
+                return tried
+            h = h / 2
+        return NOT_FINITE
+
+    def _longest(self, stages: Stages, x: State) -> Number:
+        control = self.run.control
+        if control.tolerance is None:
+            return control.h
+        proposed = proposed_step(stages, x, max(control.tolerance, self.run.arithmetic.unit), self.run.arithmetic)
+        return control.largest if proposed is None else min(control.largest, proposed)
+
+    def _try(
+        self, t: Number, h: Number, t1: Number, x: State, stages: Stages, lines: tuple[Series, ...]
+    ) -> Span | Obstacle:
+        run, here, power, parts = self.run, self.here, self.run.arithmetic.zero + 1, list[State]()
+        for c in stages[:-1]:
+            power = power * h
+            parts.append(tuple(a * power for a in c))
+        piece = tuple(parts)
+        z = at(x, piece, run.arithmetic.zero + 1)
+        try:
+            end = here.kernel.flow(t1, *z)
+            if not run.arithmetic.isfinite(sum(z) + sum(end)):
+                return NOT_FINITE
+            method = run.stepper(here)
+            assert method.error is not None
+            tolerance = run.control.tolerance
+            if tolerance is not None and run.control.ratio(method.error(h, stages, end), x, z) > max(
+                1, 64 * run.arithmetic.unit / tolerance
+            ):
+                return TOO_WRONG
+            ends = here.kernel.surfaces(t1, *z)
+            curves = self._curves(t, h, t1, x, z, piece, lines, ends)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+
+        def point(s: Number) -> tuple[Number, State]:
+            return (t1, z) if s == 1 else (t + s * h, at(x, piece, s) if s > 0 else x)
+
+        def sizes(s: Number) -> State:
+            return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
+
+        return Span(t, h, t1, x, z, piece, curves, ends, point, lambda s: shortened(piece, s), sizes)
+
+    def _curves(
+        self,
+        t: Number,
+        h: Number,
+        t1: Number,
+        x: State,
+        z: State,
+        piece: Polynomial,
+        lines: tuple[Series, ...],
+        ends: State,
+    ) -> list[list[Piece]]:
+        """The surfaces' series where they meet the surfaces at the step's end, interpolation for the others."""
+        run, here = self.run, self.here
+        starts, zero = here.kernel.surfaces(t, *x), run.arithmetic.zero
+        if not ends:
+            return []
+        try:
+            found = self.series.surfaces(self.method.order, lines)
+        except DOMAIN_ERRORS:
+            found = tuple(None for _ in ends)
+        curves: list[list[Piece]] = []
+        for k, (row, end) in enumerate(zip(found, ends, strict=True)):
+            scaled, power = list[Number](), zero + 1
+            for c in row or ():
+                scaled.append(c * power)
+                power = power * h
+            allowed = 4 * here.surfaces.noise(k, t1, z) + share(run) * sum(map(abs, scaled))
+            if not scaled or not abs(value(scaled, zero + 1) - end) <= allowed:
+                return interpolate(run, here, t, h, x, z, piece, DEGREE)
+            curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
+        return curves
+
+
+def interpolate(
+    run: Run, here: Here, t: Number, h: Number, x: State, z: State, piece: Polynomial, degree: int
+) -> list[list[Piece]]:
+    """Interpolate all surfaces along a step's interpolant."""
+    surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
+    allowed = [max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z)) for k in range(count)]
+
+    def values(s: Number) -> State:
+        return surfaces(t + s * h, *at(x, piece, s))
+
+    return interpolated(values, count, degree, allowed, share(run), run.arithmetic)
+
+
+def share(run: Run) -> Number:
+    """How far a surface may be off its polynomial, relative to its own size along a step."""
+    tolerance = run.control.tolerance
+    return max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
+
+
+def most_halvings(run: Run) -> int:
+    """Enough to go from any step to round-off of it."""
+    return 16 - 2 * int(log2(run.arithmetic.unit))

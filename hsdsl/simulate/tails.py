@@ -1,0 +1,86 @@
+"""Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
+
+Flights T_n of one edge that leads back to its own mode shrink by the ratio q at least; what is left is then at most
+T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Stop, Transition
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.rest import is_pushed, moves_alone, stays
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.stops import show
+
+LEAST_FLIGHTS = 3
+MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
+
+
+def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
+    """Return the last flight and the largest ratio of the last few, if one edge's flights shrink; else None."""
+    last = made[-LEAST_FLIGHTS - 1 :]
+    if len(last) <= LEAST_FLIGHTS or any(t.edge != last[0].edge or t.source != t.target or t.entry for t in last):
+        return None
+    flights = [b.time - a.time for a, b in pairwise(last)]
+    if not flights[-1] > 0:
+        return None
+    ratios = [b / a for a, b in pairwise(flights) if a > 0]
+    return (flights[-1], max(ratios)) if max(ratios) < 1 else None
+
+
+def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
+    """Go to the limit of a tail that is nearly over; stop at one where more than the impacts goes on."""
+    made = run.recorder.transitions
+    found = contraction(made)
+    if found is None or here.mode.states != here.arc.states:
+        return here
+    flight, ratio = found
+    left = flight * ratio / (1 - ratio)
+    end = here.t + left
+    if left > run.settings.relaxation or end > here.segment.end:
+        return here
+    try:
+        q = fixed_point(run, here, k, end)
+        if q is None:
+            return here
+        limit = here.moved(end, q)
+        if not is_pushed(run, limit, k) or not stays(run, limit, k):
+            return here
+        alone = moves_alone(run, limit, k)
+    except DOMAIN_ERRORS:
+        return here
+    edge = here.mode.edges[k].name
+    if not alone:
+        sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
+        run.recorder.departures.append(f"Zeno at t = {show(end)}: {sentence}")
+        return Stop("zeno", here.t, sentence)
+    run.recorder.departures.append(
+        f"Zeno at t = {show(end)}: the transitions of {edge} after number {len(made) - 1}, all within {show(left)} "
+        "of each other, are replaced by their limit"
+    )
+    here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
+    mode = run.program.modes.index(here.mode)
+    return run.place(mode, here.mode.states, end, q, here.surfaces.scale, stood_on={k})
+
+
+def fixed_point(run: Run, here: Here, k: int, t: Number) -> State | None:
+    """The point on the guard that repeated resets run to (Aitken's acceleration, by component)."""
+    reset, x = here.kernel.resets[k], here.x
+    for _ in range(MOST_ROUNDS):
+        one = reset(t, *x)
+        if one == x:
+            break
+        two = reset(t, *one)
+        x = tuple(map(_accelerated, x, one, two))
+    if abs(here.kernel.surfaces(t, *x)[k]) > here.surfaces.noise(k, t, x, entry=True):
+        return None
+    return x
+
+
+def _accelerated(a: Number, b: Number, c: Number) -> Number:
+    bend = c - 2 * b + a
+    return a - (b - a) * (b - a) / bend if bend != 0 else c
