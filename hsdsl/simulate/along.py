@@ -133,7 +133,9 @@ def interpolated(
 def _settled(residual: Number, row: Sequence[Number], allowed: Number, share: Number) -> bool:
     """Whether a residual is small enough, or the surface too far from zero for it to matter."""
     return bool(
-        residual <= allowed + share * max(map(abs, row)) or max(row) < -FAR * residual or min(row) > FAR * residual
+        residual <= allowed + share * max(abs(r) for r in row)
+        or max(row) < -FAR * residual
+        or min(row) > FAR * residual
     )
 
 

@@ -38,7 +38,8 @@ def bernstein(c: Coefficients) -> list[Number]:
 
 def split(b: list[Number], s: Number) -> tuple[list[Number], list[Number]]:
     """Cut an interval at the share s: Bernstein coefficients on both parts (de Casteljau)."""
-    left, right, row = [b[0]], [b[-1]], b
+    left, right = [b[0]], [b[-1]]
+    row: list[Number] = b
     rest = 1 - s
     while len(row) > 1:
         row = [rest * a + s * c for a, c in pairwise(row)]

@@ -67,7 +67,7 @@ def push(run: Run, here: Here, k: int, order: int, t: Number) -> Number:
     if row is not None:
         return 2 * row[2]
     slope = kernel.flow(t, *x)  # a kinked flow has no second derivative at hand: the rate's difference along it
-    small = run.arithmetic.sqrt(run.arithmetic.unit) / (1 + max(map(abs, slope)))
+    small: Number = run.arithmetic.sqrt(run.arithmetic.unit) / (1 + greatest(slope))
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     return (kernel.rates[k](t + small, *ahead)[0] - kernel.rates[k](t, *x)[0]) / small
 
@@ -76,17 +76,22 @@ def moves_alone(run: Run, here: Here, k: int) -> bool:
     """Whether the flow moves the state only in the direction that the reset takes back."""
     t, x = here.t, here.x
     slope = here.kernel.flow(t, *x)
-    largest = max(map(abs, slope))
+    largest = greatest(slope)
     if not largest > 0:
         return False
-    small = run.arithmetic.sqrt(run.arithmetic.unit) * (1 + max(map(abs, x))) / largest
+    small: Number = run.arithmetic.sqrt(run.arithmetic.unit) * (1 + greatest(x)) / largest
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     back = tuple(a - b for a, b in zip(here.kernel.resets[k](t, *ahead), ahead, strict=True))
     along = max(range(len(slope)), key=lambda i: abs(slope[i]))
-    share = back[along] / slope[along]
+    share: Number = back[along] / slope[along]
     return share < 0 and all(
         abs(b - share * f) <= PARALLEL * abs(share) * largest for b, f in zip(back, slope, strict=True)
     )
+
+
+def greatest(x: State) -> Number:
+    """The largest absolute value."""
+    return max(abs(a) for a in x)
 
 
 def hold(run: Run, here: Here, k: int) -> Here:

@@ -133,7 +133,7 @@ class TableSteps:
                 return shortened(piece, s)
 
         def sizes(s: Number) -> State:
-            largest = (max(map(abs, column)) for column in zip(*stages, strict=True))
+            largest = [max(abs(k) for k in column) for column in zip(*stages, strict=True)]
             return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
 
         return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
