@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from hsdsl import __version__
+from hsdsl.cli.chart import chart
 from hsdsl.cli.distance import distance
 from hsdsl.cli.doctor import doctor
 from hsdsl.cli.explain import explain
@@ -34,7 +35,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (run, validate, lint, explain, distance, schema, doctor):
+for verb in (run, validate, lint, explain, distance, chart, schema, doctor):
     app.command()(verb)
 
 

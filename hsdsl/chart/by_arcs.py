@@ -1,0 +1,78 @@
+"""The loop around a tool that integrates one mode and stops at its events: reset, change the mode, go on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.chart.result import Array, Result
+from hsdsl.chart.scene import Scene
+from hsdsl.chart.translation import PlainModel, as_function
+
+MOST_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class ToolArc:
+    """What a tool made of one mode.
+
+    Attributes
+    ----------
+    end, x : float, sequence of float
+        Where it stopped.
+    edge : int or None
+        The event that stopped it, None at the end of the run.
+    values : array, shape (samples in [start, end], states)
+        At those of the asked times that it got to.
+    """
+
+    end: float
+    x: Sequence[float]
+    edge: int | None
+    values: Array
+
+
+Integrate = Callable[[int, float, Sequence[float], Array, float], ToolArc]
+"""``integrate(mode, t, x, times, until)``: from t to the first event or to ``until``, sampled at ``times``."""
+
+
+def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[float], Result]:
+    """Make ``run(...)`` of one arc after the other. ``integrate`` is called as `Integrate`, after the tolerance."""
+    resets = [[as_function(mode, edge.reset) for edge in mode.edges] for mode in model.modes]
+    places = [
+        [(i, mode.states.index(name)) for i, name in enumerate(scene.states) if name in mode.states]
+        for mode in model.modes
+    ]
+    grid, until = scene.grid, float(scene.grid[-1])
+    most = 10 * len(scene.exact.transitions) + 100
+
+    def run(tolerance: float) -> Result:
+        values = np.full((len(grid), len(scene.states)), np.nan)
+        modes = np.full(len(grid), "", dtype=object)
+        t, x, k, first, count = float(grid[0]), model.x, model.start, 0, 0
+        began = time.perf_counter()
+        problem = None
+        while True:
+            mode = model.modes[k]
+            arc = integrate(tolerance, k, t, x, grid[first:], until)  # type: ignore[call-arg]
+            last = first + len(arc.values)
+            for i, j in places[k]:
+                values[first:last, i] = arc.values[:, j]
+            modes[first:last] = mode.name
+            first, t = last, arc.end
+            if arc.edge is None:
+                break
+            count += 1
+            x = resets[k][arc.edge](t, *arc.x)
+            k = mode.edges[arc.edge].target
+            if model.modes[k].final or t >= until:
+                break
+            if count > most or time.perf_counter() - began > MOST_SECONDS:
+                problem = f"gave up at t = {t:.6g} after {count} transitions"
+                break
+        return Result(values, modes, count, problem)
+
+    return run

@@ -1,0 +1,147 @@
+"""A scene: a model with its numbers, its exact execution, and the times at which errors are taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hsdsl.errors import UsageError
+from hsdsl.exact import precise, reference
+from hsdsl.execution import Execution
+from hsdsl.model import Model
+from hsdsl.names import did_you_mean
+
+Array = npt.NDArray[Any]
+DIGITS = 12  # of a reference computed by refinement, where none is known
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is charted.
+
+    Attributes
+    ----------
+    grid : array, shape (samples,)
+        Equally spaced times from 0 to the exact execution's end.
+    clear : array of bool, shape (samples,)
+        Whether a sample is so far from every jump of the exact execution that a slightly late jump changes nothing.
+    exact_values, exact_modes : array
+        The exact execution at the samples, as in `Result`.
+    countable : (float, float)
+        The fewest and the most transitions that a right answer has: those so near the end that they may be missed make
+        the difference, and past a Zeno point no number means anything.
+    """
+
+    name: str
+    model: Model
+    parameters: Mapping[str, Any]
+    initial: Mapping[str, Any]
+    exact: Execution
+    states: tuple[str, ...]
+    grid: Array
+    clear: Array
+    exact_values: Array
+    exact_modes: Array
+    countable: tuple[float, float]
+
+    @staticmethod
+    def of(
+        model: Model,
+        *,
+        block: int = 0,
+        states: Sequence[str] = (),
+        samples: int = 2000,
+        clearance: float = 1e-4,
+        exact: Execution | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+    ) -> Scene:
+        """Look a model up.
+
+        Parameters
+        ----------
+        model : Model
+            The model; its exact execution is `hsdsl.exact.reference`, or `hsdsl.exact.precise` where none is known.
+        block : int
+            Which block of its ``reference:`` section (and so which initial values).
+        states : sequence of str
+            The states whose error is taken; all unless given.
+        samples : int
+            How many sample times.
+        clearance : float
+            Samples nearer than this to a jump of the exact execution are left out of the error, in the unit of time.
+        exact : Execution, optional
+            What to compare with instead.
+        parameters, initial : mapping, optional
+            The overrides that ``exact`` was run with.
+
+        Raises
+        ------
+        UsageError
+            An unknown state, fewer than two samples, or no exact execution can be had.
+        """
+        if samples < 2:
+            raise UsageError(f"a chart takes at least 2 samples, not {samples}")
+        if exact is None:
+            exact, initial = _exact(model, block)
+        for name in states:
+            if name not in exact.states:
+                raise UsageError(f"the model has no state '{name}'", did_you_mean(name, exact.states))
+        chosen = tuple(states) or exact.states
+        start, end = (float(t) for t in exact.time_span)
+        grid = np.linspace(start, end, samples)
+        jumps = np.array([tr.time for tr in exact.transitions], dtype=float)
+        near = np.abs(grid[:, None] - jumps[None, :]).min(axis=1) if len(jumps) else np.full(samples, np.inf)
+        values, modes = sampled(exact, grid, chosen)
+        return Scene(
+            Path(model.program.path).stem + (f"-{block}" if block else ""),
+            model,
+            dict(parameters or {}),
+            dict(initial or {}),
+            exact,
+            chosen,
+            grid,
+            (near > clearance) & (grid <= end - clearance),
+            values,
+            modes,
+            _countable(exact, jumps, end - clearance),
+        )
+
+
+def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[Array, Array]:
+    """Return values of shape (samples, states) and modes of shape (samples,), NaN and empty beyond the end."""
+    values = np.full((len(grid), len(states)), np.nan)
+    modes = np.full(len(grid), "", dtype=object)
+    end = float(execution.time_span[1])
+    inside = grid <= end
+    at = execution.sample(grid[inside])
+    modes[inside] = at.mode
+    for i, name in enumerate(states):
+        if name in at.states:
+            values[inside, i] = at[name]
+    return values, modes
+
+
+def _countable(exact: Execution, jumps: Array, nearly_end: float) -> tuple[float, float]:
+    if exact.verdict.theorem == "left":
+        return 0, inf
+    return int(np.count_nonzero(jumps <= nearly_end)), len(jumps)
+
+
+def _exact(model: Model, block: int) -> tuple[Execution, dict[str, Any]]:
+    try:
+        exact = reference(model, block)
+    except UsageError:
+        if block:
+            raise
+        return precise(model, DIGITS), {}
+    if not block:
+        return exact, {}
+    first = exact.arcs[0]
+    return exact, {name: float(v) for name, v in zip(first.states, exact.values[0], strict=False)}

@@ -1,0 +1,99 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
+"""A model's mathematics as functions for another tool: parameters put in, names of the file left behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.chart.result import Refused
+from hsdsl.chart.scene import Scene
+from hsdsl.system import TIME, Edge, Mode
+
+
+@dataclass(frozen=True)
+class PlainEdge:
+    """An edge: it fires when ``guard`` rises through zero; ``reset`` gives the target's states."""
+
+    source: int
+    target: int
+    guard: sp.Expr
+    reset: tuple[sp.Expr, ...]
+
+
+@dataclass(frozen=True)
+class PlainMode:
+    """A mode over the symbols ``x0, x1, ...`` and ``t``, numbers instead of parameters."""
+
+    name: str
+    states: tuple[str, ...]
+    symbols: tuple[sp.Symbol, ...]
+    flow: tuple[sp.Expr, ...]
+    edges: tuple[PlainEdge, ...]
+    final: bool
+
+
+@dataclass(frozen=True)
+class PlainModel:
+    """A scene's model for another tool: no `if`, no sampled inputs; walls are left out, for no tool knows them."""
+
+    modes: tuple[PlainMode, ...]
+    start: int
+    x: tuple[float, ...]
+
+
+T = sp.Symbol("t", real=True)
+
+
+def translate(scene: Scene) -> PlainModel:
+    """Put numbers in for parameters and numbered symbols for states.
+
+    Raises
+    ------
+    Refused
+        The model has something that only a hybrid language says.
+    """
+    system = scene.model.system
+    if any(hasattr(signal, "times") for signal in system.inputs):
+        raise Refused("sampled inputs are not translated")
+    if any(edge.condition is not None for mode in system.modes for edge in mode.edges):
+        raise Refused("an `if` on a guard is not translated")
+    numbers: dict[sp.Symbol, Any] = {}
+    for parameter in system.parameters:
+        value = scene.parameters.get(parameter.name, parameter.value)
+        numbers[sp.Symbol(parameter.name, real=True)] = sp.Float(sp.N(sp.sympify(value).xreplace(numbers), 17))
+    index = {mode.name: k for k, mode in enumerate(system.modes)}
+    modes = tuple(_mode(mode, index, numbers) for mode in system.modes)
+    first = scene.exact.arcs[0]
+    x = tuple(float(v) for v in scene.exact.values[0][: len(first.states)])
+    return PlainModel(modes, index[first.mode], x)
+
+
+def _mode(mode: Mode, index: dict[str, int], numbers: dict[sp.Symbol, Any]) -> PlainMode:
+    symbols = tuple(sp.Symbol(f"x{i}", real=True) for i in range(len(mode.states)))
+    names = dict(zip((sp.Symbol(name, real=True) for name in mode.states), symbols, strict=True))
+
+    def plain(expression: Any) -> sp.Expr:
+        return _in_floats(sp.sympify(expression).xreplace(names | numbers | {TIME: T}))
+
+    def edge(e: Edge) -> PlainEdge:
+        return PlainEdge(index[e.source], index[e.target], plain(e.surface.residual), tuple(map(plain, e.reset)))
+
+    flow = tuple(map(plain, mode.flow))
+    return PlainMode(mode.name, mode.states, symbols, flow, tuple(map(edge, mode.edges)), mode.final)
+
+
+def _in_floats(expression: sp.Expr) -> sp.Expr:
+    """Write constants as floats, except those that are floats anyway (integer exponents, square roots)."""
+    constants = [a for a in expression.atoms(sp.Number, sp.NumberSymbol) if not a.is_Integer]
+    rounded = {a: sp.Float(a, 17) for a in constants if not (a.is_Rational and a.q & (a.q - 1) == 0)}
+    return expression.xreplace(rounded)
+
+
+def as_function(mode: PlainMode, expressions: tuple[sp.Expr, ...], modules: Any = "math") -> Callable[..., Any]:
+    """Return ``f(t, x0, x1, ...) -> tuple``; the symbols are ours, so nothing of the file is ever evaluated."""
+    return sp.lambdify((T, *mode.symbols), expressions, modules=modules, cse=True)

@@ -1,0 +1,149 @@
+"""``hsdsl chart``: speed against accuracy, ours and others'."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsdsl.cli.console import errors_reported, say
+from hsdsl.errors import UsageError
+from hsdsl.names import did_you_mean
+
+if TYPE_CHECKING:
+    from hsdsl.chart import Row
+
+Model = Annotated[list[str], typer.Argument(help="Model files; FILE:1 is the second start of its reference.")]
+
+
+def chart(
+    models: Model,
+    schemes: Annotated[str | None, typer.Option(metavar="A,B", help="Our schemes; all unless given.")] = None,
+    methods: Annotated[str | None, typer.Option(metavar="A,B", help="Our methods; all unless given.")] = None,
+    engines: Annotated[str | None, typer.Option(metavar="A,B", help="Our engines; all unless given.")] = None,
+    tolerances: Annotated[str | None, typer.Option(metavar="A,B", help="For adaptive methods and peers.")] = None,
+    steps: Annotated[str | None, typer.Option(metavar="A,B", help="For fixed-step methods.")] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."),
+    ] = None,
+    states: Annotated[str | None, typer.Option(metavar="A,B", help="Take the error of these states only.")] = None,
+    samples: Annotated[int, typer.Option(metavar="N", help="How many samples the error is taken at.")] = 2000,
+    clearance: Annotated[
+        float, typer.Option(metavar="DT", help="Samples nearer than this to an exact jump do not count.")
+    ] = 1e-4,
+    rounds: Annotated[int, typer.Option(metavar="N", help="Timed turns, after one that warms up.")] = 5,
+    patience: Annotated[float, typer.Option(metavar="S", help="Slower tools get no tighter setting.")] = 10.0,
+    rho: Annotated[bool, typer.Option("--rho/--no-rho", help="Also compute rho of our runs.")] = True,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table: .csv.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the chart: .png or .svg.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table and no progress.")] = False,
+) -> None:
+    """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
+    with errors_reported(json):
+        from hsdsl.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
+        from hsdsl.integrators import INTEGRATORS
+
+        _check_suffix(out, "--out", (".csv",))
+        _check_suffix(plot, "--plot", (".png", ".svg"))
+        asked: dict[str, Any] = {
+            "schemes": _names(schemes, SCHEMES, "--schemes") or SCHEMES,
+            "methods": _names(methods, tuple(INTEGRATORS), "--methods"),
+            "engines": _names(engines, ENGINES, "--engines") or ENGINES,
+            "tolerances": _numbers(tolerances, "--tolerances") or TOLERANCES,
+            "steps": _numbers(steps, "--steps"),
+            "against": _names(",".join(PEERS) if against == "all" else against, tuple(PEERS), "--against"),
+            "rounds": rounds,
+            "patience": patience,
+            "with_rho": rho,
+        }
+        found: list[tuple[str, list[Row]]] = []
+        with _progress(quiet or json) as watch:
+            for scene in [_scene(text, _split(states), samples, clearance) for text in models]:
+                rows, remarks = work_precision(scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}"))
+                found.append((scene.name, rows))
+                for remark in remarks if not quiet else ():
+                    say(f"left out: {remark}")
+        _report(found, out, plot, json, quiet)
+
+
+def _scene(text: str, states: list[str], samples: int, clearance: float) -> Any:
+    from hsdsl.chart import Scene
+    from hsdsl.model import load
+
+    path, colon, block = text.rpartition(":")
+    if not (colon and block.isdecimal()):
+        path, block = text, "0"
+    return Scene.of(load(path), block=int(block), states=states, samples=samples, clearance=clearance)
+
+
+def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
+    from hsdsl.chart.picture import panels
+    from hsdsl.chart.table import as_csv, as_text, record
+    from hsdsl.report import dumps
+    from hsdsl.store.atomic import replacing
+
+    rows = [row for _, group in found for row in group]
+    if out is not None:
+        with replacing(out) as file:
+            file.write(as_csv(rows).encode())
+        say(f"wrote {out}")
+    if plot is not None:
+        from hsdsl.plot.work_precision import plot_work_precision
+
+        plot_work_precision(plot, [panels(name, group) for name, group in found])
+        say(f"wrote {plot}")
+    if json:
+        print(dumps({"rows": [record(row) for row in rows]}))
+    elif not quiet:
+        print("\n\n".join(f"{name}\n{as_text(group)}" for name, group in found))
+
+
+class _progress:
+    """One line on a terminal that says what is running."""
+
+    def __init__(self, quiet: bool) -> None:
+        self._shown = not quiet and sys.stderr.isatty()
+
+    def __enter__(self) -> Any:
+        return self._say if self._shown else lambda _: None
+
+    def _say(self, text: str) -> None:
+        sys.stderr.write(f"\r\x1b[K{text[:100]}")
+        sys.stderr.flush()
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            sys.stderr.write("\r\x1b[K")
+
+
+def _split(text: str | None) -> list[str]:
+    return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def _names(text: str | None, known: tuple[str, ...], option: str) -> tuple[str, ...]:
+    names = _split(text)
+    for name in names:
+        if name not in known:
+            raise UsageError(f"{option}: there is no '{name}'", did_you_mean(name, known))
+    return tuple(names)
+
+
+def _numbers(text: str | None, option: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in _split(text))
+    except ValueError:
+        raise UsageError(f"{option} wants numbers with commas between them, not '{text}'") from None
+    if not all(0 < number < 1e300 for number in numbers):
+        raise UsageError(f"{option} wants positive numbers, not '{text}'")
+    return numbers
+
+
+def _check_suffix(path: Path | None, option: str, suffixes: tuple[str, ...]) -> None:
+    if path is not None and path.suffix.lower() not in suffixes:
+        raise UsageError(f"{option} {path}: the name must end in {' or '.join(suffixes)}")
+    if path is not None and not path.parent.is_dir():
+        raise UsageError(f"{option} {path}: there is no folder {path.parent}")

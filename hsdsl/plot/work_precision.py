@@ -1,0 +1,144 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""Time against error, log-log: one column a scene, a line a tool and method, crosses where the answer is wrong."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hsdsl.errors import UsageError
+from hsdsl.plot.colours import _PALETTE as PALETTE
+from hsdsl.store.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = (".png", ".svg")
+MARKERS = "osD^vP*hXp<>"
+LEAST_ERROR = 1e-16
+FAINT = "#8a8a8a"
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One run: its error (NaN: unknown), its median seconds, and whether it is right, wrong or failed."""
+
+    error: float
+    seconds: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Line:
+    """The runs of one tool and method, in the order of rising effort."""
+
+    label: str
+    group: str
+    marks: Sequence[Mark]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One scene and one measure of error."""
+
+    title: str
+    measure: str
+    lines: Sequence[Line]
+
+
+def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence[Panel]]) -> None:
+    """Draw panels, ``columns[i]`` from top to bottom.
+
+    Parameters
+    ----------
+    path : path
+        ``.png`` or ``.svg``.
+    columns : sequence of sequence of Panel
+        A column a scene.
+
+    Raises
+    ------
+    UsageError
+        For an unknown suffix, or a file that cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
+    import matplotlib.style
+    from matplotlib.figure import Figure
+
+    from hsdsl.plot import STYLE
+
+    labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
+    groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
+    down = max(len(column) for column in columns)
+    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
+        figure = Figure(figsize=(4.6 * len(columns) + 2.4, 3.7 * down + 0.3), layout="constrained")
+        axes = figure.subplots(down, len(columns), squeeze=False)
+        for i, column in enumerate(columns):
+            for k in range(down):
+                if k < len(column):
+                    _draw(axes[k][i], column[k], labels, groups, ylabel=i == 0)
+                else:
+                    axes[k][i].axis("off")
+        _legend(figure, labels, groups)
+        figure.savefig(
+            file,
+            format=target.suffix[1:].lower(),
+            dpi=150,
+            metadata={"Date": None} if target.suffix == ".svg" else None,
+        )
+
+
+def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str, object]:
+    names = list(dict.fromkeys(groups[name] for name in labels))
+    inside = [name for name in labels if groups[name] == groups[label]]
+    return {
+        "color": PALETTE[names.index(groups[label]) % len(PALETTE)],
+        "marker": MARKERS[inside.index(label) % len(MARKERS)],
+        "markersize": 5,
+        "linewidth": 1.3,
+    }
+
+
+def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str], ylabel: bool) -> None:
+    for line in panel.lines:
+        look = _look(line.label, labels, groups)
+        right = [(max(m.error, LEAST_ERROR), m.seconds) for m in line.marks if m.verdict == "right" and m.error == m.error]
+        if right:
+            axis.plot(*zip(*right, strict=True), **look)  # type: ignore[arg-type]
+        wrong = [(max(m.error, LEAST_ERROR), m.seconds) for m in line.marks if m.verdict != "right" and m.error == m.error]
+        if wrong:
+            axis.plot(*zip(*wrong, strict=True), color=look["color"], marker="x", linestyle="none", markersize=6)  # type: ignore[arg-type]
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.invert_xaxis()
+    axis.grid(True, which="major", color="#dddddd", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.set_xlabel(panel.measure)
+    if ylabel:
+        axis.set_ylabel("seconds, warm")
+    axis.set_title(panel.title, loc="left", parse_math=False, fontsize=9.5)
+    silent = [line.label for line in panel.lines if all(m.error != m.error for m in line.marks)]
+    if silent:
+        axis.text(
+            0.02,
+            0.02,
+            "no answer: " + ", ".join(silent),
+            transform=axis.transAxes,
+            fontsize=7,
+            color=FAINT,
+            wrap=True,
+        )
+
+
+def _legend(figure: object, labels: Sequence[str], groups: dict[str, str]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], label=label, **_look(label, labels, groups)) for label in labels]  # type: ignore[arg-type]
+    handles.append(Line2D([], [], color=FAINT, marker="x", linestyle="none", label="another execution, or no end"))
+    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)  # type: ignore[attr-defined]
