@@ -9,7 +9,7 @@ from typing import Any
 from hsdsl.chart.result import Attempt, Result
 from hsdsl.chart.scene import Scene, sampled
 from hsdsl.errors import UsageError
-from hsdsl.integrators import INTEGRATORS
+from hsdsl.integrators import METHODS, ButcherTableau
 from hsdsl.simulate import SCHEMES as ALL_SCHEMES
 
 SCHEMES = tuple(name for name in ALL_SCHEMES if name != "paoli-schatzman")
@@ -30,8 +30,8 @@ def own_runs(
     """List what can run, in the order of rising effort; what cannot leaves its reason in ``remarks``."""
     length = float(scene.grid[-1])
     for scheme in schemes:
-        for method in methods or INTEGRATORS:
-            adaptive = INTEGRATORS[method].adaptive
+        for method in methods or METHODS:
+            adaptive = METHODS[method].adaptive
             size = "tolerance" if adaptive else "step"
             values = sorted(tolerances if adaptive else steps or (length * share for share in SHARES), reverse=True)
             for engine in engines:
@@ -52,8 +52,8 @@ def _attempt(scene: Scene, asked: dict[str, Any], size: str, value: float) -> At
 
 def relaxation(method: str, value: float) -> float:
     """Return a relaxation whose error is below that of the tolerance or step it goes with."""
-    adaptive = INTEGRATORS[method].adaptive
-    order = 1 if adaptive else min(INTEGRATORS[method].order, 2)
+    chosen = METHODS[method]
+    order = min(chosen.order, 2) if isinstance(chosen, ButcherTableau) and not chosen.adaptive else 1
     return max(LEAST_RELAXATION, 0.01 * value**order)
 
 

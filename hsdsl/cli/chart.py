@@ -45,13 +45,13 @@ def chart(
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
     with errors_reported(json):
         from hsdsl.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
-        from hsdsl.integrators import INTEGRATORS
+        from hsdsl.integrators import METHODS
 
         _check_suffix(out, "--out", (".csv",))
         _check_suffix(plot, "--plot", (".png", ".svg"))
         asked: dict[str, Any] = {
             "schemes": _names(schemes, SCHEMES, "--schemes") or SCHEMES,
-            "methods": _names(methods, tuple(INTEGRATORS), "--methods"),
+            "methods": _names(methods, tuple(METHODS), "--methods"),
             "engines": _names(engines, ENGINES, "--engines") or ENGINES,
             "tolerances": _numbers(tolerances, "--tolerances") or TOLERANCES,
             "steps": _numbers(steps, "--steps"),
