@@ -35,12 +35,12 @@ class ToolArc:
     values: Array
 
 
-Integrate = Callable[[int, float, Sequence[float], Array, float], ToolArc]
-"""``integrate(mode, t, x, times, until)``: from t to the first event or to ``until``, sampled at ``times``."""
+Integrate = Callable[[float, int, float, Sequence[float], Array, float], ToolArc]
+"""``integrate(tolerance, mode, t, x, times, until)``: from t to the first event or ``until``, sampled at ``times``."""
 
 
 def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[float], Result]:
-    """Make ``run(...)`` of one arc after the other. ``integrate`` is called as `Integrate`, after the tolerance."""
+    """Make ``run(tolerance)``: one arc after the other, until the scene's end or a final mode."""
     resets = [[as_function(mode, edge.reset) for edge in mode.edges] for mode in model.modes]
     places = [
         [(i, mode.states.index(name)) for i, name in enumerate(scene.states) if name in mode.states]
@@ -57,7 +57,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
         problem = None
         while True:
             mode = model.modes[k]
-            arc = integrate(tolerance, k, t, x, grid[first:], until)  # type: ignore[call-arg]
+            arc = integrate(tolerance, k, t, x, grid[first:], until)
             last = first + len(arc.values)
             for i, j in places[k]:
                 values[first:last, i] = arc.values[:, j]

@@ -58,17 +58,16 @@ def relaxation(method: str, value: float) -> float:
 
 
 def _refusal(scene: Scene, asked: dict[str, Any], size: str, value: float) -> str:
+    asked = asked | {size: value}
     try:
-        scene.model.simulate(0, **asked, **{size: value}, parameters=scene.parameters, initial=scene.initial)
+        scene.model.simulate(0, **asked, parameters=scene.parameters, initial=scene.initial)
     except UsageError as error:
         return str(error)
     return ""
 
 
 def _run(scene: Scene, asked: dict[str, Any]) -> Result:
-    execution = scene.model.simulate(
-        float(scene.grid[-1]), **asked, parameters=scene.parameters, initial=scene.initial
-    )
+    execution = scene.model.simulate(float(scene.grid[-1]), **asked, parameters=scene.parameters, initial=scene.initial)
     values, modes = sampled(execution, scene.grid, scene.states)
     problem = None if execution.stop.complete else execution.stop.message
     return Result(values, modes, len(execution.transitions), problem, execution)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hsdsl.chart import Row
 
-COLUMNS = (
+COLUMNS: tuple[str, ...] = (
     "model",
     "tool",
     "scheme",

@@ -87,7 +87,7 @@ def _mode(mode: Mode, index: dict[str, int], numbers: dict[sp.Symbol, Any]) -> P
     return PlainMode(mode.name, mode.states, symbols, flow, tuple(map(edge, mode.edges)), mode.final)
 
 
-def _in_floats(expression: sp.Expr) -> sp.Expr:
+def _in_floats(expression: Any) -> Any:
     """Write constants as floats, except those that are floats anyway (integer exponents, square roots)."""
     constants = [a for a in expression.atoms(sp.Number, sp.NumberSymbol) if not a.is_Integer]
     rounded = {a: sp.Float(a, 17) for a in constants if not (a.is_Rational and a.q & (a.q - 1) == 0)}

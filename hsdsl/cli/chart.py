@@ -63,7 +63,9 @@ def chart(
         found: list[tuple[str, list[Row]]] = []
         with _progress(quiet or json) as watch:
             for scene in [_scene(text, _split(states), samples, clearance) for text in models]:
-                rows, remarks = work_precision(scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}"))
+                rows, remarks = work_precision(
+                    scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
+                )
                 found.append((scene.name, rows))
                 for remark in remarks if not quiet else ():
                     say(f"left out: {remark}")
@@ -102,6 +104,10 @@ def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | N
         print("\n\n".join(f"{name}\n{as_text(group)}" for name, group in found))
 
 
+def _silence(text: str) -> None:
+    pass
+
+
 class _progress:
     """One line on a terminal that says what is running."""
 
@@ -109,7 +115,7 @@ class _progress:
         self._shown = not quiet and sys.stderr.isatty()
 
     def __enter__(self) -> Any:
-        return self._say if self._shown else lambda _: None
+        return self._say if self._shown else _silence
 
     def _say(self, text: str) -> None:
         sys.stderr.write(f"\r\x1b[K{text[:100]}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -50,11 +51,11 @@ LARGEST_DEFECT = 1e-9  # of slopes, guards and resets, relative
 class Referenced(Protocol):
     """A model, as far as its reference needs one."""
 
-    @property
-    def program(self) -> Program: ...
+    program: cached_property[Program]
     @property
     def system(self) -> Any: ...
-    def simulate(self, until: Any = None, **asked: Any) -> Execution: ...
+    @property
+    def simulate(self) -> Callable[..., Execution]: ...
 
 
 def reference(model: Referenced, block: int = 0) -> Execution:

@@ -10,7 +10,7 @@ whether the model was lowered rightly: that takes an independent solution.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import floor, inf, log10
 from typing import Any, Protocol
@@ -33,7 +33,8 @@ SOURCE = (
 class Simulated(Protocol):
     """A model, as far as it is run here."""
 
-    def simulate(self, until: Any = None, **asked: Any) -> Execution: ...
+    @property
+    def simulate(self) -> Callable[..., Execution]: ...
 
 
 def precise(model: Simulated, digits: int = 10, **asked: Any) -> Execution:

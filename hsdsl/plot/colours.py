@@ -9,14 +9,14 @@ from hsdsl.plot.curves import SEVERAL
 INK = "#16324f"
 FAINT = "#8a8a8a"
 ALARM = "#d55e00"
-_PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
+PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
 
 
 def colours(modes: Sequence[str]) -> dict[str, str]:
     """Give each mode a colour; after seven modes they begin again, darker."""
     chosen: dict[str, str] = {}
     for i, mode in enumerate(mode for mode in modes if mode != SEVERAL):
-        chosen[mode] = _mixed(_PALETTE[i % len(_PALETTE)], 0.55 ** (i // len(_PALETTE)), "#000000")
+        chosen[mode] = _mixed(PALETTE[i % len(PALETTE)], 0.55 ** (i // len(PALETTE)), "#000000")
     return chosen | {mode: "#7a7a7a" for mode in modes if mode == SEVERAL}
 
 

@@ -7,20 +7,21 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.errors import UsageError
-from hsdsl.plot.colours import _PALETTE as PALETTE
+from hsdsl.plot.colours import FAINT, PALETTE
 from hsdsl.store.atomic import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FORMATS = (".png", ".svg")
 MARKERS = "osD^vP*hXp<>"
 LEAST_ERROR = 1e-16
-FAINT = "#8a8a8a"
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
         )
 
 
-def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str, object]:
+def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str, Any]:
     names = list(dict.fromkeys(groups[name] for name in labels))
     inside = [name for name in labels if groups[name] == groups[label]]
     return {
@@ -108,12 +109,14 @@ def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str
 def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str], ylabel: bool) -> None:
     for line in panel.lines:
         look = _look(line.label, labels, groups)
-        right = [(max(m.error, LEAST_ERROR), m.seconds) for m in line.marks if m.verdict == "right" and m.error == m.error]
+        known = [m for m in line.marks if isfinite(m.error)]
+        right = [(max(m.error, LEAST_ERROR), m.seconds) for m in known if m.verdict == "right"]
+        wrong = [(max(m.error, LEAST_ERROR), m.seconds) for m in known if m.verdict != "right"]
         if right:
-            axis.plot(*zip(*right, strict=True), **look)  # type: ignore[arg-type]
-        wrong = [(max(m.error, LEAST_ERROR), m.seconds) for m in line.marks if m.verdict != "right" and m.error == m.error]
+            axis.plot(*zip(*right, strict=True), **look)
         if wrong:
-            axis.plot(*zip(*wrong, strict=True), color=look["color"], marker="x", linestyle="none", markersize=6)  # type: ignore[arg-type]
+            crosses: dict[str, Any] = {**look, "marker": "x", "linestyle": "none"}
+            axis.plot(*zip(*wrong, strict=True), **crosses)
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.invert_xaxis()
@@ -123,7 +126,7 @@ def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str
     if ylabel:
         axis.set_ylabel("seconds, warm")
     axis.set_title(panel.title, loc="left", parse_math=False, fontsize=9.5)
-    silent = [line.label for line in panel.lines if all(m.error != m.error for m in line.marks)]
+    silent = [line.label for line in panel.lines if not any(isfinite(m.error) for m in line.marks)]
     if silent:
         axis.text(
             0.02,
@@ -136,9 +139,9 @@ def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str
         )
 
 
-def _legend(figure: object, labels: Sequence[str], groups: dict[str, str]) -> None:
+def _legend(figure: Figure, labels: Sequence[str], groups: dict[str, str]) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], label=label, **_look(label, labels, groups)) for label in labels]  # type: ignore[arg-type]
+    handles = [Line2D([], [], label=label, **_look(label, labels, groups)) for label in labels]
     handles.append(Line2D([], [], color=FAINT, marker="x", linestyle="none", label="another execution, or no end"))
-    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)  # type: ignore[attr-defined]
+    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)

@@ -1,3 +1,5 @@
+# The peers are optional and untyped.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """CasADi: its Rosenbrock integrator on the samples' grid, with zero-crossing functions and a transition function.
 
 Events are experimental there; the mode is one more state, which only transitions change.

@@ -1,3 +1,5 @@
+# The peers are optional and untyped.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """diffrax: ``diffeqsolve`` (Tsit5, PID steps) with an event that a Newton solve locates, compiled, mode by mode."""
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
 def _solver(mode: PlainMode) -> Any:
     flow = as_function(mode, mode.flow, "jax")
     guards = [as_function(mode, (edge.guard,), "jax") for edge in mode.edges]
-    term = dx.ODETerm(lambda t, y, args: jnp.stack([jnp.asarray(v, float) for v in flow(t, *y)]))  # type: ignore[arg-type]
+    term = dx.ODETerm(lambda t, y, args: jnp.stack([jnp.asarray(v, float) for v in flow(t, *y)]))
     conditions = [lambda t, y, args, guard=guard, **_: guard(t, *y)[0] for guard in guards]
 
     @jax.jit

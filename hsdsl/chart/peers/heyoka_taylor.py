@@ -1,4 +1,6 @@
-"""heyoka: an adaptive Taylor integrator a mode with terminal events; resets to the same mode in the event's callback."""
+# The peers are optional and untyped.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
+"""heyoka: an adaptive Taylor integrator a mode with terminal events; a reset to the same mode is its callback."""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ import numpy as np
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
 from hsdsl.chart.result import Array, Refused, Result
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.translation import T, PlainMode, PlainModel, as_function, translate
+from hsdsl.chart.translation import PlainMode, PlainModel, T, as_function, translate
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:

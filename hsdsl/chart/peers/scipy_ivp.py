@@ -1,3 +1,5 @@
+# The peers are optional and untyped.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """SciPy: ``solve_ivp`` with terminal events that rise through zero, restarted after each; DOP853."""
 
 from __future__ import annotations
@@ -50,5 +52,5 @@ def _event(function: Callable[..., Any]) -> Callable[..., Any]:
     def event(t: float, x: Sequence[float]) -> float:
         return function(t, *x)[0]
 
-    event.terminal, event.direction = True, 1.0  # type: ignore[attr-defined]
+    event.terminal, event.direction = True, 1.0
     return event

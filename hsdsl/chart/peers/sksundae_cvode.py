@@ -1,3 +1,5 @@
+# The peers are optional and untyped.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """scikit-SUNDAE: CVODE with events that rise through zero, restarted after each (BDF, its default)."""
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ def _solver(model: PlainModel, k: int, tolerance: float) -> Any:
         events[:] = guards(t, *y)
 
     count = len(mode.edges)
-    eventsfn.terminal, eventsfn.direction = [True] * count, [1] * count  # type: ignore[attr-defined]
+    eventsfn.terminal, eventsfn.direction = [True] * count, [1] * count
     events = {"eventsfn": eventsfn, "num_events": count} if count else {}
     limits = {"rtol": tolerance, "atol": max(tolerance, LEAST), "max_num_steps": 1_000_000}
     return sun.cvode.CVODE(rhsfn, **limits, **events)
