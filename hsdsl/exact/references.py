@@ -52,6 +52,7 @@ class Referenced(Protocol):
     """A model, as far as its reference needs one."""
 
     program: cached_property[Program]
+
     @property
     def system(self) -> Any: ...
     @property
