@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from hsdsl.cli.console import errors_reported
-from hsdsl.cli.distance_runs import of_runs
+from hsdsl.cli.console import errors_reported, say
+from hsdsl.cli.distance_runs import check_picture, of_runs
 from hsdsl.errors import UsageError
 
 
@@ -43,7 +43,11 @@ def distance(
         str | None, typer.Option(metavar="A,B", help="For rho-hat: the states that count as the position.")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the distance of two runs over time: .png or .svg.")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg.",
+        ),
     ] = None,
     seconds: Annotated[
         float,
@@ -60,15 +64,19 @@ def distance(
                 raise UsageError("give two runs, or one model with --from and --to")
             names = None if coordinates is None else [name.strip() for name in coordinates.split(",")]
             of_runs(first, second, metric, json, options, names, plot)
-        elif coordinates is not None or plot is not None:
-            raise UsageError("--coordinates and --plot are for two runs")
+        elif first.suffix.lower() == ".npz":
+            hint = "give a second run, or the model file with --from and --to"
+            raise UsageError(f"{first} is a run: two runs, or a model and two states, are wanted", hint)
+        elif coordinates is not None:
+            raise UsageError("--coordinates is for two runs")
         elif from_ is None or to is None:
             raise UsageError(
                 "two states are wanted, or a second run",
                 f'for example: hsdsl distance {first} --from "free x=13 v=5" --to "free x=13 v=-4"',
             )
         else:
-            of_points(first, from_, to, metric, json, options)
+            check_picture(plot)
+            of_points(first, from_, to, metric, json, {**options, "plot": plot})
 
 
 def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, options: dict[str, Any]) -> None:
@@ -78,6 +86,8 @@ def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, option
 
     name = metric or ("quotient" if options["relaxation"] is None else "relaxed")
     found = load(path).distance(p, q, metric=name, **options)
+    if options["plot"] is not None:
+        say(f"wrote {options['plot']}")
     if not json:
         print(found.sentence)
         return

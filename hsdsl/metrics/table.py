@@ -65,6 +65,8 @@ CURVE_METRICS: dict[str, CurveMetric] = {
     "tau-epsilon": CurveMetric("closeness of hybrid arcs, jump by jump", lambda r: tau_epsilon(r.a, r.b)),
 }
 
+RELAXED = ("rho", "relaxed")
+
 
 def between(metric: str, request: Request) -> CurveDistance:
     """Compute a distance between two executions by its name.
@@ -72,11 +74,16 @@ def between(metric: str, request: Request) -> CurveDistance:
     Raises
     ------
     UsageError
-        There is no such distance, the runs are of different models, or the distance refuses them.
+        There is no such distance, it does not take what is asked for, the runs are of different models, or it refuses
+        them.
     """
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
     check_same_model(request.a, request.b)
+    if request.relaxation is not None and metric not in RELAXED:
+        raise UsageError(f"the distance '{metric}' has no relaxation", f"with one: {' or '.join(RELAXED)}")
+    if request.coordinates is not None and metric != "rho-hat":
+        raise UsageError(f"the distance '{metric}' takes all states; coordinates are for rho-hat")
     return replace(CURVE_METRICS[metric].compute(request), metric=metric)
 
 

@@ -192,6 +192,7 @@ class Model:
         parameters: Mapping[str, Any] | None = None,
         hops: int | None = None,
         seconds: float = 60.0,
+        plot: str | os.PathLike[str] | None = None,
     ) -> PointDistance:
         """Return how far apart two points are: the length of the shortest curve that may pass through guards.
 
@@ -209,6 +210,8 @@ class Model:
             The most passages of a path.
         seconds : float
             About how long the search may take; then the interval is what is known by then, and ``certified`` says so.
+        plot : path, optional
+            Draw the shortest path found there (.png or .svg), where its modes have two coordinates.
 
         Raises
         ------
@@ -219,7 +222,7 @@ class Model:
         from hsdsl.model.places import distance_of_points
 
         values = with_parameters(self._values(FLOAT64), parameters or {})
-        return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds))
+        return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)
 
     @property
     def columns(self) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -13,6 +14,7 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import TOLERANCE, Space
 from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
 from hsdsl.metrics.space import make_space
+from hsdsl.metrics.table import CURVE_METRICS
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate.stops import show
@@ -22,9 +24,20 @@ _ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 def distance_of_points(
-    values: Values, p: str | Place, q: str | Place, metric: str, relaxation: Any, hops: int | None, budget: Budget
+    values: Values,
+    p: str | Place,
+    q: str | Place,
+    metric: str,
+    relaxation: Any,
+    hops: int | None,
+    budget: Budget,
+    plot: str | os.PathLike[str] | None = None,
 ) -> PointDistance:
     """Return how far apart two points of a model's space are; see `Model.distance`."""
+    if metric in CURVE_METRICS and metric not in METRICS:
+        raise UsageError(
+            f"'{metric}' is a distance between runs, not between points", f"between points: {' or '.join(METRICS)}"
+        )
     if metric not in METRICS:
         raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, METRICS))
     depth = None if metric == "quotient" else _relaxation(values, relaxation)
@@ -36,9 +49,14 @@ def distance_of_points(
         _check_inside(space, place)
     budget.start()
     try:
-        return distance(space, start, end, depth, hops, budget)
+        found = distance(space, start, end, depth, hops, budget)
     except ValueError as error:
         raise UsageError(str(error)) from error
+    if plot is not None:
+        from hsdsl.plot.path import plot_path
+
+        plot_path(plot, space, found.path, f"Shortest path, length {found.interval.upper:.6g}")
+    return found
 
 
 def read_place(values: Values, space: Space, text: str) -> Place:

@@ -60,6 +60,14 @@ WRONG = [
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--relaxation", "0"), "must be positive"),
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--set", "initial.x=2"), "parameters alone"),
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--set", "cc=2"), "no parameter 'cc'"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--metric", "rho"), "'rho' is a distance between runs"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--metric", "skorokhod"), "is a distance between runs"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--coordinates", "x"), "--coordinates is for two runs"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--plot", "way.pdf"), "should end in .png or .svg"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=0", "--plot", "way.png"), "no path to draw"),
+    (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--seconds", "0"), "positive number of seconds"),
+    (("--from", "", "--to", "free x=1 v=1"), "no mode ''"),
+    (("--from", "free x=1 v=1/0", "--to", "free x=1 v=1"), "v"),
 ]
 
 
@@ -69,6 +77,28 @@ def test_wrong_use_is_refused_with_a_sentence(command, arguments, message):
     assert answer.code == 2
     assert message in answer.err
     assert answer.out == ""
+
+
+def test_picture_of_the_path(command, tmp_path):
+    answer = command(
+        "distance", MODEL, "--from", "free x=13 v=5", "--to", "free x=13 v=-4", "--plot", tmp_path / "way.svg"
+    )
+    assert answer.code == 0
+    picture = (tmp_path / "way.svg").read_text()
+    assert picture.startswith("<?xml")
+    for text in ("guard of impact", "image of impact", "from", "to", "free"):
+        assert f"<!-- {text} -->" in picture
+    assert picture.count("<!-- 1 -->") == 2  # where the passage begins and where it ends
+
+
+def test_path_in_more_than_two_coordinates_is_not_drawn(command, tmp_path):
+    states = "aerial x=0 z=1 th=0 vx=0 vz=-1 w=0", "aerial x=0 z=1.1 th=0 vx=0 vz=-1 w=0"
+    target = tmp_path / "way.png"
+    runner = MODELS / "pronking-runner.yaml"
+    answer = command("distance", runner, "--from", states[0], "--to", states[1], "--plot", target)
+    assert answer.code == 2
+    assert "mode aerial has 6: x, z, th, vx, vz, w" in answer.err
+    assert not target.exists()
 
 
 def test_model_with_errors(command, model):

@@ -34,8 +34,8 @@ def model():
 def slice_graph(p, q, samples):
     """The shortest way in the slice x = 0, th = w = 0 from a state in the air to one on the left leg.
 
-    Coordinates are z, vx, vz and the foot's pl. In the slice both feet touch down at z = TOUCHDOWN, anywhere in (vx, vz)
-    with vz <= 0, the left one at pl = 1/2 + sin(PSI). Nodes are points of the guard and their images.
+    Coordinates are z, vx, vz and the foot's pl. In the slice both feet touch down at z = TOUCHDOWN, at any vx and
+    vz <= 0, the left one at pl = 1/2 + sin(PSI). Nodes are points of the guard and their images.
     """
     vx, vz = np.meshgrid(np.linspace(-1, 1, samples), np.linspace(-2, 0, samples))
     guard = np.column_stack([np.full(vx.size, TOUCHDOWN), vx.ravel(), vz.ravel()])
@@ -87,7 +87,7 @@ def test_runner_in_the_slice_is_the_fine_graph(space, p, q):
         return np.linalg.norm(guard - p) + np.linalg.norm([*(guard - corner[:3]), ahead - corner[3]])
 
     best = minimize(length, (0, -0.5), bounds=[(-1, 1), (-2, 0)], tol=1e-14).fun
-    # The best grid point is half a spacing off in both directions; the second derivative is at most 1/height for each leg.
+    # The best grid point is half a spacing off both ways; a leg's second derivative is at most 1/height.
     offset, heights = 1 / (samples - 1), (p[0] - TOUCHDOWN, abs(q[0] - TOUCHDOWN))
     assert best - 1e-9 <= graph <= best + offset**2 * sum(1 / height for height in heights)
     assert distance(space, start, end).interval.upper <= best * (1 + 1e-9)

@@ -1,0 +1,164 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""A picture of a shortest path through modes of two coordinates: a panel for each mode, passages as numbered jumps."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsdsl.errors import UsageError
+from hsdsl.metrics.formulas import Formula
+from hsdsl.metrics.geometry import Array, Domain, Gate, Space
+from hsdsl.metrics.line import interval_of
+from hsdsl.metrics.paths import Piece
+from hsdsl.plot.colours import ALARM, FAINT, INK
+from hsdsl.store.atomic import replacing
+
+FORMATS = (".png", ".svg")
+GRID = 160  # points of a panel's side at which domains and curved guards are looked at
+MARGIN = 0.25  # of a path's extent, around it
+
+
+def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece], title: str) -> None:
+    """Draw domains, guards, their images and a path.
+
+    Parameters
+    ----------
+    path : path
+        ``.png`` or ``.svg``.
+    space : Space
+        Where the path lies.
+    pieces : sequence of Piece
+        The path, as a distance's answer has it.
+    title : str
+        What stands above.
+
+    Raises
+    ------
+    UsageError
+        No path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise UsageError(f"--plot {target}: the name should end in .png or .svg")
+    modes = _visited(space, pieces)
+    import matplotlib.style
+    from matplotlib.figure import Figure
+
+    from hsdsl.plot import STYLE
+
+    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
+        columns = min(3, len(modes))
+        rows = -(-len(modes) // columns)
+        figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+        for axis, mode in zip(axes, modes, strict=False):
+            _panel(axis, space, mode, pieces)
+        for axis in axes[len(modes) :]:
+            axis.set_visible(False)
+        figure.suptitle(title, x=0.01, ha="left", parse_math=False)
+        day = {"Date": None} if target.suffix.lower() == ".svg" else None
+        figure.savefig(file, format=target.suffix[1:].lower(), dpi=150, metadata=day)
+
+
+def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:
+    if not pieces:
+        raise UsageError("there is no path to draw: either none was found or the points are the same")
+    modes = [space.mode_index(name) for name in dict.fromkeys(piece.mode for piece in pieces)]
+    for mode in modes:
+        names = space.domains[mode].coordinates
+        if len(names) != 2:
+            raise UsageError(
+                f"a path is drawn in modes of two coordinates, and mode {space.modes[mode]} has {len(names)}: "
+                f"{', '.join(names) or 'none'}"
+            )
+    return modes
+
+
+def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[Piece]) -> None:
+    domain = space.domains[mode]
+    own = np.array([x for piece in pieces if piece.mode == domain.mode for x in (piece.start, piece.end)])
+    extent = max(float(np.max(own.max(axis=0) - own.min(axis=0))), 1e-9 * (1 + float(np.abs(own).max())))
+    middle = (own.max(axis=0) + own.min(axis=0)) / 2
+    low, high = middle - (0.5 + MARGIN) * extent, middle + (0.5 + MARGIN) * extent
+    x, y = (np.linspace(a, b, GRID) for a, b in zip(low, high, strict=True))
+    axis.contourf(x, y, _beyond(domain, x, y), levels=[-np.inf, 0], colors=["#eef4fa"])
+    for gate in space.gates:
+        if gate.source == mode:
+            _line(axis, gate, gate.base, gate.frame, extent, own, "-", f"guard of {gate.edge}")
+        if gate.target == mode:
+            _line(axis, gate, gate.image_base, gate.image_frame, extent, own, ":", f"image of {gate.edge}")
+    for gate in space.curved_gates:
+        if gate.source == mode:
+            _curve(axis, x, y, gate.surface, gate.conditions)
+        if gate.target == mode and gate.marks.value(own[0]).size:
+            _curve(axis, x, y, gate.marks, None)
+    _pieces(axis, domain.mode, pieces)
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axis.set_xlabel(domain.coordinates[0], parse_math=False)
+    axis.set_ylabel(domain.coordinates[1], parse_math=False)
+    axis.set_title(domain.mode, loc="left", parse_math=False)
+    axis.set_aspect("equal", adjustable="box")
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+
+
+def _beyond(domain: Domain, x: Array, y: Array) -> Array:
+    """How far each point of a grid is beyond the domain: positive outside."""
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    worst = np.max(points @ domain.normals.T - domain.levels, axis=1, initial=-1.0)
+    for formula in domain.curved:
+        worst = np.maximum(worst, [formula(point) for point in points])
+    return np.nan_to_num(worst, nan=1.0).reshape(len(y), len(x))
+
+
+def _line(axis: Any, gate: Gate, base: Array, frame: Array, extent: float, own: Array, style: str, label: str) -> None:
+    """A guard or image: a segment, cut off some way outside the panel."""
+    if not np.any(frame):
+        axis.plot(*base, marker="s", color=FAINT, label=label, linestyle="none")
+        return
+    slope = frame[:, 0]
+    middle = float((own.mean(axis=0) - base) @ slope / (slope @ slope))
+    reach = 4 * extent / float(np.linalg.norm(slope))
+    ends = np.clip(interval_of(gate.normals, gate.levels), middle - reach, middle + reach)
+    at = base + np.outer(ends, slope)
+    axis.plot(at[:, 0], at[:, 1], style, color=FAINT, linewidth=2.0, label=label, zorder=1)
+
+
+def _curve(axis: Any, x: Array, y: Array, surface: Formula, conditions: Formula | None) -> None:
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    values = np.array([surface(point) for point in points])
+    if conditions is not None:
+        allowed = np.array([np.all(conditions.value(point) <= 1e-2 * np.ptp(x)) for point in points])
+        values = np.where(allowed, values, np.nan)
+    if np.nanmin(values, initial=1) < 0 < np.nanmax(values, initial=-1):
+        style = "solid" if conditions is not None else "dotted"
+        axis.contour(x, y, values.reshape(len(y), len(x)), levels=[0], colors=[FAINT], linestyles=[style])
+
+
+def _pieces(axis: Any, mode: str, pieces: Sequence[Piece]) -> None:
+    """The straight pieces in one mode, with the numbers of the passages they end at and come from."""
+    number = 0
+    for k, piece in enumerate(pieces):
+        came, number = number, number + (piece.edge is not None)
+        if piece.mode != mode:
+            continue
+        axis.plot(*zip(piece.start, piece.end, strict=True), color=INK, linewidth=1.8, zorder=3)
+        if k == 0:
+            _mark(axis, piece.start, "from", INK)
+        elif pieces[k - 1].edge is not None:
+            _mark(axis, piece.start, str(came), ALARM)
+        if piece.edge is not None:
+            _mark(axis, piece.end, str(number), ALARM)
+        elif k == len(pieces) - 1:
+            _mark(axis, piece.end, "to", INK)
+
+
+def _mark(axis: Any, at: tuple[float, ...], text: str, colour: str) -> None:
+    axis.plot(*at, marker="o", color=colour, markersize=6, zorder=4)
+    axis.annotate(text, at, xytext=(6, 6), textcoords="offset points", color=colour, fontweight="bold", zorder=5)
