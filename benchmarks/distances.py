@@ -83,7 +83,7 @@ def transitions() -> None:
     """Print how rho's cost grows with the number of transitions, at about the same number of samples."""
     model = hsdsl.load(MODELS / "thermostat.yaml")
     print("\n| transitions | samples | rho | seconds |\n|---|---|---|---|")
-    for until in (10, 100, 1000):
+    for until in (100, 1000, 10_000):
         runs = [model.simulate(until=until, relaxation=eps, tolerance=1e-8) for eps in (1e-6, 1e-5)]
         found = distance(*runs, model=model)
         spent = seconds(lambda runs=runs: distance(*runs, model=model))
@@ -94,7 +94,7 @@ def rivals() -> None:
     """Print the cost of the rivals for many transitions."""
     model = hsdsl.load(MODELS / "thermostat.yaml")
     print("\n| metric | transitions | distance | seconds |\n|---|---|---|---|")
-    for until in (100, 1000):
+    for until in (1000, 27_500):
         runs = [model.simulate(until=until, relaxation=eps, tolerance=1e-8) for eps in (1e-6, 1e-5)]
         for metric in ("sup", "skorokhod", "tau-epsilon"):
             began = time.process_time()
