@@ -10,10 +10,10 @@ import numpy as np
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.curves import Points
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.inside import highest
 from hsdsl.metrics.neighbours import Neighbours
+from hsdsl.metrics.on_space import Points
 from hsdsl.metrics.points import Place, distance, distances
 
 QUICK, SLOW = 50_000, 20_000

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsdsl.execution import Array, Execution
-from hsdsl.metrics.curves import OnSpace, PointMetric, merged
+from hsdsl.metrics.curves import merged
+from hsdsl.metrics.on_space import OnSpace, PointMetric
 from hsdsl.metrics.rivals import Labelled
 from hsdsl.metrics.supremum import CellDistance
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.closeness import tau_epsilon
-from hsdsl.metrics.curves import CurveDistance, PointMetric, rho
+from hsdsl.metrics.curves import CurveDistance, rho
+from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.rivals import sup_norm
 from hsdsl.metrics.sampled import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.curves import CurveDistance, PointMetric
+from hsdsl.metrics.curves import CurveDistance
+from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.table import Request, between, check_same_model
 
 if TYPE_CHECKING:

@@ -82,11 +82,12 @@ def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:
 
 def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[Piece]) -> None:
     domain = space.domains[mode]
-    own = np.array([x for piece in pieces if piece.mode == domain.mode for x in (piece.start, piece.end)])
+    own: Array = np.array([x for piece in pieces if piece.mode == domain.mode for x in (piece.start, piece.end)])
     extent = max(float(np.max(own.max(axis=0) - own.min(axis=0))), 1e-9 * (1 + float(np.abs(own).max())))
     middle = (own.max(axis=0) + own.min(axis=0)) / 2
     low, high = middle - (0.5 + MARGIN) * extent, middle + (0.5 + MARGIN) * extent
-    x, y = np.linspace(low[0], high[0], GRID), np.linspace(low[1], high[1], GRID)
+    x: Array = np.linspace(float(low[0]), float(high[0]), GRID)
+    y: Array = np.linspace(float(low[1]), float(high[1]), GRID)
     axis.contourf(x, y, _beyond(domain, x, y), levels=[-np.inf, 0], colors=["#eef4fa"])
     for gate in space.gates:
         if gate.source == mode:
