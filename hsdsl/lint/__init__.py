@@ -7,6 +7,7 @@ file ask to ignore.
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass
 
 from hsdsl import limits
@@ -22,6 +23,7 @@ from hsdsl.lint.subject import Subject
 from hsdsl.system import HybridSystem
 
 UNDECIDED = "HS492"
+_LEAST_SECONDS = 0.01  # for a rule, also where the others have used up the time of all
 
 __all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "configured", "lint"]
 
@@ -56,19 +58,23 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     """
     subject = Subject(elaborate_with_places(path, text=text))
     codes = (selection or Selection.of()).codes
+    seconds = limits.current().seconds
+    end = time.process_time() + seconds / 2
+    found: list[Diagnostic] = []
     with deep_stack():
-        found = [diagnostic for code in codes for diagnostic in _findings(subject, code)]
+        for code in codes:
+            found += _findings(subject, code, min(seconds / PARTS, end - time.process_time()))
     findings, ignored = sift(subject, found, codes)
     return Report(subject.system, findings, ignored)
 
 
-def _findings(subject: Subject, code: str) -> list[Diagnostic]:
-    """What one rule finds; where it cannot be decided, that is said instead of nothing."""
+def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:
+    """What one rule finds in some processor time; where it cannot be decided, that is said instead of nothing."""
     check = RULES[code].check
     found: dict[Finding, None] = {}
     problem = None
     try:
-        with timebox(limits.current().seconds / PARTS):
+        with timebox(max(seconds, _LEAST_SECONDS)):
             for finding in check(subject) if check else ():
                 found[finding] = None
     except OutOfTime:

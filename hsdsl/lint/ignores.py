@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.lint.rules import RULES
 from hsdsl.lint.subject import Subject
-from hsdsl.names import did_you_mean, shown
-from hsdsl.source import Mapping, Node, Place, Scalar, Text
+from hsdsl.names import shown
+from hsdsl.source import Mapping, Node, Scalar, Text
 
 UNUSED, UNKNOWN = "HS490", "HS491"
-_COMMENT = re.compile(r"#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?[ \t]*([^\r\n]*)")
+_LISTED = "codes are HS and three digits; every finding has its own"
+_COMMENT = re.compile(r"#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?(?=[ \t]{0,9}(.{0,500}))")
 
 
 @dataclass(frozen=True)
@@ -62,49 +64,57 @@ def sift(
 
 def comments_of(text: Text, root: Node) -> Iterator[Comment]:
     """The comments of a file that ask to ignore something."""
-    taken = None
-    for number, line in enumerate(text.lines, start=1):
-        for match in _COMMENT.finditer(line):
-            taken = _scalars(root) if taken is None else taken
-            if not _begins_comment(line, match.start()) or _inside(taken, number - 1, match.start()):
-                continue
-            about = _next_content(text.lines, number) if not line[: match.start()].strip() else number
-            yield Comment(
-                about, tuple(_codes(text, number, match)), _span(text, number, match), match[2].strip() or None
-            )
-            break
+    found = [
+        (number, match)
+        for number, line in enumerate(text.lines, start=1)
+        for match in _COMMENT.finditer(line)
+        if _begins_comment(line, match.start())
+    ]
+    if not found:
+        return
+    taken, following = _scalars(root), _following(text.lines)
+    for number, match in found:
+        if not _inside(taken, number - 1, match.start()):
+            alone = not text.lines[number - 1][: match.start()].strip()
+            codes = tuple(_codes(text, number, match))
+            about = following[number - 1] if alone else number
+            yield Comment(about, codes, _span(text, number, match), match[2].strip() or None)
 
 
 def _begins_comment(line: str, column: int) -> bool:
     return column == 0 or line[column - 1] in " \t"
 
 
-def _scalars(root: Node) -> list[Place]:
-    """The places of all scalars that may contain the sign of a comment: those in quotes, and blocks of text."""
-    found: list[Place] = []
+def _scalars(root: Node) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Beginnings and ends, in order, of all scalars that contain the sign of a comment."""
+    found: set[tuple[tuple[int, int], tuple[int, int]]] = set()
     waiting = [root]
     while waiting:
         node = waiting.pop()
         if isinstance(node, Scalar):
             if "#" in node.value:
-                found.append(node.place)
+                found.add((node.place.start[1:], node.place.end[1:]))
         elif isinstance(node, Mapping):
             waiting.extend(value for _, value in node)
         else:
             waiting.extend(node.items)
+    return sorted(found)
+
+
+def _inside(scalars: list[tuple[tuple[int, int], tuple[int, int]]], line: int, column: int) -> bool:
+    before = bisect(scalars, (line, column), key=lambda ends: ends[0])
+    return before > 0 and (line, column) < scalars[before - 1][1]
+
+
+def _following(lines: Sequence[str]) -> list[int]:
+    """For each line the number of the next one that is neither empty nor a comment; its own where there is none."""
+    found = list(range(1, len(lines) + 1))
+    following = None
+    for index in reversed(range(len(lines))):
+        found[index] = following or index + 1
+        if lines[index].strip() and not lines[index].lstrip().startswith("#"):
+            following = index + 1
     return found
-
-
-def _inside(places: list[Place], line: int, column: int) -> bool:
-    return any(p.start[1:] <= (line, column) < p.end[1:] for p in places)
-
-
-def _next_content(lines: Sequence[str], number: int) -> int:
-    """The first line from ``number`` (counted from 0) on that is neither empty nor a comment, counted from 1."""
-    for later in range(number, len(lines)):
-        if lines[later].strip() and not lines[later].lstrip().startswith("#"):
-            return later + 1
-    return number
 
 
 def _codes(text: Text, number: int, match: re.Match[str]) -> Iterator[tuple[str, Span]]:
@@ -125,8 +135,8 @@ def _wrong(
             yield _about(text, UNKNOWN, message, comment.span, "write `# hsdsl: ignore[HS401]`, with the code")
         for code, span in comment.codes:
             if code not in RULES:
-                known = "errors cannot be ignored" if re.fullmatch(r"HS[0-3]\d\d", code) else did_you_mean(code, RULES)
-                yield _about(text, UNKNOWN, f"'{shown(code)}' is not the code of a lint rule", span, known)
+                hint = "errors cannot be ignored" if re.fullmatch(r"HS[0-3]\d\d", code) else _LISTED
+                yield _about(text, UNKNOWN, f"'{shown(code)}' is not the code of a lint rule", span, hint)
             elif code in codes and (code, comment.line) not in used:
                 message = f"there is no {code} to ignore on line {comment.line}"
                 yield _about(text, UNUSED, message, span, "remove the code, or the comment")

@@ -46,8 +46,9 @@ def leaves(mode: Mode, surface: Surface, point: Point) -> bool | None:
 
 def along(mode: Mode, expr: Any) -> Any:
     """The derivative of an expression along the flow of a mode, L_f."""
-    pairs = zip(mode.states, mode.flow, strict=True)
-    return sp.Add(expr.diff(TIME), *(expr.diff(symbol(name)) * value for name, value in pairs))
+    within = expr.free_symbols
+    pairs = ((symbol(name), value) for name, value in zip(mode.states, mode.flow, strict=True))
+    return sp.Add(expr.diff(TIME), *(expr.diff(state) * value for state, value in pairs if state in within))
 
 
 def _size(expr: Any, point: Point) -> Any:

@@ -19,42 +19,40 @@ class Definition(NamedTuple):
     name: str
 
 
-def definition(document: Model, mode: str | None, name: str) -> Definition | None:
-    """What a name means in a mode, or outside all modes; None for `t`, `pi` and the like."""
-    if mode is not None and name in document.modes[mode].let:  # pyright: ignore[reportArgumentType]
-        return Definition("let", mode, name)
-    for kind, table in (("let", document.let), ("parameter", document.parameters), ("input", document.inputs)):
-        if name in table:
-            return Definition(kind, None, name)
-    if any(name in (other.flow or ()) for other in document.modes.values()):
-        return Definition("state", None, name)
-    return None
+class Names:
+    """What every name of a model means."""
 
+    def __init__(self, document: Model) -> None:
+        states = dict.fromkeys(str(key) for mode in document.modes.values() for key in mode.flow or ())
+        kinds = {"state": states, "input": document.inputs, "parameter": document.parameters, "let": document.let}
+        self.top = {str(name): Definition(kind, None, str(name)) for kind, names in kinds.items() for name in names}
+        self.own = {
+            str(key): {str(name): Definition("let", str(key), str(name)) for name in mode.let}
+            for key, mode in document.modes.items()
+        }
 
-def needs(document: Model, expression: Written) -> Iterator[Definition]:
-    """What an expression names."""
-    for name in expression.names:
-        found = definition(document, expression.mode, name)
-        if found is not None:
-            yield found
+    def used(self, expression: Written) -> Iterator[Definition]:
+        """What an expression names, but for `t`, `pi` and the like."""
+        own = self.own.get(expression.mode or "", {})
+        for name in expression.names:
+            found = own.get(name) or self.top.get(name)
+            if found is not None:
+                yield found
 
 
 def unused(document: Model, expressions: Iterable[Written]) -> frozenset[Definition]:
     """The parameters, inputs and `let` names that nothing depends on but, at most, other unused ones."""
-    uses: dict[Definition, set[Definition]] = {
-        **{Definition("parameter", None, str(name)): set() for name in document.parameters},
-        **{Definition("input", None, str(name)): set() for name in document.inputs},
-        **{Definition("let", None, str(name)): set() for name in document.let},
-        **{Definition("let", str(m), str(name)): set() for m, mode in document.modes.items() for name in mode.let},
-    }
+    names = Names(document)
+    tables = (names.top, *names.own.values())
+    uses: dict[Definition, set[Definition]] = {d: set() for t in tables for d in t.values() if d.kind in _DEFINING}
     defined = frozenset(uses)
     waiting: list[Definition] = []
     for expression in expressions:
         if expression.role in _DEFINING:
             own = Definition(expression.role, expression.mode, str(expression.name))
-            uses[own].update(needs(document, expression))
+            uses[own].update(names.used(expression))
         else:
-            waiting.extend(needs(document, expression))
+            waiting.extend(names.used(expression))
     reached: set[Definition] = set()
     while waiting:
         found = waiting.pop()

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from random import Random
+from time import process_time
 
 import pytest
 from fuzz import generators
@@ -62,3 +63,20 @@ def test_a_misspelt_cell_is_found_in_a_large_grid():
     found = lint("grid.yaml", STRUCTURE, text=broken.encode()).findings
     assert [finding.code for finding in found] == ["HS422"]
     assert "'c2_2'" in found[0].message
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("# hsdsl: ignore[HS401] once more\n" * 25_000 + "parameters: {a: 1}\n", 0),
+        ("reference:\n" + "- {source: '# hsdsl: ignore'}  # hsdsl: ignore[HS401]\n" * 12_000, 12_000),
+        ("# hsdsl: ignore[" + ",".join(f"HT{n:05}" for n in range(100_000)) + "]\n", 100_000),
+        ("# hsdsl: ignore " * 60_000 + "\n", 60_000),
+    ],
+    ids=["stacked", "beside texts", "long", "in one line"],
+)
+def test_many_comments_are_read_in_linear_time(text, count):
+    model = text + "hsdsl: 1\nmodes: {m: {flow: {x: 1}}}\ninitial: {mode: m, x: 0}\nexperiment: {until: 1}\n"
+    began = process_time()
+    assert len(lint("model.yaml", text=model.encode()).findings) == count
+    assert process_time() - began < 15  # seconds; pairs of them would take minutes

@@ -94,7 +94,7 @@ def _reached(subject: Subject, until: Number) -> Iterator[str]:
 
 def _affine(part: ModePart, residual: sp.Expr) -> bool:
     """Whether a surface function is affine in states and time: then it is monotone along a constant flow."""
-    symbols = [*map(symbol, part.mode.states), TIME]
+    symbols = residual.free_symbols & {*map(symbol, part.mode.states), TIME}
     return all(residual.diff(a, b) == 0 for a in symbols for b in symbols)
 
 

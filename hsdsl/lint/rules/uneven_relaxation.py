@@ -84,7 +84,8 @@ def _speed(found: tuple[Number, EdgePart, bool]) -> Number:
 def _speeds(subject: Subject, mode: Mode, item: EdgePart) -> Iterator[tuple[Number, EdgePart, bool]]:
     """Positive speeds at a guard, and whether each holds everywhere on it."""
     residual = item.edge.surface.residual
-    squared = sp.Add(*(residual.diff(s) ** 2 for s in (*map(symbol, mode.states), TIME)))
+    within = residual.free_symbols & {*map(symbol, mode.states), TIME}
+    squared = sp.Add(*(residual.diff(s) ** 2 for s in within))
     rate = along(mode, residual)
     symbols = rate.free_symbols | squared.free_symbols
     if symbols <= set(subject.numbers):
