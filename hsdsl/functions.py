@@ -138,6 +138,21 @@ class tanh(sp.tanh):
     _eval_is_positive = _eval_is_negative = _eval_is_zero = _eval_is_unknown
 
 
+def power(base, exponent):
+    """``base**exponent``; a power of a power stays as it is.
+
+    To know whether it may multiply the exponents, SymPy splits the inner base into real and imaginary parts, and for
+    that it multiplies powers out.
+    """
+    kept = base.is_Pow and not exponent.is_Integer
+    return sp.Pow(base, exponent, evaluate=False) if kept else sp.Pow(base, exponent)
+
+
+def rebuilt(expr, arguments):
+    """An expression with other arguments, made as :func:`power` makes powers."""
+    return power(*arguments) if expr.is_Pow else expr.func(*arguments)
+
+
 # name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)
 FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
     "sin": (sp.sin, 1, 1),

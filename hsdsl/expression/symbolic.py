@@ -26,6 +26,7 @@ from hsdsl.expression.syntax import (
     Sum,
     Tree,
     Truth,
+    children,
 )
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import shown
@@ -49,7 +50,9 @@ def number(tree: Tree, scope: Scope, text: str) -> Value:
     ExpressionError
         Where a condition stands for a number, a constant has no finite real value, or the expression is too large.
     """
-    return _Builder(scope, text).number(tree)
+    builder = _Builder(scope, text)
+    builder.refuse_deep(tree)
+    return builder.number(tree)
 
 
 def condition(tree: Tree, scope: Scope, text: str) -> Any:
@@ -69,6 +72,16 @@ class _Builder:
     def __init__(self, scope: Scope, text: str) -> None:
         self.scope = scope
         self.text = text
+
+    def refuse_deep(self, tree: Tree) -> None:
+        """Raise where functions and powers are nested too deep, before SymPy is given any of them."""
+        waiting = [(tree, 0)]
+        while waiting:
+            node, depth = waiting.pop()
+            depth += isinstance(node, (Call, Power))
+            if depth > bounds.MOST_LEVELS:
+                raise self.too_deep(tree)
+            waiting.extend((child, depth) for child in children(node))
 
     def number(self, tree: Tree) -> Value:
         """The value of a node that must be a number."""
@@ -144,7 +157,7 @@ class _Builder:
             self.refuse_unless_finite(tree, number)
         if bounds.power_bits(base.expr, exponent.expr) > bounds.MOST_BITS:
             raise self.too_long(tree)
-        return self.value(tree, self.made(tree, sp.Pow, base.expr, exponent.expr), number, [base, exponent])
+        return self.value(tree, self.made(tree, functions.power, base.expr, exponent.expr), number, [base, exponent])
 
     def call(self, tree: Call) -> Value:
         """A function of the language. min and max of many are taken in pairs."""
@@ -195,9 +208,13 @@ class _Builder:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
         if depth > bounds.MOST_LEVELS:
-            message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
+            raise self.too_deep(tree)
         return Value(expr, number, constant, uses, size, depth, within)
+
+    def too_deep(self, tree: Tree) -> ExpressionError:
+        """The error for a nest that SymPy would need too long for."""
+        message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
+        return ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
 
     def refuse_large_constant(self, tree: Tree, size: int, depth: int) -> None:
         """Raise where SymPy would compute a constant for ever."""

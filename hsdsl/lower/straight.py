@@ -14,6 +14,7 @@ from itertools import accumulate, count
 
 import sympy as sp
 
+from hsdsl.functions import rebuilt
 from hsdsl.lower.printer import LARGEST_PRODUCT
 
 LARGEST = 80  # nodes of one statement
@@ -29,7 +30,7 @@ def replaced(expr: sp.Basic, mapping: dict, done: dict) -> sp.Basic:
         return expr
     if expr not in done:
         args = tuple(replaced(a, mapping, done) for a in expr.args)
-        done[expr] = expr if args == expr.args else expr.func(*args)
+        done[expr] = expr if args == expr.args else rebuilt(expr, args)
     return done[expr]
 
 
@@ -70,6 +71,8 @@ class Cut:
         parts = [self._cut(a) for a in expr.args]
         if self._powers and expr.is_Pow and expr.exp.is_Integer and abs(expr.exp) <= LARGEST_PRODUCT:
             parts = [(self.name(part), 1) if abs(expr.exp) > 1 else (part, size) for part, size in parts]
+        if expr.is_Pow and expr.base.is_Pow:
+            parts = [(self.name(parts[0][0]), 1), parts[1]]  # see `power`
         if isinstance(expr, sp.Tuple):
             return sp.Tuple(*(part for part, _ in parts), sympify=False), 1
         if 1 + sum(size for _, size in parts) > LARGEST:
@@ -79,7 +82,7 @@ class Cut:
         args = tuple(part for part, _ in parts)
         if args == expr.args:
             return expr, 1 + sum(size for _, size in parts)
-        return expr.func(*args), 1 + sum(size for _, size in parts)
+        return rebuilt(expr, args), 1 + sum(size for _, size in parts)
 
     def _narrow(self, operation: type, parts: list[tuple[sp.Basic, int]]) -> list[tuple[sp.Basic, int]]:
         """Name the first operands together, as often as what is left is too wide or too large."""

@@ -13,6 +13,7 @@ from random import Random
 from typing import Any
 
 from fuzz import seeds
+from hsdsl import limits
 from hsdsl.diagnose import as_json, render
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
@@ -20,6 +21,7 @@ from hsdsl.expression import ExpressionError, parse, symbolic
 from hsdsl.expression.inequality import inequality
 from hsdsl.expression.scope import Scope, Value, state, symbol
 from hsdsl.expression.stack import deep_stack
+from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.model import Model
@@ -131,7 +133,7 @@ def feed_expression(text: str, rng: Random, share: float) -> str:
             tree = parse(text, wanted)  # pyright: ignore[reportArgumentType]
             if SCOPE.faults(tree):
                 continue
-            with deep_stack():
+            with deep_stack(), timebox(limits.DEFAULT.seconds, PARTS):
                 if wanted == "number":
                     found = [symbolic.number(tree, SCOPE, text).expr]
                 elif wanted == "inequality":
@@ -144,6 +146,8 @@ def feed_expression(text: str, rng: Random, share: float) -> str:
                 if rng.random() < share:
                     _lowered(found)
                     got = "lowered"
+        except OutOfTime:
+            got = "out of time"
         except ExpressionError as error:
             if not (0 <= error.start < error.end <= max(1, len(text) + 1) and error.message):
                 raise Violation(f"{error.code} at {error.start}:{error.end}: {error.message}") from error
