@@ -15,16 +15,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["Execution", "Model", "ModelError", "UsageError", "__version__", "distance", "load"]
+__all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__version__", "distance", "load"]
 
 if TYPE_CHECKING:
     from hsdsl.errors import ModelError, UsageError
     from hsdsl.execution import Execution
+    from hsdsl.limits import Limits
     from hsdsl.model import Model, load
     from hsdsl.model.distances import distance
 
 _HOMES = {
     "Execution": "hsdsl.execution",
+    "Limits": "hsdsl.limits",
     "Model": "hsdsl.model",
     "ModelError": "hsdsl.errors",
     "UsageError": "hsdsl.errors",

@@ -126,7 +126,7 @@ CODES: dict[str, str] = {
     # the file and its YAML
     "HS001": "the file is not UTF-8 text",
     "HS002": "a character that does not belong in a model",
-    "HS003": "the file is too large, too deeply nested or too much repeated",
+    "HS003": "the file is too large",
     "HS004": "the file is not valid YAML",
     "HS005": "a tab where YAML wants spaces",
     "HS006": "the indentation fits no line above",
@@ -137,6 +137,9 @@ CODES: dict[str, str] = {
     "HS011": "the file is empty",
     "HS012": "an alias inside its own anchor",
     "HS013": "a key that is not a plain word",
+    "HS014": "mappings and lists nested too deep",
+    "HS015": "too many values, once aliases are expanded",
+    "HS016": "too many entries in one mapping",
     # expressions
     "HS101": "a character that expressions do not have",
     "HS102": "an expression that ends or goes on where it should not",
@@ -147,7 +150,7 @@ CODES: dict[str, str] = {
     "HS107": "an equality where an inequality is wanted",
     "HS108": "a logical operator of another language",
     "HS109": "a construct of another language",
-    "HS110": "an expression that is too long or too deeply nested",
+    "HS110": "an expression that is too long",
     "HS111": "a name that nothing defines",
     "HS112": "a function that does not exist, or a function without its parentheses",
     "HS113": "a function with the wrong number of arguments",
@@ -160,6 +163,8 @@ CODES: dict[str, str] = {
     "HS120": "an expression that grows too large once names are replaced",
     "HS121": "no expression where one is wanted",
     "HS122": "symbolic work that takes too long",
+    "HS123": "parentheses that are nested too deep",
+    "HS124": "a whole number that is too large, or a number with too many digits",
     # the shape of the document
     "HS201": "a key that does not exist here",
     "HS202": "a key that is missing",
@@ -184,6 +189,7 @@ CODES: dict[str, str] = {
     "HS314": "a reference to something that does not exist",
     "HS315": "a transition or a domain in a mode that has no states of its own",
     "HS316": "two units for one name",
+    "HS317": "a data file outside the model's folder",
     "HS320": "both a step and a tolerance",
     "HS321": "a setting outside its range",
 }

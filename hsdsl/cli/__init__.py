@@ -18,6 +18,7 @@ from hsdsl.cli.chart import chart
 from hsdsl.cli.distance import distance
 from hsdsl.cli.doctor import doctor
 from hsdsl.cli.explain import explain
+from hsdsl.cli.limited import limited
 from hsdsl.cli.lint import lint
 from hsdsl.cli.run import run
 from hsdsl.cli.schema import schema
@@ -35,8 +36,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+READING = (run, validate, lint, distance, chart)  # verbs that read models
 for verb in (run, validate, lint, explain, distance, chart, schema, doctor):
-    app.command()(verb)
+    app.command()(limited(verb) if verb in READING else verb)
 
 
 def _version(wanted: bool) -> None:

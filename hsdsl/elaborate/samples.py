@@ -6,6 +6,7 @@ import re
 from fractions import Fraction
 from pathlib import Path
 
+from hsdsl import limits
 from hsdsl.elaborate.world import World
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.names import did_you_mean, shown
@@ -41,21 +42,26 @@ def read_samples(world: World, name: Key, file: Scalar) -> Samples | None:
 
 def _inside(world: World, file: Scalar) -> Path | None:
     """The file's path, if it stays in the model's folder."""
-    given = Path(file.value)
-    folder = world.folder.resolve()
+    path = world.folder / file.value
     try:
-        inside = not given.is_absolute() and (folder / given).resolve().is_relative_to(folder)
+        target = path.resolve()
+        folders = (world.folder.resolve(), *(folder.resolve() for folder in limits.current().folders))
+        inside = any(target.is_relative_to(folder) for folder in folders)
     except (OSError, ValueError, RuntimeError):
         inside = False
     if inside:
-        return world.folder / given
+        return path
     message = f"the file '{shown(file.value)}' is not in the folder of the model"
-    world.reader.add(file.place, "HS311", message, "put it there and write its path from that folder")
+    hint = "put it there and write its path from that folder, or allow its folder with --allow-path FOLDER"
+    world.reader.add(file.place, "HS317", message, hint)
     return None
 
 
 def _bytes(world: World, file: Scalar, path: Path) -> bytes | None:
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe would keep us waiting
+            world.reader.add(file.place, "HS311", f"'{shown(file.value)}' is not a regular file")
+            return None
         with path.open("rb") as stream:
             data = stream.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:

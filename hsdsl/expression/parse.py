@@ -171,7 +171,7 @@ class _Parser:
         if self.depth > DEEPEST:
             token = self.tokens[self.at - 1]
             message = f"the expression is nested more than {DEEPEST} deep"
-            raise ExpressionError("HS110", message, token.start, token.end, "name its parts under `let`")
+            raise ExpressionError("HS123", message, token.start, token.end, "name its parts under `let`")
         yield
         self.depth -= 1
 

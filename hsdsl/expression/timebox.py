@@ -13,6 +13,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
+LONGEST_WAIT = 3600.0  # a lock cannot wait for ever
 PARTS = 15  # into which the time for a file is divided: one expression may take one
 
 _python: Any = getattr(ctypes, "pythonapi", None)  # CPython; elsewhere the time is looked at between parts
@@ -71,7 +72,7 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
     thread = threading.get_ident()
 
     def watch() -> None:
-        while not done.wait(max(0.01, box.left())):
+        while not done.wait(min(max(0.01, box.left()), LONGEST_WAIT)):
             with lock:
                 if not done.is_set() and box.left() <= 0:
                     sent.set()

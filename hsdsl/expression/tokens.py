@@ -68,12 +68,12 @@ def _number(text: str, at: int) -> Token | None:
 def _value(match: re.Match[str], at: int) -> Fraction:
     digits, exponent = match.group(1), match.group(2)
     if len(match.group()) > _MOST_DIGITS:
-        raise ExpressionError("HS105", f"the number has more than {_MOST_DIGITS:,} digits", at, match.end())
+        raise ExpressionError("HS124", f"the number has more than {_MOST_DIGITS:,} digits", at, match.end())
     if digits is None or (digits.isdigit() and not exponent):
         value = int(match.group(), 10 if digits else 0)
         if value > LARGEST_INTEGER:
             hint = "write it with an exponent: 2.5e20"
-            raise ExpressionError("HS105", "a whole number is at most 1e18", at, match.end(), hint)
+            raise ExpressionError("HS124", "a whole number is at most 1e18", at, match.end(), hint)
         return Fraction(value)
     power = int(exponent[1:]) if exponent else 0
     return _scaled(Fraction(digits), power, at, match.end())

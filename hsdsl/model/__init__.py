@@ -16,6 +16,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS, TaylorMethod
+from hsdsl.limits import Limits, applied
 from hsdsl.lower import lower
 from hsdsl.model import engines
 from hsdsl.model.estimate import Estimate, compare, finer_settings
@@ -36,13 +37,15 @@ if TYPE_CHECKING:
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
 
-def load(path: str | os.PathLike[str]) -> Model:
+def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
     """Read a model file.
 
     Parameters
     ----------
     path : path
         A YAML file in the language.
+    limits : Limits, optional
+        What the file may ask for, and where its data may lie, where the defaults are not to hold.
 
     Raises
     ------
@@ -52,15 +55,17 @@ def load(path: str | os.PathLike[str]) -> Model:
         The file cannot be read.
     """
     began = time.perf_counter()
-    system = elaborate(path)
-    return Model(system, time.perf_counter() - began)
+    with applied(limits):
+        system = elaborate(path)
+    return Model(system, time.perf_counter() - began, limits)
 
 
 class Model:
     """A checked model. ``system`` is the mathematics, ``program`` what an engine runs."""
 
-    def __init__(self, system: HybridSystem, load_seconds: float = 0.0) -> None:
+    def __init__(self, system: HybridSystem, load_seconds: float = 0.0, limits: Limits | None = None) -> None:
         self.system = system
+        self._limits = limits
         self._seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | None = None
         self._kernels: dict[int | None, PythonKernel] = {}
@@ -73,7 +78,8 @@ class Model:
     def program(self) -> Program:
         """The model lowered to routines, free of SymPy."""
         began = time.perf_counter()
-        program = lower(self.system)
+        with applied(self._limits):
+            program = lower(self.system)
         self._seconds["compile"] += time.perf_counter() - began
         return program
 

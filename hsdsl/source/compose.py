@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from hsdsl import limits
 from hsdsl.errors import Diagnostic, Findings, ModelError, Span
 from hsdsl.names import INVISIBLE, normalised, shown
 from hsdsl.source.commas import rejoined_entries, rejoined_items, spaced_entries
@@ -18,8 +19,6 @@ from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence, abse
 from hsdsl.source.text import Text
 
 DEEPEST = 64
-MOST_NODES = 200_000
-MOST_ENTRIES = 1_000
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -54,6 +53,7 @@ class _Composer:
         self.findings = findings
         self.depth = 0
         self.count = 0
+        self.limits = limits.current()
         self.anchors: dict[str, tuple[Node | None, int, int]] = {}  # node (None while open), nodes, height
         self.unused: dict[str, Any] = {}
 
@@ -126,9 +126,10 @@ class _Composer:
             key, more_keys, _ = self.node()
             value, more, tall = self.node()
             entries.append((key, value))
-            if len(entries) > MOST_ENTRIES:
-                message = f"a mapping has at most {MOST_ENTRIES:,} entries, and here one has more"
-                self._stop(key.place.diagnostic("HS003", message))
+            if len(entries) > self.limits.modes:
+                message = f"a mapping has at most {self.limits.modes:,} entries, and here one has more"
+                hint = f"allow more with --limit modes={self.limits.modes * 10}"
+                self._stop(key.place.diagnostic("HS016", message, hint))
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
         if event.flow_style:
@@ -172,12 +173,13 @@ class _Composer:
 
     def _grow(self, event: Any, nodes: int, height: int) -> None:
         self.count += nodes
-        if self.count > MOST_NODES:
-            message = f"the file has more than {MOST_NODES:,} values once its aliases are expanded"
-            self._stop(self._place(event).diagnostic("HS003", message))
+        if self.count > self.limits.values:
+            message = f"the file has more than {self.limits.values:,} values once its aliases are expanded"
+            hint = f"keep data in CSV files, or allow more with --limit values={self.limits.values * 10}"
+            self._stop(self._place(event).diagnostic("HS015", message, hint))
         if self.depth + height > DEEPEST:
             message = f"mappings and lists are nested more than {DEEPEST} deep here"
-            self._stop(self._place(event).diagnostic("HS003", message))
+            self._stop(self._place(event).diagnostic("HS014", message))
 
     def _place(self, event: Any, last: Any = None) -> Place:
         start, end = event.start_mark, (last or event).end_mark

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
+from hsdsl import limits
 from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
 from hsdsl.names import INVISIBLE, closest
 
-LARGEST_FILE = 1 << 20  # bytes
 _MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 _BREAK = re.compile("\r\n|\r|\n")
 _OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
@@ -52,7 +52,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """
     try:
         with Path(path).open("rb") as stream:
-            return stream.read(LARGEST_FILE + 1)
+            return stream.read(limits.current().bytes + 1)
     except (OSError, ValueError) as error:
         raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
 
@@ -93,8 +93,10 @@ def decode(path: str, data: bytes) -> Text:
         When it is too large, not UTF-8, or has characters that no model may have.
     """
     data = data.removeprefix(b"\xef\xbb\xbf")
-    if len(data) > LARGEST_FILE:
-        raise _refused(path, "HS003", "the file is larger than 1 MiB", "keep data in CSV files and name them in inputs")
+    most = limits.current().bytes
+    if len(data) > most:
+        hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
+        raise _refused(path, "HS003", f"the file is larger than {_size(most)}", hint)
     if data.startswith(_OTHER_ENCODINGS):
         raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
     try:
@@ -109,6 +111,10 @@ def decode(path: str, data: bytes) -> Text:
     if wrong:
         raise ModelError(wrong)
     return text
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MiB" if count % (1 << 20) == 0 else f"{count:,} bytes"
 
 
 def _refused(path: str, code: str, message: str, hint: str) -> ModelError:

@@ -12,6 +12,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import yaml
+
 from fuzz import seeds
 from hsdsl import limits
 from hsdsl.diagnose import as_json, render
@@ -57,7 +59,8 @@ class Guard:
         self.folder = str(folder.resolve())
         self.watching = False
         self.seen: list[str] = []
-        self._readable = (self.folder, sys.prefix, sys.base_prefix, str(seeds.TESTS.parent / "hsdsl"))
+        libraries = str(Path(yaml.__file__).parents[1])
+        self._readable = (self.folder, libraries, sys.prefix, sys.base_prefix, str(seeds.TESTS.parent / "hsdsl"))
         sys.addaudithook(self._hook)
 
     def _hook(self, event: str, arguments: tuple[Any, ...]) -> None:

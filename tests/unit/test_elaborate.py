@@ -150,7 +150,7 @@ def test_data_may_not_be_linked_from_outside(tmp_path):
     text = f"{HEAD}inputs: {{u: {{file: u.csv}}}}\nmodes: {{A: {{flow: {{x: u, v: 1}}}}}}\n{TAIL}"
     with pytest.raises(ModelError) as raised:
         system(text, folder / "m.yaml")
-    assert [d.code for d in raised.value.diagnostics] == ["HS311"]
+    assert [d.code for d in raised.value.diagnostics] == ["HS317"]
 
 
 def test_experiment_and_initial_are_expressions():

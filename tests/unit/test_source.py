@@ -5,8 +5,8 @@ import time
 import pytest
 
 from hsdsl.errors import Findings, ModelError, UsageError
+from hsdsl.limits import DEFAULT
 from hsdsl.source import Mapping, Scalar, Sequence, compose, decode, read_bytes
-from hsdsl.source.text import LARGEST_FILE
 
 
 def root(text):
@@ -103,18 +103,18 @@ def test_keys_are_one_spelling():
 
 def test_caps():
     assert root("a: " + "[" * 63 + "]" * 63)
-    assert codes("a: " + "[" * 64 + "]" * 64) == ["HS003"]
-    assert codes("[" * 100_000) == ["HS003"]
-    assert codes("- " * 50_000 + "x") == ["HS003"]
-    assert codes(b"#" * (LARGEST_FILE + 1)) == ["HS003"]
-    assert codes("a:\n" + "- x\n" * 200_001) == ["HS003"]
+    assert codes("a: " + "[" * 64 + "]" * 64) == ["HS014"]
+    assert codes("[" * 100_000) == ["HS014"]
+    assert codes("- " * 50_000 + "x") == ["HS014"]
+    assert codes(b"#" * (DEFAULT.bytes + 1)) == ["HS003"]
+    assert codes("a:\n" + "- x\n" * 200_001) == ["HS015"]
     lists = (f"b{i + 1}: &b{i + 1} [{', '.join([f'*b{i}'] * 50)}]\n" for i in range(4))
-    assert codes("b0: &b0 [x, x]\n" + "".join(lists)) == ["HS003"]
+    assert codes("b0: &b0 [x, x]\n" + "".join(lists)) == ["HS015"]
 
 
 def test_nesting_counts_inside_aliases():
     half = "[" * 40 + "]" * 40
-    assert codes(f"a: &a {half}\nb: {'[' * 40}*a{']' * 40}\n") == ["HS003"]
+    assert codes(f"a: &a {half}\nb: {'[' * 40}*a{']' * 40}\n") == ["HS014"]
 
 
 @pytest.mark.parametrize("text", ["", "# only\n", "\n\n", "---\n# x\n"])

@@ -1,11 +1,13 @@
 """Time boxes around symbolic work."""
 
+import os
 import threading
 import time
 
 import pytest
 import sympy as sp
 
+import hsdsl
 from hsdsl import limits
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
@@ -93,6 +95,54 @@ def test_lowering_that_takes_too_long_is_an_error(monkeypatch):
     with pytest.raises(ModelError) as raised, applied(Limits(seconds=0.1)):
         lower(system)
     assert [d.code for d in raised.value.diagnostics] == ["HS122"]
+
+
+def test_entries_and_values_and_bytes_are_capped(tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_bytes(MODEL)
+    for allowed, code in ((Limits(modes=2), "HS016"), (Limits(values=5), "HS015"), (Limits(bytes=50), "HS003")):
+        with pytest.raises(ModelError) as raised:
+            hsdsl.load(path, limits=allowed)
+        (found,) = raised.value.diagnostics
+        assert found.code == code
+        assert "--limit" in found.hint
+    hsdsl.load(path)
+
+
+def test_data_lies_in_the_folder_of_the_model_or_where_it_may(tmp_path, command):
+    (tmp_path / "models").mkdir()
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "u.csv").write_text("time,u\n0,1\n")
+    (tmp_path / "models" / "linked.csv").symlink_to(tmp_path / "data" / "u.csv")
+    path = tmp_path / "models" / "m.yaml"
+    for name in ("../data/u.csv", str(tmp_path / "data" / "u.csv"), "linked.csv"):
+        path.write_bytes(MODEL + f"inputs: {{u: {{file: {name}}}}}\n".encode())
+        with pytest.raises(ModelError) as raised:
+            hsdsl.load(path)
+        assert [d.code for d in raised.value.diagnostics] == ["HS317"]
+        hsdsl.load(path, limits=Limits(folders=(tmp_path / "data",)))
+        assert command("validate", path).code == 1
+        assert command("validate", path, "--allow-path", tmp_path / "data").code == 0
+        assert command("run", path, "-q", "--allow-path", tmp_path / "data").code == 0
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "u.csv")
+    with pytest.raises(ModelError) as raised:
+        elaborate(tmp_path / "m.yaml", text=MODEL + b"inputs: {u: {file: u.csv}}\n")
+    assert [d.code for d in raised.value.diagnostics] == ["HS311"]
+
+
+def test_limits_on_the_command_line(tmp_path, command):
+    path = tmp_path / "m.yaml"
+    path.write_bytes(MODEL)
+    assert command("validate", path, "--limit", "modes=2").code == 1
+    assert command("validate", path, "--limit", "modes=1e5", "--limit", "seconds=inf").code == 0
+    for wrong in (["--limit", "mods=3"], ["--limit", "modes=many"], ["--limit", "modes=-1"], ["--limit", "modes"]):
+        answer = command("validate", path, *wrong)
+        assert answer.code == 2 and "hsdsl: " in answer.err, wrong
+    assert command("run", path, "--json", "--limit", "modes=x").json["errors"][0]["message"]
+    assert command("run", path, "--allow-path", tmp_path / "nowhere").code == 2
 
 
 def test_limits_are_positive():
