@@ -23,7 +23,7 @@ with atheris.instrument_imports(include=["hsdsl"]):
 
 
 class Drawn(Random):
-    """Randomness that is read from the fuzzer's bytes; zeros once they are spent."""
+    """Randomness that is read from the fuzzer's bytes; once they are spent, always the same."""
 
     def __init__(self, data: bytes) -> None:
         self._provider = atheris.FuzzedDataProvider(data)
@@ -31,11 +31,15 @@ class Drawn(Random):
 
     def random(self) -> float:
         """A number in [0, 1)."""
-        return self._provider.ConsumeIntInRange(0, 2**32 - 1) / 2**32
+        if self._provider.remaining_bytes():
+            return self._provider.ConsumeIntInRange(0, 2**32 - 1) / 2**32
+        return super().random()
 
     def getrandbits(self, k: int) -> int:
         """``k`` bits."""
-        return self._provider.ConsumeIntInRange(0, 2 ** min(k, 63) - 1)
+        if self._provider.remaining_bytes() and k < 64:
+            return self._provider.ConsumeIntInRange(0, 2**k - 1)
+        return super().getrandbits(k)
 
 
 def main() -> None:
