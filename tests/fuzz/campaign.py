@@ -191,7 +191,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         ways.update(counted)
         faults += found
         peak, waiting = max(peak, high), waiting - 1
-        if sum(ways.values()) % (50 * BLOCK) == 0:
+        for fault in found:
+            if fault["what"] != "slow":
+                print(_line(fault), file=sys.stderr, flush=True)
+        if given % (50 * BLOCK) == 0:
             _say(options, ways, faults, began)
     for _ in crew.workers:
         crew.jobs.put(None)
@@ -206,6 +209,11 @@ def _say(options: argparse.Namespace, ways: Counter[str], faults: list[dict[str,
     grave = sum(f["what"] != "slow" for f in faults)
     print(f"{options.kind}: {counted}; {grave} faults, {len(faults) - grave} slow, {time.monotonic() - began:.0f} s",
           file=sys.stderr, flush=True)  # fmt: skip
+
+
+def _line(fault: dict[str, Any]) -> str:
+    where = f"--kind {fault['kind']} --seed {fault['seed']} --replay {fault['index']}"
+    return f"{fault['what']}: {where}: {fault.get('message', '')} {' > '.join(fault['trace'][-4:])}"
 
 
 def distinct(faults: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -238,6 +246,7 @@ def parsed(arguments: list[str] | None = None) -> argparse.Namespace:
 def main() -> int:
     """Run a campaign, or one input of it again."""
     options = parsed()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the workers end with it
     if options.replay is not None:
         return replay(options)
     result = run(options)
@@ -245,8 +254,7 @@ def main() -> int:
         options.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
     grave = distinct(result["faults"])
     for fault in grave:
-        print(f"{fault['what']} x {fault['times']}: --seed {fault['seed']} --replay {fault['index']}: "
-              f"{fault.get('message', '')} {' > '.join(fault['trace'][-4:])}")  # fmt: skip
+        print(f"{fault['times']} x {_line(fault)}")
     print(json.dumps({**result, "faults": sum(f["what"] != "slow" for f in result["faults"]),
                       "slow": sum(f["what"] == "slow" for f in result["faults"])}))  # fmt: skip
     return 1 if grave else 0

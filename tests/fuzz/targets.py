@@ -16,6 +16,7 @@ import yaml
 
 from fuzz import seeds
 from hsdsl import limits
+from hsdsl.backends.c import model_source
 from hsdsl.diagnose import as_json, render
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
@@ -44,6 +45,11 @@ _GENERATED = re.compile(
     r"|[xpabcsvwg]\d+|q_m?\d+_\d+"
     r"|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|log|sqrt|abs|sign|floor|min|max"
 )
+_GENERATED_C = re.compile(
+    r"Generated|from|a|model|see|h|for|what|the|tables|mean|include|static|extern|const|restrict|int|double|void|return"
+    r"|[ptx]|out|bad|hs|hs_\w+|HS_\w+|(?:routine|routines|edges|modes|walls|inputs|[a-z])_?\d+(?:_\d+)?|NAN"
+)
+_HEXADECIMAL = re.compile(r"\b0x[0-9a-f.]+p[-+]\d+")
 _WORD = re.compile(r"[^\W\d]\w*")
 _FORBIDDEN = ("os.", "subprocess.", "socket.", "shutil.", "ctypes.", "urllib.", "ftplib.", "pty.", "pickle.")
 
@@ -83,7 +89,9 @@ class Guard:
             self.seen.append(f"open {real} {mode}")
 
     def _compiled(self, source: Any, filename: Any) -> None:
-        if source is not None and not str(filename).startswith("<hsdsl"):
+        ours = str(filename).startswith(("<hsdsl", *self._readable[1:]))  # generated, or a module imported just now
+        ours = ours or (isinstance(source, bytes) and source.startswith(b"def routine("))
+        if source is not None and not ours:
             self.seen.append(f"compile {source!r:.200}")
 
     @contextmanager
@@ -186,10 +194,11 @@ def feed_document(data: bytes, rng: Random, folder: Path, share: float) -> str:
     program = model.program
     for routines in (program.constants, *(r for mode in program.modes for r in (mode.routines, mode.diagnosis))):
         check_text(routines.source)
+    check_c(model_source(program))
     try:
         with interrupted_after(0.1):
-            model.simulate(max_transitions=20)
-    except (UsageError, KeyboardInterrupt):
+            model.simulate(max_transitions=20, engine="python")
+    except (ModelError, UsageError, KeyboardInterrupt):
         return "lowered"
     return "run"
 
@@ -199,6 +208,13 @@ def check_text(source: str) -> None:
     for word in set(_WORD.findall(source)):
         if not _GENERATED.fullmatch(word):
             raise Violation(f"the name {word!r} stands in generated text")
+
+
+def check_c(source: str) -> None:
+    """Refuse generated C with a word in it that is not ours."""
+    for word in set(_WORD.findall(_HEXADECIMAL.sub("", source))):
+        if not _GENERATED_C.fullmatch(word):
+            raise Violation(f"the name {word!r} stands in generated C")
 
 
 def _check_said(text: str) -> None:
