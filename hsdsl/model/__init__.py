@@ -157,8 +157,9 @@ class Model:
         if request.method is None:
             chosen = replace(chosen, one_stop=one_stop(values, x))
         compiled = engines.choose(engine, chosen, precision, self._compile)
-        execution = simulate(self.program, values.kernel, chosen, values.parameters, mode, states, x, watch, compiled)
-        return replace(execution, title=self.system.title, seconds={**self._seconds, **execution.seconds})
+        return simulate(
+            self.program, values.kernel, chosen, values.parameters, mode, states, x, watch, compiled, self._seconds
+        )
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""

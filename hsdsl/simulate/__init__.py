@@ -24,7 +24,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -68,18 +68,20 @@ def simulate(
     x: State,
     watch: Callable[[Progress], None] | None = None,
     compiled: CompiledModel | None = None,
+    seconds: Mapping[str, float] | None = None,
 ) -> Execution:
     """Run a program from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given.
 
     ``watch`` is given the recorder before the run starts, so that another thread can show how far it is.
-    An interrupt (Ctrl-C) ends the run with what was computed.
+    An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
     """
+    spent = dict(seconds or {})
     timeline = make_timeline(program, kernel, parameters, settings.until)
     degree = settings.method.degree if settings.method else 0
     recorder = Recorder(kernel.arithmetic, settings.until, degree, len(program.outputs))
     run = Run(program, kernel, timeline, settings, make_control(settings, kernel.arithmetic), recorder)
     if compiled is not None:
-        return _by_compiled_loop(CompiledRun(run, compiled, mode, x), states, watch)
+        return _by_compiled_loop(CompiledRun(run, compiled, mode, x), states, spent, watch)
     if watch is not None:
         watch(recorder)
     zero = kernel.arithmetic.zero
@@ -91,21 +93,24 @@ def simulate(
         if not recorder.arcs:
             raise
         stop = interrupted(recorder.now)
-    seconds = time.perf_counter() - began
-    return _execution(run, stop, seconds, recorder.columns(), recorder.transitions)
+    spent["simulate"] = time.perf_counter() - began
+    return _execution(run, stop, spent, recorder.columns(), recorder.transitions)
 
 
 def _by_compiled_loop(
-    compiled: CompiledRun, states: tuple[str, ...], watch: Callable[[Progress], None] | None
+    compiled: CompiledRun,
+    states: tuple[str, ...],
+    spent: dict[str, float],
+    watch: Callable[[Progress], None] | None,
 ) -> Execution:
     if watch is not None:
         watch(compiled)
     began = time.perf_counter()
     stop = compiled.follow()
-    seconds = time.perf_counter() - began
+    spent["simulate"] = time.perf_counter() - began
     columns = execution_columns(compiled.whole, compiled.run.program, states)
     transitions = tuple(transitions_of(compiled.whole, compiled.run.program))
-    return _execution(compiled.run, stop, seconds, columns, transitions, engine="c")
+    return _execution(compiled.run, stop, spent, columns, transitions, engine="c")
 
 
 def _native(value: Any) -> Number:
@@ -116,7 +121,7 @@ def _native(value: Any) -> Number:
 def _execution(
     run: Run,
     stop: Stop,
-    seconds: float,
+    seconds: dict[str, float],
     columns: dict[str, Any],
     transitions: Sequence[Transition],
     engine: str = "python",
@@ -145,7 +150,8 @@ def _execution(
         verdict=verdict(transitions, run.recorder) if settings.one_stop is None else Verdict("unknown", NOTES),
         output_function=partial(output_values, run),
         output_names=program.outputs,
-        seconds={"simulate": seconds},
+        seconds=seconds,
+        title=program.title,
         digits=run.arithmetic.digits,
         **columns,
     )

@@ -99,7 +99,8 @@ void hs_simulate(hs_task *task) {
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
   run.control.order = task->method->order;
-  run.ticks = clock();
+  run.steps_to_poll = run.poll_steps = 64;
+  run.polled = clock();
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   relaxed(&run, enter(&run, task->mode, task->dimension, 0.0, 0));

@@ -1,10 +1,7 @@
 /* Rows, arcs and transitions, written to the caller's chunk. See hsdsl/simulate/recorder.py. */
 
 /* Whether there is room for one more of each; the caller is asked for it where there is not. */
-static int room(hs_run *run) {
-  hs_chunk *chunk = &run->task->chunk;
-  if (chunk->rows < chunk->row_room && chunk->arcs < chunk->arc_room && chunk->transitions < chunk->transition_room)
-    return 1;
+static int make_chunk(hs_run *run) {
   if (run->full) return 0;
   const int answer = run->task->flush(run->task);
   if (answer) run->interrupted = 1;
@@ -12,7 +9,14 @@ static int room(hs_run *run) {
   return !run->full;
 }
 
-static void write_row(hs_run *run, double t, const double *x, const hs_polynomial *piece, double depth,
+HS_INLINE int room(hs_run *run) {
+  const hs_chunk *chunk = &run->task->chunk;
+  return (chunk->rows < chunk->row_room && chunk->arcs < chunk->arc_room &&
+          chunk->transitions < chunk->transition_room) ||
+         make_chunk(run);
+}
+
+HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polynomial *piece, double depth,
                       hs_routine *outputs, const double *p) {
   hs_chunk *chunk = &run->task->chunk;
   const int n = run->here.dimension, w = run->width, m = run->model->outputs;
@@ -35,7 +39,7 @@ static void write_row(hs_run *run, double t, const double *x, const hs_polynomia
 }
 
 /* Add the piece that leads to a row, and the row. */
-static inline void append(hs_run *run, double t, const double *x, const hs_polynomial *piece) {
+HS_INLINE void append(hs_run *run, double t, const double *x, const hs_polynomial *piece) {
   write_row(run, t, x, piece, 0.0, run->here.outputs, run->here.outputs_p);
 }
 

@@ -2,21 +2,20 @@
 
 #define ALMOST (1 - 0x1p-30)
 #define MOST_HALVINGS 122 /* 16 - 2 log2(u) */
-#define POLL_STEPS 256u
-#define POLL_SHARE 50 /* seconds / 50 */
+#define POLL_EVERY (CLOCKS_PER_SEC / 50)
 
 enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and reasons to stop */
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
-static hs_found attempt(hs_run *run, double h, double t1) {
+HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
   const hs_here *here = &run->here;
   const hs_mode *mode = here->table;
   hs_trial *trial = &run->trial;
-  const int n = here->dimension, m = mode->surfaces;
+  const int m = mode->surfaces;
   hs_found found;
   trial->t = here->t, trial->h = h, trial->t1 = t1;
   trial->looked = trial->ends = trial->has_piece = 0;
-  if (step(run, here->t, h) || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
+  if (step(run, n, here->t, h) || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
   double largest = m ? run->ahead[0] : 0.0;
   for (int k = 1; k < m; k++) largest = hs_max(largest, run->ahead[k]);
   if (largest <= 0) {
@@ -73,20 +72,27 @@ static int stuck(hs_run *run, hs_obstacle kind, int surface) {
   return stopped(run, HS_STUCK, run->here.t);
 }
 
-/* Whether to go on: the caller is asked now and then. */
+/* Ask the caller whether to go on; a clock costs more than a step, so how many steps lie between is learnt. */
+static void poll(hs_run *run) {
+  const clock_t now = clock();
+  if (now - run->polled < POLL_EVERY) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
+  if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
+  run->steps_to_poll = run->poll_steps;
+  run->polled = now;
+  if (run->task->poll(run->task)) run->interrupted = 1;
+}
+
+/* Whether to stop: the caller is asked now and then. */
 static int interrupted(hs_run *run) {
-  if (++run->steps % POLL_STEPS == 0 && clock() - run->ticks > CLOCKS_PER_SEC / POLL_SHARE) {
-    run->ticks = clock();
-    if (run->task->poll(run->task)) run->interrupted = 1;
-  }
+  if (--run->steps_to_poll == 0) poll(run);
   return run->interrupted;
 }
 
 /* Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9). */
-static int flow(hs_run *run) {
+HS_INLINE int flow_in(hs_run *run, const int n) {
   hs_here *here = &run->here;
   hs_control *control = &run->control;
-  const int n = here->dimension, adaptive = control->tolerance > 0, curved = run->method->degree > 0;
+  const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const double limit = run->task->timeline->end[here->segment];
   run->patience.reached = NAN;
   run->patience.idle = run->patience.creeping = 0;
@@ -101,7 +107,7 @@ static int flow(hs_run *run) {
         t1 = here->t + h;
       else
         h = limit - here->t, t1 = limit;
-      found = attempt(run, h, t1);
+      found = attempt(run, n, h, t1);
       if (adaptive && run->trial.ends && found.obstacle == HS_CLEAR) {
         local_error(run, h);
         ratio = error_ratio(run);
@@ -136,10 +142,23 @@ static int flow(hs_run *run) {
     if (here->standing) leave(run, t1, run->z);
     append(run, t1, run->z, curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0);
     here->t = t1;
-    copy(run->x, run->z, n);
-    copy(run->slope, run->end, n);
+    swap(&run->x, &run->z);
+    swap(&run->slope, &run->end);
+    run->k[0] = run->slope;
+    run->k[run->method->stages] = run->end;
   }
   return AT_BOUNDARY;
+}
+
+/* The same for any number of states; for a few the compiler is told how many, and needs no loops over them. */
+static int flow(hs_run *run) {
+  switch (run->here.dimension) {
+    case 1: return flow_in(run, 1);
+    case 2: return flow_in(run, 2);
+    case 3: return flow_in(run, 3);
+    case 4: return flow_in(run, 4);
+    default: return flow_in(run, run->here.dimension);
+  }
 }
 
 static int in_strip(hs_run *run, hs_reason reason, double t) {

@@ -8,6 +8,12 @@
 #include "hs_math.h"
 #include "hs_simulate.h"
 
+#if defined(__GNUC__)
+#define HS_INLINE static inline __attribute__((always_inline))
+#else
+#define HS_INLINE static inline
+#endif
+
 #define HS_UNIT 0x1p-53
 #define HS_TIE 1e-12
 
@@ -87,8 +93,8 @@ typedef struct {
   double landed_at;    /* the end of a step into a strip */
   int64_t row, jump;   /* counted from the start of the run */
   int interrupted, full;
-  clock_t ticks;
-  unsigned steps;
+  long steps_to_poll, poll_steps;
+  clock_t polled;
 } hs_run;
 
 static inline double tie(double t) { return HS_TIE * hs_max(1.0, fabs(t)); }
@@ -103,6 +109,12 @@ static inline double sum(const double *v, int n) {
   double total = 0.0;
   for (int i = 0; i < n; i++) total += v[i];
   return total;
+}
+
+static inline void swap(double **a, double **b) {
+  double *const kept = *a;
+  *a = *b;
+  *b = kept;
 }
 
 static inline void copy(double *to, const double *from, int n) {

@@ -1,6 +1,6 @@
 /* From a table to steps: sums go left to right, as in the functions hsdsl/integrators/stepper.py writes out. */
 
-static inline double weighted(const hs_row *row, double *const *k, int state) {
+HS_INLINE double weighted(const hs_row *row, double *const *k, int state) {
   if (!row->terms) return 0.0;
   double total = row->weight[0] * k[row->stage[0]][state];
   for (int i = 1; i < row->terms; i++) total += row->weight[i] * k[row->stage[i]][state];
@@ -8,17 +8,17 @@ static inline double weighted(const hs_row *row, double *const *k, int state) {
 }
 
 /* Evaluate stage i of a step from (t, run->x); not 0 where the flow has no value. */
-static inline int evaluate(hs_run *run, int i, double t, double h) {
+HS_INLINE int evaluate(hs_run *run, int n, int i, double t, double h) {
   const hs_method *method = run->method;
-  for (int s = 0; s < run->here.dimension; s++) run->at[s] = run->x[s] + h * weighted(&method->a[i], run->k, s);
+  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + h * weighted(&method->a[i], run->k, s);
   return run->here.table->flow(run->here.p, t + method->c[i] * h, run->at, run->k[i]);
 }
 
 /* One step from (t, run->x) to run->z; not 0 where the flow has no value. */
-static inline int step(hs_run *run, double t, double h) {
+HS_INLINE int step(hs_run *run, int n, double t, double h) {
   for (int i = 1; i < run->method->stages; i++)
-    if (evaluate(run, i, t, h)) return 1;
-  for (int s = 0; s < run->here.dimension; s++) run->z[s] = run->x[s] + h * weighted(&run->method->b, run->k, s);
+    if (evaluate(run, n, i, t, h)) return 1;
+  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + h * weighted(&run->method->b, run->k, s);
   return 0;
 }
 
@@ -45,7 +45,7 @@ static int method_piece(hs_run *run, double t, double h, hs_polynomial *piece) {
   if (method->interpolant == HS_HERMITE) return hermite(run, h, piece), 0;
   if (method->interpolant == HS_SECANT) return secant(run, piece), 0;
   for (int i = 0; i < method->extra; i++)
-    if (evaluate(run, method->stages + 1 + i, t, h)) return 1;
+    if (evaluate(run, run->here.dimension, method->stages + 1 + i, t, h)) return 1;
   piece->degree = method->degree;
   for (int m = 0; m < method->degree; m++)
     for (int s = 0; s < run->here.dimension; s++)

@@ -1,0 +1,43 @@
+"""Run every case, every model and some random ones by the compiled loop, in small chunks: to be run under sanitizers.
+
+Started by `unit/test_sanitizers.py`; a fault ends the process with a message of the sanitizer.
+"""
+
+from __future__ import annotations
+
+from conformance.test_agreement import FLOATS, LONG, MODELS, STEPS, arguments
+from conformance.test_conformance import CASES, Run, model, read
+from property.random_models import SETTINGS, random_model
+
+import hsdsl
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import ModelError, UsageError
+from hsdsl.integrators import INTEGRATORS
+from hsdsl.model import Model
+from hsdsl.simulate import chunks
+
+
+def main() -> None:
+    chunks.LEAST_ROWS, chunks.MOST_ROWS = 12, 200
+    count = 0
+    for name in CASES:
+        for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():
+            for setting in list(FLOATS.values())[::3]:
+                count += model(name).simulate(**arguments(run, setting), engine="c").engine == "c"
+    for path in MODELS.values():
+        loaded = hsdsl.load(path)
+        for method in INTEGRATORS:
+            for setting in STEPS:
+                count += loaded.simulate(method=method, max_transitions=40, **setting, engine="c").engine == "c"
+    for seed in range(25):
+        try:
+            drawn = Model(elaborate("random.yaml", text=random_model(seed).encode()))
+            for setting in SETTINGS:
+                count += drawn.simulate(max_transitions=25, **setting, engine="c").engine == "c"
+        except (ModelError, UsageError):
+            continue
+    print(f"{count} runs")
+
+
+if __name__ == "__main__":
+    main()
