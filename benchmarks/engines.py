@@ -1,8 +1,8 @@
 """What the engines cost, beside a C program written by hand for the one model.
 
 Relaxed midpoint on the forced oscillator with stop (Burden et al. 2013, Sec. V-B, example 1), by the Python loop, by
-the compiled loop, and by `by_hand.c`, which has the model written into its loop and keeps every step; the runner by both
-engines. All in turn and in one process; a run that does not end where the others do has no time.
+the compiled loop, and by `by_hand.c`, which has the model written into its loop and keeps every step; the runner by
+both engines. All in turn and in one process; a run that does not end where the others do has no time.
 
     python benchmarks/engines.py [--repetitions 7] [--step 1e-3]
 """
