@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl import __version__
 from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, report_usage, say
-from hsdsl.diagnose import as_annotation, as_json, as_sarif, finding, render
+from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Gathered:
     def _json(self, lint: bool) -> None:
         from hsdsl.report import dumps
 
-        said: dict[str, Any] = {"models": self.entries, **as_json(self.errors)}
+        said: dict[str, Any] = {"models": self.entries, "errors": [measured(error) for error in self.errors]}
         if lint:
             said["findings"] = [finding(diagnostic) for diagnostic in self.findings]
             said["ignored"] = [{**finding(i.diagnostic), "reason": i.reason} for i in self.ignored]

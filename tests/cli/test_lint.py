@@ -65,7 +65,7 @@ def test_json(command, bad, model):
         "fixable": True,
     }
     assert [entry["reason"] for entry in answer.json["ignored"]] == ["for later"] * 2
-    assert [error["code"] for error in answer.json["errors"]] == ["HS303"]
+    assert [(error["code"], error["length"]) for error in answer.json["errors"]] == [("HS303", 3)]
     assert command("lint", bad, *ONLY, "--json").json["findings"] == [finding]
 
 

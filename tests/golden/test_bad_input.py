@@ -39,7 +39,7 @@ def test_places_are_in_the_file_and_in_order(case):
     places = [(d.span.path, d.span.line, d.span.column) for d in found]
     assert places == sorted(places, key=lambda p: (p[0] != case.name, *p))
     for entry in as_json(found)["errors"]:
-        assert set(entry) == {"code", "path", "line", "column", "length", "message", "hint"}
+        assert set(entry) == {"code", "path", "line", "column", "message", "hint"}
         lines = Path(entry["path"]).read_bytes().decode("utf-8", "replace").splitlines() or [""]
         assert 1 <= entry["line"] <= len(lines) + 1
         assert entry["column"] <= len(lines[min(entry["line"], len(lines)) - 1]) + 1
