@@ -17,7 +17,7 @@ from hsdsl.simulate.isolate import Coefficients, last_root, rises, value
 
 LEAST_DEGREE = 4
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
-FAR = 16  # residuals: a surface this far from zero at all nodes has no root between them
+MOST_PIECES = 1000  # of a step, before what is left is taken as it is
 ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 Function = Callable[[Number], Number]
 
@@ -108,6 +108,7 @@ def interpolated(
     nodes = [arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1)]
     tests = [arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1)]
     matrix = _to_powers(degree, arithmetic)
+    share = share + arithmetic.unit * sum(abs(m) for line in matrix for m in line)
     zero = arithmetic.zero
     parts: list[tuple[Number, Number, int]] = [(zero, zero + 1, 0)]
     found: list[list[Piece]] = [[] for _ in range(count)]
@@ -117,10 +118,10 @@ def interpolated(
         checks = list(zip(*(functions(start + width * s) for s in tests), strict=True))
         pieces = [[sum((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
         settled = [
-            _settled(max(abs(value(c, s) - w) for s, w in zip(tests, check, strict=True)), row, limit, share)
+            residual(c, tests, check) <= limit + share * max(abs(r) for r in row)
             for c, row, check, limit in zip(pieces, rows, checks, allowed, strict=True)
         ]
-        if not all(settled) and halvings < MOST_HALVINGS:
+        if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < MOST_PIECES:
             half = width / 2
             parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]
             continue
@@ -130,13 +131,9 @@ def interpolated(
     return found
 
 
-def _settled(residual: Number, row: Sequence[Number], allowed: Number, share: Number) -> bool:
-    """Whether a residual is small enough, or the surface too far from zero for it to matter."""
-    return bool(
-        residual <= allowed + share * max(abs(r) for r in row)
-        or max(row) < -FAR * residual
-        or min(row) > FAR * residual
-    )
+def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number]) -> Number:
+    """How far a polynomial is off the values it should have at some points."""
+    return max(abs(value(c, s) - w) for s, w in zip(tests, wanted, strict=True))
 
 
 @cache

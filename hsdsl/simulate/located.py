@@ -111,7 +111,9 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:
-                run.recorder.doubts.append(f"a surface would not settle on a polynomial around t = {show(time)}")
+                run.recorder.doubt(
+                    k, f"surface {k} of mode {here.mode.name} would not settle on a polynomial at t = {show(time)}"
+                )
             return Crossing(k, theta, time, q, zero)
     return None
 
@@ -161,6 +163,9 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
         return stop
     outcome, resumed = reset(here, crossing, landing.scale, run), t
     if crowded(run, t):
+        run.recorder.depart(
+            "crowded", f"more than {FREE} transitions within the relaxation, from t = {show(t)} on in strips"
+        )
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
@@ -172,16 +177,27 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
     if resumed > t:
         run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
     after, scale = outcome
+    since = run.tie(t) if landing.alternatives or same_instant(run, t) else run.arithmetic.zero
     run.record(here, crossing, resumed, after, landing.alternatives)
-    since = run.tie(t) if landing.alternatives else run.arithmetic.zero
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since)
     return entered if isinstance(entered, Stop) else close_tail(run, entered, crossing.edge)
 
 
-def crowded(run: Run, t: Number) -> bool:
-    """Whether as many transitions as cost no time have fallen within the relaxation, and do not run to a limit."""
+def same_instant(run: Run, t: Number) -> bool:
+    """Whether the transition before this one was made at the same instant."""
     made = run.recorder.transitions
-    return len(made) >= FREE and t - made[-FREE].time <= run.settings.relaxation and contraction(made) is None
+    return bool(made) and made[-1].resumed is not None and t - made[-1].resumed <= run.tie(t)
+
+
+def crowded(run: Run, t: Number) -> bool:
+    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit."""
+    last = run.recorder.transitions[-FREE:]
+    if len(last) < FREE or contraction(last) is not None:
+        return False
+    flown = t - last[0].time
+    for made in last:
+        flown = flown - (made.resumed - made.time if made.resumed is not None else 0)
+    return flown <= run.settings.relaxation
 
 
 def at_boundary(run: Run, here: Here) -> Here | Stop:

@@ -15,7 +15,7 @@ from hsdsl.simulate.stops import show
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 PARALLEL = 1e-6
-DEGREE, SHARE, CORRECTIONS = 8, 1e-13, 8
+DEGREE, SHARE, CORRECTIONS = 6, 1e-12, 8
 
 
 def rests(run: Run, here: Here) -> int | None:
@@ -101,7 +101,7 @@ def hold(run: Run, here: Here, k: int) -> Here:
     release = released(run, here, k, order, end)
     edge, until = here.mode.edges[k].name, end if release is None else release
     here.arc.append(until, here.x, (tuple(run.arithmetic.zero for _ in here.x),))
-    run.recorder.departures.append(f"at rest on the guard of {edge} from t = {show(here.t)} to t = {show(until)}")
+    run.recorder.depart(None, f"at rest on the guard of {edge} from t = {show(here.t)} to t = {show(until)}")
     if release is None:
         return here.moved(end, here.x)
     mode = run.program.modes.index(here.mode)

@@ -23,7 +23,8 @@ from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
 RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
 UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
-DEGREE = 8  # of the interpolation of a surface along a Taylor step
+LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
+DEGREE = 6  # of the interpolation of a surface along a Taylor step
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,9 @@ def stepping(run: Run, here: Here) -> Stepping:
     if isinstance(run.settings.method, TaylorMethod):
         series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
         assert series is not None
-        return SeriesSteps(run, here, run.settings.method, series)
+        error = run.stepper(here).error
+        assert error is not None
+        return SeriesSteps(run, here, run.settings.method, series, error)
     return TableSteps(run, here, run.stepper(here))
 
 
@@ -147,6 +150,7 @@ class SeriesSteps:
     here: Here
     method: TaylorMethod
     series: Taylor
+    error: Callable[[Number, Stages, State], State]
 
     def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
         """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
@@ -187,10 +191,8 @@ class SeriesSteps:
             end = here.kernel.flow(t1, *z)
             if not run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
-            method = run.stepper(here)
-            assert method.error is not None
             tolerance = run.control.tolerance
-            if tolerance is not None and run.control.ratio(method.error(h, stages, end), x, z) > max(
+            if tolerance is not None and run.control.ratio(self.error(h, stages, end), x, z) > max(
                 1, 64 * run.arithmetic.unit / tolerance
             ):
                 return TOO_WRONG
@@ -233,11 +235,17 @@ class SeriesSteps:
             for c in row or ():
                 scaled.append(c * power)
                 power = power * h
-            allowed = 4 * here.surfaces.noise(k, t1, z) + share(run) * sum(map(abs, scaled))
-            if not scaled or not abs(value(scaled, zero + 1) - end) <= allowed:
+            if not scaled or not self._converges(scaled, end, here.surfaces.noise(k, t1, z)):
                 return interpolate(run, here, t, h, x, z, piece, DEGREE)
             curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
         return curves
+
+    def _converges(self, c: list[Number], end: Number, noise: Number) -> bool:
+        """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step."""
+        given, largest = self.run.control.tolerance, max(abs(a) for a in c)
+        tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
+        tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
+        return tail and abs(value(c, end * 0 + 1) - end) <= 4 * noise + tolerance * largest
 
 
 def interpolate(

@@ -29,7 +29,8 @@ def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
     if not flights[-1] > 0:
         return None
     ratios = [b / a for a, b in pairwise(flights) if a > 0]
-    return (flights[-1], max(ratios)) if max(ratios) < 1 else None
+    shrinking = len(ratios) == LEAST_FLIGHTS - 1 and max(ratios) < 1
+    return (flights[-1], max(ratios)) if shrinking else None
 
 
 def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
@@ -56,11 +57,12 @@ def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
     edge = here.mode.edges[k].name
     if not alone:
         sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
-        run.recorder.departures.append(f"Zeno at t = {show(end)}: {sentence}")
+        run.recorder.depart(None, f"Zeno at t = {show(end)}: {sentence}")
         return Stop("zeno", here.t, sentence)
-    run.recorder.departures.append(
+    run.recorder.depart(
+        None,
         f"Zeno at t = {show(end)}: the transitions of {edge} after number {len(made) - 1}, all within {show(left)} "
-        "of each other, are replaced by their limit"
+        "of each other, are replaced by their limit",
     )
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     mode = run.program.modes.index(here.mode)

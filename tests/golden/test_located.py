@@ -1,0 +1,152 @@
+"""The located scheme against exact executions: oscillators, Zeno points and rest, two legs at once, fifty digits."""
+
+from __future__ import annotations
+
+import random
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.exact.stop import Motion, Oscillator, exact_example_1, exact_example_2
+
+MODELS = Path(__file__).parents[2] / "models"
+METHODS = ["taylor", "dop853", "dopri5"]
+
+
+@lru_cache
+def model(name: str) -> Any:
+    """A model of the folder, loaded once."""
+    return hsdsl.load(MODELS / f"{name}.yaml")
+
+
+def located(name: str, method: str, tolerance: Any, **more: Any) -> Any:
+    return model(name).simulate(scheme="located", method=method, tolerance=tolerance, **more)
+
+
+@pytest.mark.parametrize(("method", "within"), [("taylor", 1e-11), ("dop853", 1e-11)])
+def test_all_impacts_of_example_1(method: str, within: float) -> None:
+    run, exact = located("oscillator-with-stop-1", method, 1e-12), exact_example_1()
+    assert len(run.transitions) == 49
+    assert max(abs(t.time - float(i.time)) for t, i in zip(run.transitions, exact.impacts, strict=True)) <= within
+    assert all(t.resumed == t.time for t in run.transitions)
+    assert np.max(np.abs(run.values[:-1, 0] - exact.at(run.times[:-1])[0])) <= 100 * within
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_no_impact_is_missed_or_made_up_at_loose_tolerances(method: str, tolerance: float) -> None:
+    assert len(located("oscillator-with-stop-1", method, tolerance).transitions) == 49
+
+
+def test_fifty_digits() -> None:
+    """To 45 digits after twenty impacts, each of which passes its error on."""
+    run = located("oscillator-with-stop-1", "taylor", "1e-50", precision=50, until=50)
+    impacts = [i for i in exact_example_1().impacts if i.time <= 50]
+    with mp.workdps(60):
+        off = [abs(mp.mpf(t.time) - mp.mpf(str(i.time))) for t, i in zip(run.transitions, impacts, strict=True)]
+        assert max(off) <= mp.mpf(10) ** -45, mp.nstr(max(off), 3)
+
+
+@pytest.mark.parametrize(("method", "within"), [("taylor", 1e-11), ("dop853", 1e-11), ("dopri5", 2e-10)])
+def test_example_2_through_both_zeno_points(method: str, within: float) -> None:
+    """Impacts are no faster than 0.2, so an error in position counts at least five times in their times."""
+    run, exact = located("oscillator-with-stop-2", method, 1e-12, relaxation=1e-9), exact_example_2()
+    assert run.stop.reason == "until"
+    assert run.verdict.theorem == "left"
+    assert [reason.split()[0] for reason in run.verdict.reasons] == ["at", "Zeno", "at", "Zeno", "at"]
+    rests = [a for a in run.arcs if a.last > a.first and np.all(run.values[a.first : a.last + 1, 1] == 0)]
+    starts, ends = zip(*((run.times[a.first], run.times[a.last]) for a in rests), strict=True)
+    assert np.allclose(starts, [0, *map(float, exact.zeno)], rtol=0, atol=within)
+    assert np.allclose(ends[:2], [float(t) for t in exact.released[:2]], rtol=0, atol=1e-11)
+    made = [i.time for i in exact.impacts if i.time < exact.zeno[0]]
+    tail = [t.time for t in run.transitions if t.time < float(exact.zeno[0])]
+    assert 20 <= len(tail) <= len(made)
+    assert max(abs(t - float(wanted)) for t, wanted in zip(tail, made, strict=False)) <= within
+    times = np.linspace(0, 12.5, 400)
+    assert np.max(np.abs(run.sample(times)["x"] - exact.at(times)[0])) <= 1e-10
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_ball_comes_to_rest(method: str) -> None:
+    run = located("bouncing-ball", method, 1e-12, until=14)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    rest = run.arcs[-1]
+    assert run.times[rest.first] == pytest.approx(12.850588106343579, abs=1e-11)
+    assert run.final.state["v"] == 0 and abs(run.final.state["h"]) <= 1e-12
+
+
+ROLLING = """
+hsdsl: 1
+parameters: {e: 1/2}
+modes:
+  fly:
+    flow: {x: 1, h: v, v: -2}
+    transitions: [{when: h <= 0, to: fly, reset: {v: -e*v}}]
+initial: {mode: fly, x: 0, h: 1, v: 0}
+experiment: {until: 5, scheme: located}
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_ball_that_bounces_and_rolls_is_not_frozen(method: str, tmp_path: Any) -> None:
+    """It falls for 1; flights of 1, 1/2, 1/4, ... follow and end at t = 3."""
+    path = tmp_path / "rolling.yaml"
+    path.write_text(ROLLING)
+    run = hsdsl.load(path).simulate(method=method)
+    assert run.stop.reason == "zeno" and "something else moves on" in run.stop.message
+    assert run.stop.time == pytest.approx(3, abs=2e-6)
+    assert run.verdict.theorem == "left"
+    assert run.final.state["x"] == pytest.approx(run.stop.time, abs=1e-9)
+
+
+EDGES = ["aerial->left", "left->ground", "ground->last_right", "last_right->ascent", "ascent->apex"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("w", ["0", "1e-12", "-1e-12", "1e-10", "-1e-8", "1e-5", "-1e-3", "1e-3", "-0.4"])
+def test_both_legs_touch_down(w: str, tolerance: float, method: str) -> None:
+    """At once, or apart by about w/10."""
+    run = located("pronking-runner", method, tolerance, initial={"w": w})
+    assert run.stop.reason == "final" and run.final.mode == "apex", run.stop.message
+    assert len(run.transitions) == 5
+    assert not any(t.entry for t in run.transitions)
+    if w == "0":
+        assert run.transitions[0].time == run.transitions[1].time
+        assert [t.edge for t in run.transitions] == EDGES
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("w", "apex"), [("0", 0.9259377788821), ("-0.4", 0.6683909550717)])
+def test_runner_to_its_apex(w: str, apex: float, method: str) -> None:
+    assert located("pronking-runner", method, 1e-13, initial={"w": w}).stop.time == pytest.approx(apex, abs=1e-11)
+
+
+@lru_cache
+def varied(directory: Path) -> Any:
+    """Example 1 with the amplitude of its forcing as a parameter."""
+    text = (MODELS / "oscillator-with-stop-1.yaml").read_text()
+    text = text[: text.index("# Between impacts")].replace("{a: 0.05,", "{A: 20, a: 0.05,").replace("20*cos", "A*cos")
+    path = directory / "varied.yaml"
+    path.write_text(text)
+    return hsdsl.load(path)
+
+
+@pytest.mark.parametrize("count", [8, pytest.param(150, marks=pytest.mark.slow)])
+def test_no_impact_is_missed_or_made_up_whatever_the_parameters(count: int, tmp_path: Path) -> None:
+    """Restitution and forcing varied, against the closed form."""
+    rng, until = random.Random(7), 37.7
+    for _ in range(count):
+        c, amplitude = f"{rng.uniform(0.3, 0.95):.6f}", f"{rng.uniform(8, 30):.6f}"
+        exact = Motion(Oscillator("0.05", c, "2.5", "14", amplitude), mp.mpf("11.36"), mp.mpf("31.4"), mp.mpf(until))
+        run = varied(tmp_path).simulate(
+            scheme="located", method="taylor", tolerance=1e-10, until=until, parameters={"c": c, "A": amplitude}
+        )
+        assert len(run.transitions) == len(exact.impacts), (c, amplitude)
+        off = [abs(t.time - float(i.time)) for t, i in zip(run.transitions, exact.impacts, strict=True)]
+        assert max(off, default=0) <= 1e-7, (c, amplitude)

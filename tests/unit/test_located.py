@@ -1,0 +1,101 @@
+"""What the located scheme does off the smooth road: strips, kinks, fast surfaces, inputs, tangential restarts."""
+
+from __future__ import annotations
+
+from math import asin, pi, sqrt
+from typing import Any
+
+import pytest
+
+import hsdsl
+
+METHODS = ["taylor", "dopri5"]
+
+
+def run(directory: Any, text: str, **more: Any) -> Any:
+    path = directory / "model.yaml"
+    path.write_text("hsdsl: 1\n" + text)
+    return hsdsl.load(path).simulate(scheme="located", **more)
+
+
+CHATTER = """
+modes:
+  a: {flow: {x: 1}, transitions: [{when: x >= 0, to: b}]}
+  b: {flow: {x: -1}, transitions: [{when: x <= 0, to: a}]}
+initial: {mode: a, x: -1}
+experiment: {until: 1.1, relaxation: 1e-3}
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_strips_open_only_after_sixteen_transitions_within_the_relaxation(method: str, tmp_path: Any) -> None:
+    made = run(tmp_path, CHATTER, method=method)
+    delays = [t.resumed - t.time for t in made.transitions if t.resumed is not None]
+    assert delays[:16] == [0] * 16
+    assert delays[16:] == pytest.approx([1e-3] * len(delays[16:]), abs=1e-12)
+    assert 100 <= len(delays[16:]) <= 101
+    assert made.verdict.theorem == "left" and "in strips" in made.verdict.reasons[0]
+
+
+KINKED = """
+modes:
+  a: {flow: {x: v, v: -x}, transitions: [{when: abs(x) >= 0.9, to: b}]}
+  b: {flow: {x: v, v: -x}, transitions: [{when: abs(x) <= 0.1, to: c}]}
+  c: {flow: {x: v, v: -x}}
+initial: {mode: a, x: 0, v: 1}
+experiment: {until: 4, tolerance: 1e-12}
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_kinked_surfaces(method: str, tmp_path: Any) -> None:
+    made = run(tmp_path, KINKED, method=method)
+    assert [t.time for t in made.transitions] == pytest.approx([asin(0.9), pi - asin(0.1)], abs=1e-10)
+
+
+def test_a_jumping_surface_is_met_and_named_as_uncertain(tmp_path: Any) -> None:
+    text = "modes: {a: {flow: {x: 1}, transitions: [{when: sign(x - 1) >= 0, to: b}]}, b: {flow: {x: 0}}}\n"
+    made = run(tmp_path, text + "initial: {mode: a, x: 1/3}\nexperiment: {until: 2}\n", method="dopri5")
+    assert [t.time for t in made.transitions] == pytest.approx([2 / 3], abs=1e-9)
+    assert "would not settle on a polynomial" in made.verdict.reasons[0]
+
+
+FAST = """
+modes:
+  a: {flow: {x: 1}, transitions: [{when: sin(200*t) >= 0.999999, to: b}]}
+  b: {flow: {x: 1}}
+initial: {mode: a, x: 0}
+experiment: {until: 1}
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_surface_far_faster_than_the_flow(method: str, tmp_path: Any) -> None:
+    """Above for 14 millionths at a time, while the flow alone would allow steps of a tenth."""
+    made = run(tmp_path, FAST, method=method)
+    assert [t.time for t in made.transitions] == pytest.approx([asin(0.999999) / 200], abs=1e-11)
+
+
+GRAZE = """
+modes:
+  a: {flow: {x: 1, y: "-2*(x - 1)"}, transitions: [{when: y >= 1, to: b}]}
+  b: {flow: {x: 0, y: 0}}
+initial: {mode: a, x: 0, y: 1e-9}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_visit_of_a_billionth_within_one_step(method: str, tmp_path: Any) -> None:
+    assert run(tmp_path, GRAZE, method=method).final.state["x"] == pytest.approx(1 - sqrt(1e-9), abs=1e-9)
+    below = run(tmp_path, GRAZE.replace("y: 1e-9", "y: -1e-9"), method=method)
+    assert below.transitions == () and below.stop.reason == "until"
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("push", "fires"), [("t**2", True), ("-t**2", False), ("t - t**2/2", True)])
+def test_a_restart_on_the_guard_that_leaves_it_tangentially(push: str, fires: bool, method: str, tmp_path: Any) -> None:
+    """From r = 0 with L_f r = 0: outwards it goes at once, inwards never."""
+    text = f"modes: {{a: {{flow: {{x: {push}}}, transitions: [{{when: x >= 0, to: b}}]}}, b: {{flow: {{x: 0}}}}}}\n"
+    made = run(tmp_path, text + "initial: {mode: a, x: 0}\nexperiment: {until: 1}\n", method=method)
+    assert [t.time for t in made.transitions] == ([0] if fires else [])
