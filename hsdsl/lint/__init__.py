@@ -90,4 +90,4 @@ def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:
 
 def _diagnostic(subject: Subject, code: str, f: Finding) -> Diagnostic:
     line = subject.reading.text.lines[f.span.line - 1] if f.span.path == subject.system.path else None
-    return Diagnostic(code, f.message, f.span, f.hint, line, RULES[code].severity, f.decided, f.fix)
+    return Diagnostic(code, f.message, f.span, f.hint, line, f.severity or RULES[code].severity, f.decided, f.fix)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hsdsl.errors import Decided, Edit, Span
+from hsdsl.errors import Decided, Edit, Severity, Span
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a rule has found. Its code and its severity are the rule's.
+    """One thing that a rule has found. Its code is the rule's.
 
     Attributes
     ----------
@@ -23,6 +23,8 @@ class Finding:
         How it is known: for all values, by bounds over boxes, or at points that were tried.
     fix : tuple of Edit
         Changes of the text that remedy it and leave what the model means as it is; empty where there are none.
+    severity : {"warning", "note"} or None
+        How much it weighs, where that is not what the rule's findings usually weigh.
     """
 
     span: Span
@@ -30,3 +32,4 @@ class Finding:
     hint: str | None = None
     decided: Decided = "symbolic"
     fix: tuple[Edit, ...] = ()
+    severity: Severity | None = None

@@ -14,6 +14,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
 from hsdsl.lint.influence import Influence, influence
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
+from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.uses import Definition, unused
 from hsdsl.lint.written import Written, written
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
@@ -140,6 +141,11 @@ class Subject:
         """The number that an expression of parameters stands for in this file."""
         value = symbolic.number(parse(scalar.value), self.reading.top, scalar.value)
         return evaluate(value.expr, self.numbers)
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """The mathematics of the rules about domains, guards and flows, with what is known of them so far."""
+        return Dynamics(self.system)
 
     def value(self, expression: Written, node: Tree | None = None) -> Any:
         """The SymPy expression of a part of an expression, `let` and inputs substituted."""

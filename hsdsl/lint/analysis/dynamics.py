@@ -1,0 +1,209 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
+"""A model as questions are asked about it: parameters have their values, and surfaces, rates, domains and guards are at hand.
+
+Sampled inputs are names that take any value between their least and their largest, at any time. Parameters have the
+values of the file; `--set` is not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.errors import Decided
+from hsdsl.expression.scope import symbol
+from hsdsl.lint.analysis.ladder import MOST_PARTS, Ladder
+from hsdsl.lint.analysis.polynomial import linear_in
+from hsdsl.lint.analysis.question import Answer, Constraint, Range, at_most_zero, zero
+from hsdsl.lint.analysis.tape import enclosure, too_large
+from hsdsl.lower.straight import replaced
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
+
+MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
+Clause = tuple[Constraint, ...]
+
+
+class Dynamics:
+    """A hybrid system with numbers for its parameters, and a ladder to decide questions about it.
+
+    Parameters
+    ----------
+    system : HybridSystem
+        The model.
+    """
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.modes = {mode.name: mode for mode in system.modes}
+        self.ladder = Ladder()
+        self._values: dict[Any, Any] = {}
+        for parameter in system.parameters:
+            self._values[symbol(parameter.name)] = replaced(parameter.value, self._values, {})
+        self._done: dict[Any, Any] = {}
+        self._rates: dict[Any, Any] = {}
+        self._ranges: dict[str, dict[Any, Range]] = {}
+
+    def placed(self, expr: Any) -> Any:
+        """An expression with the parameters' values."""
+        return replaced(sp.sympify(expr), self._values, self._done)
+
+    def residual(self, surface: Surface) -> Any:
+        """The surface function r."""
+        return self.placed(surface.residual)
+
+    def flow(self, mode: Mode) -> dict[Any, Any]:
+        """The derivative of each state, by symbol."""
+        return {symbol(s): self.placed(f) for s, f in zip(mode.states, mode.flow, strict=True)}
+
+    def rate(self, mode: Mode, expr: Any) -> Any | None:
+        """L_f of an expression: how fast it changes along the flow.
+
+        None where that is not known: the expression is too large, or follows an input that is interpolated.
+        """
+        key = (mode.name, expr)
+        if key not in self._rates:
+            self._rates[key] = self._rate(mode, expr)
+        return self._rates[key]
+
+    def _rate(self, mode: Mode, expr: Any) -> Any | None:
+        if expr is None or too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
+            return None
+        flow = self.flow(mode)
+        present = sorted(expr.free_symbols & flow.keys(), key=lambda s: s.name)
+        parts = [expr.diff(s) * flow[s] for s in present]
+        return sp.Add(expr.diff(TIME), *parts) if TIME in expr.free_symbols else sp.Add(*parts)
+
+    def gradient(self, mode: Mode, expr: Any) -> list[Any] | None:
+        """The derivatives of an expression by time and the mode's states; None where it is too large."""
+        if too_large([expr], MOST_PARTS):
+            return None
+        return [expr.diff(s) for s in (TIME, *map(symbol, mode.states))]
+
+    def domain(self, mode: Mode, without: Edge | None = None) -> Clause:
+        """Where a mode's states belong (M1): every edge without `if`, and every wall."""
+        surfaces = [edge.surface for edge in mode.edges if edge.condition is None and edge is not without]
+        return tuple(at_most_zero(self.residual(surface)) for surface in (*surfaces, *mode.walls))
+
+    def condition(self, edge: Edge, holds: bool = True) -> list[Clause]:
+        """An `if`, or its contrary, as alternatives: each a list of constraints that hold together.
+
+        One empty alternative is always true; no alternative is never. A condition of many comparisons gives none.
+        """
+        if edge.condition is None:
+            return [()] if holds else []
+        placed = self.placed(edge.condition)
+        placed = placed if holds else sp.Not(placed)
+        if len(placed.atoms(sp.core.relational.Relational)) > MOST_COMPARISONS:
+            return []
+        clauses = [self._clause(c) for c in sp.Or.make_args(sp.to_dnf(placed, simplify=False))]
+        return [clause for clause in clauses if clause is not None]
+
+    def _clause(self, clause: Any) -> Clause | None:
+        found: list[Constraint] = []
+        for literal in sp.And.make_args(clause):
+            if literal == sp.false:
+                return None
+            if literal == sp.true or isinstance(literal, sp.Ne):
+                continue
+            if isinstance(literal, sp.Eq):
+                found.append(zero(literal.lhs - literal.rhs))
+                continue
+            less, more = (literal.lts, literal.gts)
+            found.append(Constraint(less - more, "< 0" if literal.is_Relational and literal.rel_op in "<>" else "<= 0"))
+        return tuple(found)
+
+    def guard(self, edge: Edge, pointing_out: bool = True) -> list[Clause]:
+        """The guard (M2) as alternatives: on the surface, in the domain, `if` holds, the flow does not point back."""
+        mode = self.modes[edge.source]
+        residual = self.residual(edge.surface)
+        rate = self.rate(mode, residual) if pointing_out else None
+        outward = () if rate is None else (at_most_zero(-rate),)
+        base = (zero(residual), *self.domain(mode, without=edge), *outward)
+        return [(*base, *clause) for clause in self.condition(edge)]
+
+    def carried(self, expr: Any, edge: Edge) -> Any:
+        """An expression of the target's states, in the states before the reset (M7)."""
+        moves = {symbol(s): self.placed(r) for s, r in zip(edge.target_states, edge.reset, strict=True)}
+        moves = {s: r for s, r in moves.items() if s != r}
+        return replaced(expr, moves, {}) if expr.free_symbols & moves.keys() else expr
+
+    def ask(self, mode: Mode, constraints: Iterable[Constraint], prove: bool = False) -> Answer:
+        """Whether there is a point of a mode's states, inputs and time where all constraints hold."""
+        return self.ladder.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
+
+    def ask_any(self, mode: Mode, alternatives: Sequence[Clause], *more: Constraint, prove: bool = False) -> Answer:
+        """The same for alternatives: the first point found; `never` where none has one."""
+        answers: list[Answer] = []
+        for clause in alternatives:
+            answer = self.ask(mode, (*clause, *more), prove)
+            if answer.somewhere:
+                return answer
+            answers.append(answer)
+        unknown = [a for a in answers if a.verdict == "unknown"]
+        weakest = [a for a in answers if a.decided == "interval"]
+        return (unknown or weakest or answers or [Answer("never", "symbolic")])[0]
+
+    def vanishes(self, mode: Mode, expr: Any, given: Clause) -> Decided | None:
+        """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
+        return self.ladder.vanishes(expr, given, self.ranges(mode))
+
+    def ranges(self, mode: Mode) -> dict[Any, Range]:
+        """What is known of the values of a mode's states, of the sampled inputs and of time."""
+        if mode.name not in self._ranges:
+            states = {symbol(s): self._of_state(s) for s in mode.states}
+            self._ranges[mode.name] = {**states, **self._common}
+        return self._ranges[mode.name]
+
+    def _of_state(self, name: str) -> Range:
+        typical = float(self.start.get(name, Fraction(1)))
+        reach = 10 * max(1.0, abs(typical), self._levels.get(name, 0.0))
+        return Range(None, None, (-reach, reach), typical)
+
+    @cached_property
+    def start(self) -> dict[str, Fraction]:
+        """The initial values, to thirty digits."""
+        return {name: _middle(self.placed(value)) for name, value in self.system.initial.values}
+
+    @cached_property
+    def until(self) -> Fraction:
+        """The end of the experiment."""
+        return _middle(self.placed(self.system.experiment.until))
+
+    @cached_property
+    def _levels(self) -> dict[str, float]:
+        """The largest level of each state in a surface of it alone."""
+        found: dict[str, float] = {}
+        for mode in self.system.modes:
+            for surface in (*(edge.surface for edge in mode.edges), *mode.walls):
+                p = self.ladder.ring.of(self.residual(surface))
+                for name in p.names if len(p.names) == 1 else ():
+                    coefficient = linear_in(p, name)
+                    level = abs(float(p.terms.get((), 0) / coefficient)) if coefficient else 0.0
+                    found[name.name] = max(found.get(name.name, 0.0), level)
+        return found
+
+    @cached_property
+    def _common(self) -> dict[Any, Range]:
+        inputs = {symbol(given.name): self._of_input(given) for given in self.system.inputs}
+        end = max(self.until, Fraction(0))
+        return {**inputs, TIME: Range(Fraction(0), end, (0.0, float(end)), 0.0)}
+
+    def _of_input(self, given: SampledInput) -> Range:
+        values = [v if isinstance(v, Fraction) else _middle(self.placed(v)) for v in given.values]
+        low, high = min(values), max(values)
+        return Range(low, high, (float(low), float(high)), float(values[0]))
+
+    @cached_property
+    def _moving(self) -> frozenset[Any]:
+        """The inputs that are interpolated between samples: what depends on them has a rate of its own."""
+        return frozenset(symbol(given.name) for given in self.system.inputs if given.hold == "linear")
+
+
+def _middle(expr: Any) -> Fraction:
+    low, high = enclosure(expr)
+    return (low + high) / 2

@@ -1,0 +1,205 @@
+# pyright: basic
+"""The ladder by which a question is decided: exact reasoning, then a point that is found, then proof by boxes.
+
+Every step is bounded in what it does, not in time, so that an answer is the same on every machine; a model has one
+budget for all its questions, after which only exact reasoning goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hsdsl.errors import Decided
+from hsdsl.lint.analysis import boxes, exact
+from hsdsl.lint.analysis.exact import Reduced
+from hsdsl.lint.analysis.intervals import Array
+from hsdsl.lint.analysis.points import ROUNDS, STARTS, Search
+from hsdsl.lint.analysis.polynomial import Polynomial, Ring, expression
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range
+from hsdsl.lint.analysis.tape import Tape, too_large
+from hsdsl.lower.straight import replaced
+
+MOST_PARTS = 1500  # of the expressions of one question
+FEWEST_POINTS = 12  # to believe that something is always zero
+MOST_WORK = 6_000_000  # operations on numbers a question may cost
+WORK_OF_A_MODEL = 400_000_000
+OVERHEAD = 400  # operations that one call of NumPy costs as much as
+
+
+@dataclass
+class Ladder:
+    """Decides questions about one model and remembers the answers."""
+
+    ring: Ring = field(default_factory=Ring)
+    left: int = WORK_OF_A_MODEL
+    _known: dict[Any, Answer] = field(default_factory=dict)
+    _left: dict[Any, Reduced | None] = field(default_factory=dict)
+    _samples: dict[Any, Array] = field(default_factory=dict)
+
+    def decide(self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], prove: bool = False) -> Answer:
+        """Answer whether there is a point that satisfies all constraints.
+
+        Parameters
+        ----------
+        constraints : sequence of Constraint
+            Their expressions hold the names of ``ranges``, exact numbers, and nothing else.
+        ranges : mapping
+            Each name's range.
+        prove : bool
+            Whether `never` matters as much as `somewhere`: else boxes are not tried.
+        """
+        key = (tuple(constraints), tuple(ranges.items()), prove)
+        if key not in self._known:
+            self._known[key] = self._decide(constraints, ranges, prove)
+        return self._known[key]
+
+    def _decide(self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], prove: bool) -> Answer:
+        if too_large((c.expr for c in constraints), MOST_PARTS):
+            return UNKNOWN
+        answer, reduced = exact.decide(constraints, self.ring, ranges)
+        if answer.verdict != "unknown" or reduced is None:
+            return answer
+        return self._numerically(constraints, ranges, reduced, prove)
+
+    def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Decided | None:
+        """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
+        if too_large([expr, *(c.expr for c in given)], MOST_PARTS):
+            return None
+        reduced = self._reduced(given, ranges)
+        if reduced is None:
+            return None
+        p = self.ring.of(expr)
+        for symbol, value in reduced.solved:
+            p = self.ring.substituted(p, {symbol: value})
+        if not p.terms:
+            return "symbolic"
+        if p.number is not None or (len(reduced.solved) == sum(c.relation == "= 0" for c in given) and _polynomial(p)):
+            return None
+        points = self.sample(given, ranges)
+        if len(points) < FEWEST_POINTS:
+            return None
+        tape = Tape([expr, *(expr.diff(s) for s in ranges)], list(ranges))
+        value, *slopes = tape.at(points)
+        size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
+        return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
+
+    def sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
+        """Points where constraints hold, as many as are found: array (n, names of ranges)."""
+        key = (tuple(given), tuple(ranges.items()))
+        if key not in self._samples:
+            self._samples[key] = self._sample(given, ranges)
+        return self._samples[key]
+
+    def _sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
+        reduced = self._reduced(given, ranges)
+        search = self._search(given, ranges, reduced, list(ranges)) if reduced else None
+        return np.zeros((0, len(ranges))) if search is None else search.points()
+
+    def _reduced(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Reduced | None:
+        key = (tuple(given), tuple(ranges.items()))
+        if key not in self._left:
+            self._left[key] = exact.decide(given, self.ring, ranges)[1]
+        return self._left[key]
+
+    def _numerically(
+        self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], reduced: Reduced, prove: bool
+    ) -> Answer:
+        solved = _solutions(reduced)
+        rest = self._rest(constraints, reduced, solved)
+        names = sorted({s for c in rest for s in c.expr.free_symbols}, key=lambda s: s.name)
+        search = self._search(rest, ranges, reduced, names)
+        if search is None:
+            return UNKNOWN
+        never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
+        if boxes.excluded(search.tape, search.relations, search.low, search.high, 1):
+            return never
+        found = search.point()
+        if found is not None:
+            return self._somewhere(dict(zip(names, map(float, found), strict=True)), solved, reduced, ranges)
+        return never if prove and self._excluded(search) else UNKNOWN
+
+    def _rest(self, constraints: Sequence[Constraint], reduced: Reduced, solved: dict[Any, Any]) -> list[Constraint]:
+        """What exact reasoning has left, written as it was given where that is possible: bounds are better so."""
+        done: dict[Any, Any] = {}
+        unsettled = set(reduced.rows)
+        rest: list[Constraint] = []
+        settled: set[Any] = set()
+        for constraint in constraints:
+            moved = Constraint(replaced(constraint.expr, solved, done), constraint.relation)
+            row = (self.ring.of(moved.expr), moved.relation)
+            if row in unsettled and row not in settled:
+                settled.add(row)
+                rest.append(moved)
+        return rest + [Constraint(expression(p), r) for p, r in reduced.rows if (p, r) not in settled]
+
+    def _search(
+        self, rest: Sequence[Constraint], ranges: Mapping[Any, Range], reduced: Reduced, names: Sequence[Any]
+    ) -> Search | None:
+        """A search for points; None where that would cost more than there is left."""
+        if too_large((c.expr for c in rest), MOST_PARTS):
+            return None
+        tape = Tape([c.expr for c in rest], names)
+        cost = len(tape) * (OVERHEAD + STARTS) * (len(names) + 1) * ROUNDS
+        if cost > self.left:
+            return None
+        self.left -= cost
+        low, high = _box(names, reduced, ranges)
+        typical = np.array([min(max(ranges[s].typical, a), b) for s, a, b in zip(names, low, high, strict=True)])
+        return Search(tape, tuple(c.relation for c in rest), low, high, typical)
+
+    def _excluded(self, search: Search) -> bool:
+        most = min(boxes.MOST_BOXES, MOST_WORK // len(search.tape), self.left // (8 * len(search.tape)))
+        self.left -= 8 * len(search.tape) * most
+        return most > 0 and boxes.excluded(search.tape, search.relations, search.low, search.high, most)
+
+    def _somewhere(
+        self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Mapping[Any, Range]
+    ) -> Answer:
+        for symbol, limits in ranges.items():
+            if symbol not in point and symbol not in solved:
+                low, high = reduced.bounds[symbol]
+                value = limits.typical if low is None else max(limits.typical, float(low))
+                point[symbol] = value if high is None else min(value, float(high))
+        free = list(point)
+        values = Tape(solved.values(), free).at(np.array([[point[s] for s in free]]))[:, 0] if solved else ()
+        whole = {**point, **dict(zip(solved, map(float, values), strict=True))}
+        if not all(np.isfinite(v) for v in whole.values()):
+            return UNKNOWN
+        return Answer("somewhere", "sampled", {s: whole[s] for s in ranges})
+
+
+def _solutions(reduced: Reduced) -> dict[Any, Any]:
+    """What was eliminated, in the names that are left."""
+    found: dict[Any, Any] = {}
+    for symbol, p in reversed(reduced.solved):
+        found[symbol] = replaced(expression(p), dict(found), {})
+    return found
+
+
+def _box(names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]) -> tuple[Array, Array]:
+    low: list[float] = []
+    high: list[float] = []
+    for symbol in names:
+        first, last = reduced.bounds[symbol]
+        near, far = ranges[symbol].search
+        start = near if first is None else float(first)
+        end = far if last is None else float(last)
+        low.append(start if first is not None else min(near, end - (far - near)))
+        high.append(end if last is not None else max(far, start + (far - near)))
+    return np.array(low), np.array(high)
+
+
+def _searched(names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]) -> tuple[tuple[Any, float, float], ...]:
+    low, high = _box(names, reduced, ranges)
+    return tuple(
+        (s, float(a), float(b)) for s, a, b in zip(names, low, high, strict=True) if None in reduced.bounds[s]
+    )
+
+
+def _polynomial(p: Polynomial) -> bool:
+    """Whether it is a polynomial of names alone: one that is not zero then vanishes nowhere in the large."""
+    return all(atom.kind == "name" and exponent > 0 for monomial in p.terms for atom, exponent in monomial)

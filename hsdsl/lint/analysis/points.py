@@ -1,0 +1,145 @@
+"""The second step of the ladder: a point that satisfies everything, by Newton's method from many starts at once.
+
+Equations, and inequalities that do not hold, are linearised by difference quotients and solved by the shortest step.
+The starts are the same every time. A point that is found holds to round-off; that none is found means nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.lint.analysis.intervals import Array, silent
+from hsdsl.lint.analysis.question import Relation
+from hsdsl.lint.analysis.tape import Tape
+
+STARTS = 96
+ROUNDS = 24
+_TIGHT = 1e-10  # how far from zero an equation may end, relative to what it is made of
+_ROOM = 1e-7  # how far from zero a strict inequality must end
+_STEP = 1e-7
+
+
+@dataclass(frozen=True)
+class Search:
+    """Constraints as a tape over a box.
+
+    Attributes
+    ----------
+    tape : Tape
+        The constraints' expressions.
+    relations : tuple of str
+        What each of them has to be.
+    low, high : array
+        The box to search.
+    typical : array
+        A typical value of each name; the first start.
+    """
+
+    tape: Tape
+    relations: tuple[Relation, ...]
+    low: Array
+    high: Array
+    typical: Array
+
+    def point(self) -> Array | None:
+        """A point where everything holds, with plain coordinates where that is possible."""
+        if not len(self.low):
+            found = self._good(np.zeros((1, 0)))
+            return np.zeros(0) if found[0] else None
+        with silent():
+            points = self._starts()
+            for _ in range(ROUNDS):
+                good = self._good(points)
+                if good.any():
+                    return self._plain(points[np.argmax(good)])
+                points = self._moved(points)
+            good = self._good(points)
+        return self._plain(points[np.argmax(good)]) if good.any() else None
+
+    def points(self) -> Array:
+        """All the points that were found: array (n, names)."""
+        with silent():
+            points = self._starts() if len(self.low) else np.zeros((1, 0))
+            for _ in range(ROUNDS if len(self.low) else 0):
+                points = np.where(self._good(points)[:, None], points, self._moved(points))
+            return points[self._good(points)]
+
+    def _starts(self) -> Array:
+        generator = np.random.default_rng(0)
+        points = self.low + (self.high - self.low) * generator.random((STARTS, len(self.low)))
+        near = self.typical + (points - self.typical) * 10.0 ** -generator.integers(0, 4, (STARTS, 1))
+        points = np.where((np.arange(STARTS) % 2 == 0)[:, None], points, near)
+        points[0] = self.typical
+        points[1] = 0.0
+        points[2] = (self.low + self.high) / 2
+        return np.clip(points, self.low, self.high)
+
+    def _slopes(self, points: Array, values: Array) -> Array:
+        """Difference quotients: array (constraints, n, names)."""
+        columns: list[Array] = []
+        for i in range(points.shape[1]):
+            step = _STEP * np.maximum(np.abs(points[:, i]), 1e-3 * np.minimum(self.high[i] - self.low[i], 1e3) + 1e-12)
+            step = np.where(points[:, i] + step > self.high[i], -step, step)
+            moved = points.copy()
+            moved[:, i] += step
+            columns.append((self.tape.at(moved) - values) / step)
+        return np.stack(columns, axis=-1)
+
+    def _good(self, points: Array) -> Array:
+        with silent():
+            values = self.tape.at(points)
+            good = np.isfinite(values).all(axis=0)
+            if not good.any() or not points.shape[1]:
+                return good & self._hold(values, np.zeros_like(values))
+            made_of = (np.abs(self._slopes(points, values)) * np.maximum(np.abs(points), 1e-3)).sum(axis=-1)
+        return good & self._hold(values, np.where(np.isfinite(made_of), made_of, np.inf))
+
+    def _hold(self, values: Array, made_of: Array) -> Array:
+        good = np.ones(values.shape[1], dtype=bool)
+        for value, scale, relation in zip(values, made_of, self.relations, strict=True):
+            if relation == "= 0":
+                good &= np.abs(value) <= _TIGHT * np.minimum(scale, 1e6)
+            elif relation == "<= 0":
+                good &= value <= _TIGHT * np.minimum(scale, 1e6)
+            else:
+                good &= value < -_ROOM * scale
+        return good
+
+    def _moved(self, points: Array) -> Array:
+        values = self.tape.at(points)
+        slopes = self._slopes(points, values)
+        wanted = np.zeros_like(values)
+        for k, relation in enumerate(self.relations):
+            if relation == "= 0":
+                wanted[k] = values[k]
+            else:
+                room = 0.1 * np.abs(slopes[k] * np.maximum(np.abs(points), 1e-1)).sum(axis=-1)
+                wanted[k] = np.where(values[k] > (-_ROOM * room if relation == "< 0" else 0.0), values[k] + room, 0.0)
+        active = wanted != 0
+        matrix = np.where(active[..., None], slopes, 0.0).transpose(1, 0, 2)
+        usable = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=0)
+        matrix, right = np.where(usable[:, None, None], matrix, 0.0), np.where(usable[:, None], wanted.T, 0.0)
+        try:
+            step = (np.linalg.pinv(matrix, rcond=1e-9) @ right[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            step = np.zeros_like(points)
+        lost = ~usable
+        step[lost] = 0.5 * (points[lost] - self.typical)
+        return np.clip(points - step, self.low, self.high)
+
+    def _plain(self, point: Array) -> Array:
+        """The same with rounder coordinates, one by one, as long as everything holds."""
+        for i in range(len(point)):
+            for change in self._rounder(i):
+                moved = point.copy()
+                moved[i] = change(point[i])
+                if self.low[i] <= moved[i] <= self.high[i] and self._good(moved[None])[0]:
+                    point = moved
+                    break
+        return point
+
+    def _rounder(self, i: int) -> Sequence[Callable[[float], float]]:
+        return (lambda x: self.typical[i], lambda x: 0.0, *(lambda x, d=d: float(f"{x:.{d}g}") for d in (1, 2, 3)))

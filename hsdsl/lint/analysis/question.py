@@ -1,0 +1,85 @@
+# pyright: basic
+"""What is asked about a model, and what is answered: is there a point where some expressions have given signs?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from hsdsl.errors import Decided
+
+Relation = Literal["= 0", "<= 0", "< 0"]
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """An expression of states, inputs and time, and the sign it must have."""
+
+    expr: Any
+    relation: Relation
+
+
+def zero(expr: Any) -> Constraint:
+    """The expression vanishes."""
+    return Constraint(expr, "= 0")
+
+
+def at_most_zero(expr: Any) -> Constraint:
+    """The expression is not positive."""
+    return Constraint(expr, "<= 0")
+
+
+def negative(expr: Any) -> Constraint:
+    """The expression is negative."""
+    return Constraint(expr, "< 0")
+
+
+def positive(expr: Any) -> Constraint:
+    """The expression is positive."""
+    return Constraint(-expr, "< 0")
+
+
+@dataclass(frozen=True)
+class Range:
+    """What is known of a name's values: ends that hold for certain (None: without), and how far to look for points."""
+
+    low: Any | None
+    high: Any | None
+    search: tuple[float, float]
+    typical: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is known of a question.
+
+    Attributes
+    ----------
+    verdict : {"never", "somewhere", "unknown"}
+        Whether there is such a point.
+    decided : {"symbolic", "interval", "sampled"} or None
+        How it is known; None where it is not.
+    point : mapping of symbols to numbers
+        Such a point.
+    searched : tuple of (symbol, low, high)
+        Of `never`: the names that nothing bounds, and how far was looked.
+    """
+
+    verdict: Literal["never", "somewhere", "unknown"]
+    decided: Decided | None = None
+    point: Mapping[Any, float] = field(default_factory=dict)
+    searched: tuple[tuple[Any, float, float], ...] = ()
+
+    @property
+    def somewhere(self) -> bool:
+        """Whether a point is known."""
+        return self.verdict == "somewhere"
+
+    @property
+    def never(self) -> bool:
+        """Whether it is known that there is none, where it was looked."""
+        return self.verdict == "never"
+
+
+UNKNOWN = Answer("unknown")

@@ -1,0 +1,42 @@
+# pyright: basic
+"""Points and searches as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from hsdsl.lint.analysis.dynamics import Dynamics
+from hsdsl.lint.analysis.question import Answer
+from hsdsl.system import TIME, Mode
+
+MOST_NAMES = 8
+
+
+def at(dynamics: Dynamics, mode: Mode, answer: Answer, about: Iterable[Any]) -> str:
+    """``at x = 14, v = 0``: the states of a point that expressions depend on; time and inputs where they do."""
+    needed = {s for expr in about if expr is not None for s in expr.free_symbols}
+    order = [s for s in dynamics.ranges(mode) if s in needed]
+    parts = [f"{s.name} = {number(answer.point[s])}" for s in order if s in answer.point and s is not TIME]
+    parts = [*parts[:MOST_NAMES], *(["..."] if len(parts) > MOST_NAMES else [])]
+    if TIME in order:
+        parts.append(f"t = {number(answer.point[TIME])}")
+    return f"at {', '.join(parts)}" if parts else "everywhere"
+
+
+def number(value: float) -> str:
+    """Six digits; what is within round-off of a shorter number as that."""
+    if abs(value) < 1e-12:
+        return "0"
+    return f"{value:.6g}"
+
+
+def searched(answer: Answer) -> str:
+    """How far was looked, for a claim that there is nothing: empty where it holds without bounds."""
+    if not answer.searched:
+        return ""
+    limits = ", ".join(
+        f"|{s.name}| <= {number(high)}" if low == -high else f"{number(low)} <= {s.name} <= {number(high)}"
+        for s, low, high in answer.searched
+    )
+    return f" (looked for with {limits})"
