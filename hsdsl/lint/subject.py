@@ -74,6 +74,17 @@ class Subject:
         """Every expression of the file."""
         return tuple(written(self.document))
 
+    def written_in(self, mode: str) -> tuple[Written, ...]:
+        """The expressions that belong to a mode."""
+        return self._by_mode.get(mode, ())
+
+    @cached_property
+    def _by_mode(self) -> dict[str | None, tuple[Written, ...]]:
+        found: dict[str | None, list[Written]] = {}
+        for expression in self.expressions:
+            found.setdefault(expression.mode, []).append(expression)
+        return {mode: tuple(expressions) for mode, expressions in found.items()}
+
     @cached_property
     def unused(self) -> frozenset[Definition]:
         """The parameters, inputs and `let` names that nothing depends on."""

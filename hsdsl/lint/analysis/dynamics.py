@@ -8,10 +8,10 @@ values of the file; `--set` is not looked at.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import sympy as sp
 
@@ -19,12 +19,13 @@ from hsdsl.errors import Decided
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.ladder import MOST_PARTS, Ladder
 from hsdsl.lint.analysis.polynomial import linear_in
-from hsdsl.lint.analysis.question import Answer, Constraint, Range, at_most_zero, zero
-from hsdsl.lint.analysis.tape import enclosure, too_large
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
+from hsdsl.lint.analysis.tape import at_point, enclosure, too_large
 from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
+T = TypeVar("T")
 Clause = tuple[Constraint, ...]
 
 
@@ -47,6 +48,7 @@ class Dynamics:
         self._done: dict[Any, Any] = {}
         self._rates: dict[Any, Any] = {}
         self._ranges: dict[str, dict[Any, Range]] = {}
+        self._remembered: dict[Any, Any] = {}
 
     def placed(self, expr: Any) -> Any:
         """An expression with the parameters' values."""
@@ -89,17 +91,17 @@ class Dynamics:
         surfaces = [edge.surface for edge in mode.edges if edge.condition is None and edge is not without]
         return tuple(at_most_zero(self.residual(surface)) for surface in (*surfaces, *mode.walls))
 
-    def condition(self, edge: Edge, holds: bool = True) -> list[Clause]:
+    def condition(self, edge: Edge, holds: bool = True) -> list[Clause] | None:
         """An `if`, or its contrary, as alternatives: each a list of constraints that hold together.
 
-        One empty alternative is always true; no alternative is never. A condition of many comparisons gives none.
+        One empty alternative is always true; no alternative is never; None is not known, for one of many comparisons.
         """
         if edge.condition is None:
             return [()] if holds else []
         placed = self.placed(edge.condition)
         placed = placed if holds else sp.Not(placed)
         if len(placed.atoms(sp.core.relational.Relational)) > MOST_COMPARISONS:
-            return []
+            return None
         clauses = [self._clause(c) for c in sp.Or.make_args(sp.to_dnf(placed, simplify=False))]
         return [clause for clause in clauses if clause is not None]
 
@@ -117,14 +119,18 @@ class Dynamics:
             found.append(Constraint(less - more, "< 0" if literal.is_Relational and literal.rel_op in "<>" else "<= 0"))
         return tuple(found)
 
-    def guard(self, edge: Edge, pointing_out: bool = True) -> list[Clause]:
-        """The guard (M2) as alternatives: on the surface, in the domain, `if` holds, the flow does not point back."""
+    def guard(self, edge: Edge, pointing_out: bool = True) -> list[Clause] | None:
+        """The guard (M2) as alternatives: on the surface, in the domain, `if` holds, the flow does not point back.
+
+        None where the `if` is not understood.
+        """
         mode = self.modes[edge.source]
         residual = self.residual(edge.surface)
         rate = self.rate(mode, residual) if pointing_out else None
         outward = () if rate is None else (at_most_zero(-rate),)
         base = (zero(residual), *self.domain(mode, without=edge), *outward)
-        return [(*base, *clause) for clause in self.condition(edge)]
+        conditions = self.condition(edge)
+        return None if conditions is None else [(*base, *clause) for clause in conditions]
 
     def carried(self, expr: Any, edge: Edge) -> Any:
         """An expression of the target's states, in the states before the reset (M7)."""
@@ -132,12 +138,52 @@ class Dynamics:
         moves = {s: r for s, r in moves.items() if s != r}
         return replaced(expr, moves, {}) if expr.free_symbols & moves.keys() else expr
 
+    def remembered(self, key: Any, work: Callable[[], T]) -> T:
+        """What was worked out under a key before, for rules that need the same."""
+        if key not in self._remembered:
+            self._remembered[key] = work()
+        return self._remembered[key]
+
+    def value(self, expr: Any, point: Mapping[Any, float]) -> float:
+        """An expression at a point of all its names; NaN where it has no real value."""
+        return at_point(expr, point)
+
+    @cached_property
+    def incoming(self) -> dict[str, list[Edge]]:
+        """The edges that lead to each mode."""
+        found: dict[str, list[Edge]] = {mode.name: [] for mode in self.system.modes}
+        for mode in self.system.modes:
+            for edge in mode.edges:
+                found[edge.target].append(edge)
+        return found
+
+    @cached_property
+    def starting_point(self) -> dict[Any, float]:
+        """Where the run starts: states, inputs and time."""
+        mode = self.modes[self.system.initial.mode]
+        states = {symbol(name): float(value) for name, value in self.start.items()}
+        return {s: r.typical for s, r in self.ranges(mode).items()} | states | {TIME: 0.0}
+
+    def at_start(self, surface: Surface) -> tuple[float, float]:
+        """The surface function where the run starts, and the round-off of it."""
+        residual = self.residual(surface)
+        sides = [self.placed(side) for side in (surface.left, surface.right)]
+        slopes = [s * residual.diff(s) for s in residual.free_symbols if s is not TIME]
+        value, *sizes = (self.value(e, self.starting_point) for e in (residual, *sides, *slopes))
+        return value, 32 * 2.0**-53 * sum(abs(size) for size in sizes if size == size)
+
+    def bounds(self, mode: Mode) -> dict[Any, tuple[Any, Any]]:
+        """What a mode's surfaces say of single states: exact ends, None where there is none."""
+        return self.ladder.bounds(self.domain(mode), self.ranges(mode))
+
     def ask(self, mode: Mode, constraints: Iterable[Constraint], prove: bool = False) -> Answer:
         """Whether there is a point of a mode's states, inputs and time where all constraints hold."""
         return self.ladder.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
 
-    def ask_any(self, mode: Mode, alternatives: Sequence[Clause], *more: Constraint, prove: bool = False) -> Answer:
+    def ask_any(self, mode: Mode, alternatives: Sequence[Clause] | None, *more: Constraint, prove: bool = False) -> Answer:
         """The same for alternatives: the first point found; `never` where none has one."""
+        if alternatives is None:
+            return UNKNOWN
         answers: list[Answer] = []
         for clause in alternatives:
             answer = self.ask(mode, (*clause, *more), prove)

@@ -240,6 +240,8 @@ def _inside(bounds: Bounds, limits: Range) -> Fraction:
     typical = Fraction(limits.typical)
     if (low is None or low < typical) and (high is None or typical < high):
         return typical
+    if bounds == (limits.low, limits.high) and low is not None and high is not None and low <= typical <= high:
+        return typical  # nothing but its own range holds it
     if low is not None and high is not None:
         return (low + high) / 2
     return low + 1 if low is not None else high - 1 if high is not None else typical

@@ -75,7 +75,7 @@ class Ladder:
         p = self.ring.of(expr)
         for symbol, value in reduced.solved:
             p = self.ring.substituted(p, {symbol: value})
-        if not p.terms:
+        if not p.terms or any(q in (p, -p) for q, relation in reduced.rows if relation == "= 0"):
             return "symbolic"
         if p.number is not None or (len(reduced.solved) == sum(c.relation == "= 0" for c in given) and _polynomial(p)):
             return None
@@ -86,6 +86,11 @@ class Ladder:
         value, *slopes = tape.at(points)
         size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
         return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
+
+    def bounds(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> dict[Any, Any]:
+        """Exact bounds of the names that constraints leave free; nothing where they are too large or contradict."""
+        reduced = None if too_large((c.expr for c in given), MOST_PARTS) else self._reduced(given, ranges)
+        return dict(reduced.bounds) if reduced else {}
 
     def sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
         """Points where constraints hold, as many as are found: array (n, names of ranges)."""

@@ -19,6 +19,10 @@ class Constraint:
     expr: Any
     relation: Relation
 
+    def along(self, expr: Any) -> Constraint:
+        """The same of another expression."""
+        return Constraint(expr, self.relation)
+
 
 def zero(expr: Any) -> Constraint:
     """The expression vanishes."""

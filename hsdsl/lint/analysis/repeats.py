@@ -33,5 +33,5 @@ class Repeats:
 
     def __iter__(self) -> Iterator[Finding]:
         for finding, count in self._found.values():
-            more = f"; {count:,} more {self.noun} like it" if count else ""
+            more = f"; {count:,} more {self.noun}{'s' * (count > 1)} like it" if count else ""
             yield replace(finding, message=finding.message + more)

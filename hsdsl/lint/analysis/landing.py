@@ -1,0 +1,109 @@
+# pyright: basic
+"""Where resets land: on or beyond the surfaces of the mode they lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.errors import Decided
+from hsdsl.expression.scope import symbol
+from hsdsl.lint.analysis.dynamics import Clause, Dynamics
+from hsdsl.lint.analysis.question import positive
+from hsdsl.system import Edge, Mode, Surface
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A reset that lands on a surface of the next mode, wherever its transition fires.
+
+    Attributes
+    ----------
+    edge : Edge or None
+        The edge whose surface it is; None for a wall.
+    surface : Surface
+        That surface.
+    rate : sympy.Expr or None
+        How fast the surface function changes after landing, in the states before the reset.
+    bend : sympy.Expr or None
+        How fast that rate changes.
+    guard : list of clauses
+        Where the first transition fires and the condition of the second holds.
+    returns : bool
+        Whether the second transition leads back to the mode and state before the first.
+    decided : {"symbolic", "sampled"}
+        How it is known that it lands there.
+    """
+
+    edge: Edge | None
+    surface: Surface
+    rate: Any
+    bend: Any
+    guard: list[Clause]
+    returns: bool
+    decided: Decided
+
+
+def surfaces_of(mode: Mode, conditional: bool = False) -> Iterator[tuple[Surface, Edge | None]]:
+    """The surfaces that bound a mode, with their edges; with ``conditional`` those of edges with an `if` too."""
+    for edge in mode.edges:
+        if conditional or edge.condition is None:
+            yield edge.surface, edge
+    for wall in mode.walls:
+        yield wall, None
+
+
+def landings(dynamics: Dynamics, edge: Edge) -> tuple[Landing, ...]:
+    """The surfaces of the next mode that an edge's reset always lands on."""
+    return dynamics.remembered(("landings", edge.source, edge.name), lambda: tuple(_landings(dynamics, edge)))
+
+
+def _landings(dynamics: Dynamics, edge: Edge) -> Iterator[Landing]:
+    mode, target = dynamics.modes[edge.source], dynamics.modes[edge.target]
+    guard = dynamics.guard(edge)
+    for surface, after in surfaces_of(target, conditional=True) if guard else ():
+        residual = dynamics.residual(surface)
+        carried = dynamics.carried(residual, edge)
+        known = [dynamics.vanishes(mode, carried, clause) for clause in guard or ()]
+        if None in known:
+            continue
+        rate = dynamics.rate(target, residual)
+        conditions = [()] if after is None else dynamics.condition(after)
+        moved = [tuple(c.along(dynamics.carried(c.expr, edge)) for c in clause) for clause in conditions or ()]
+        both = [(*before, *clause) for before in guard or () for clause in moved]
+        returns = after is not None and _returns(dynamics, edge, after, guard or [])
+        bend = None if rate is None else dynamics.rate(target, rate)
+        rate, bend = (None if e is None else dynamics.carried(e, edge) for e in (rate, bend))
+        yield Landing(after, surface, rate, bend, both, returns, "sampled" if "sampled" in known else "symbolic")
+
+
+def _returns(dynamics: Dynamics, edge: Edge, after: Edge, guard: list[Clause]) -> bool:
+    if after.target != edge.source or (after.name == edge.name and after.source == edge.source):
+        return False
+    mode = dynamics.modes[edge.source]
+    for state, value in zip(after.target_states, after.reset, strict=True):
+        moved = dynamics.carried(dynamics.placed(value), edge) - symbol(state)
+        if moved != 0 and any(dynamics.vanishes(mode, moved, clause) is None for clause in guard):
+            return False
+    return True
+
+
+def entered_beyond(dynamics: Dynamics, edge: Edge) -> bool:
+    """Whether a state may be beyond an edge's surface when it enters the mode, so that the edge fires at once (M5).
+
+    Where that is not known, it may.
+    """
+    if edge.condition is not None:
+        return False
+    residual = dynamics.residual(edge.surface)
+    if {s.name for s in residual.free_symbols} & {given.name for given in dynamics.system.inputs}:
+        return True  # an input that jumps carries the surface along
+    for before in dynamics.incoming[edge.source]:
+        if before is not edge:
+            mode = dynamics.modes[before.source]
+            carried = dynamics.carried(residual, before)
+            if not dynamics.ask_any(mode, dynamics.guard(before), positive(carried), prove=True).never:
+                return True
+    starts_here = edge.source == dynamics.system.initial.mode
+    return starts_here and dynamics.value(residual, dynamics.starting_point) > 0

@@ -1,0 +1,121 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
+"""Where expressions are not smooth or have no value: the parts of them that decide it, and the questions to ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from hsdsl import functions
+from hsdsl.lint.analysis.dynamics import Clause
+from hsdsl.lint.analysis.ladder import MOST_PARTS
+from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, positive, zero
+from hsdsl.lint.analysis.tape import too_large
+from hsdsl.lint.written import Written
+
+_LEVELS = (0, 1, -1, 2)  # whole numbers that the argument of a floor is looked for at
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of an expression, what it is called, and the alternatives in which it is singular."""
+
+    expr: Any
+    said: str
+    alternatives: tuple[Clause, ...]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression of a mode as written, its mathematics, and where it is evaluated."""
+
+    written: Written
+    expr: Any
+    where: tuple[Clause, ...]
+
+
+def parts(expr: Any) -> list[Any]:
+    """Every different part of an expression; none where there are too many."""
+    if too_large([expr], MOST_PARTS):
+        return []
+    return list(dict.fromkeys(sp.preorder_traversal(expr)))
+
+
+def jumps(expr: Any) -> Iterator[Part]:
+    """Where a sign, a floor or an angle jumps, unless what it is multiplied with vanishes there."""
+    for part in parts(expr):
+        if isinstance(part, (functions.sign, functions.floor, sp.atan2)):
+            weights = _weights(expr, part)
+            for condition in _jump(part):
+                yield Part(part, _name(part), tuple((*condition, w) for w in weights))
+
+
+def _jump(part: Any) -> list[Clause]:
+    if isinstance(part, functions.floor):
+        return [(zero(part.args[0] - level),) for level in _LEVELS]
+    if isinstance(part, sp.atan2):
+        return [(zero(part.args[0]), negative(part.args[1]))]
+    return [(zero(part.args[0]),)]
+
+
+def kinks(expr: Any) -> Iterator[Part]:
+    """Where abs, min and max have a kink, unless what they are multiplied with vanishes there."""
+    for part in parts(expr):
+        if isinstance(part, (functions.absolute, functions.minimum, functions.maximum)):
+            inside = part.args[0] if len(part.args) == 1 else part.args[0] - part.args[1]
+            yield Part(part, _name(part), tuple((zero(inside), w) for w in _weights(expr, part)))
+
+
+def _weights(expr: Any, part: Any) -> list[Constraint]:
+    """The factor that a part comes with in an expression is not zero, as two alternatives."""
+    name = sp.Dummy(real=True)
+    weight = expr.xreplace({part: name}).diff(name).xreplace({name: part})
+    if weight.is_number:
+        return [at_most_zero(sp.S.Zero)] if weight != 0 else []
+    return [positive(weight), negative(weight)]
+
+
+def _name(part: Any) -> str:
+    return {"absolute": "abs", "minimum": "min", "maximum": "max"}.get(type(part).__name__, type(part).__name__)
+
+
+def divisors(expr: Any) -> Iterator[Any]:
+    """What is divided by."""
+    for part in parts(expr):
+        if part.is_Pow and part.exp.is_Rational and part.exp < 0 and not part.base.is_number:
+            yield part.base
+        elif isinstance(part, sp.tan):
+            yield sp.cos(part.args[0])
+
+
+def without_value(expr: Any) -> Iterator[Part]:
+    """Where square roots, logarithms and inverse functions have no real value."""
+    for part in parts(expr):
+        if part.is_Pow and not part.exp.is_Integer and not part.base.is_number:
+            said = "a square root" if abs(part.exp) == sp.Rational(1, 2) else "a power that is no whole number"
+            yield Part(part.base, said, ((negative(part.base),),))
+        elif isinstance(part, sp.log):
+            yield Part(part.args[0], "a logarithm", ((at_most_zero(part.args[0]),),))
+        elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
+            inside = part.args[0]
+            both = ((negative(1 - inside),), (negative(1 + inside),))
+            yield Part(inside, f"`{_name(part)}`", both)
+        elif isinstance(part, sp.acosh):
+            yield Part(part.args[0], "`acosh`", ((negative(part.args[0] - 1),),))
+
+
+def steep(expr: Any) -> Iterator[Part]:
+    """Where roots and inverse functions have an infinite slope."""
+    for part in parts(expr):
+        if part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1 and not part.base.is_number:
+            said = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
+            yield Part(part.base, said, ((zero(part.base),),))
+        elif isinstance(part, (sp.asin, sp.acos)):
+            inside = part.args[0]
+            yield Part(inside, f"`{_name(part)}`", ((zero(1 - inside),), (zero(1 + inside),)))
+        elif isinstance(part, sp.acosh):
+            yield Part(part.args[0], "`acosh`", ((zero(part.args[0] - 1),),))
