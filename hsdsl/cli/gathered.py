@@ -50,7 +50,7 @@ class Gathered:
         self.entries.append(entry)
         self.findings += findings
         self.ignored += ignored
-        self.code = max(self.code, MODEL_ERRORS * bool(findings))
+        self.code = max(self.code, MODEL_ERRORS * any(found.severity == "warning" for found in findings))
 
     def say(self, format: Format, lint: bool) -> None:
         """Say everything: data and annotations on standard output, and text for people as it is due."""

@@ -12,9 +12,9 @@ from hsdsl.elaborate import Reading
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
+from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.influence import Influence, influence
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
-from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.uses import Definition, unused
 from hsdsl.lint.written import Written, written
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence

@@ -1,6 +1,7 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""A model as questions are asked about it: parameters have their values, and surfaces, rates, domains and guards are at hand.
+"""A model as questions are asked about it: parameters have their values, and surfaces, rates, domains and guards are at
+hand.
 
 Sampled inputs are names that take any value between their least and their largest, at any time. Parameters have the
 values of the file; `--set` is not looked at.
@@ -26,6 +27,7 @@ from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
 T = TypeVar("T")
+_LARGEST = Fraction(10) ** 100  # of values that are looked for: beyond, products overflow
 Clause = tuple[Constraint, ...]
 
 
@@ -47,7 +49,7 @@ class Dynamics:
             self._values[symbol(parameter.name)] = replaced(parameter.value, self._values, {})
         self._done: dict[Any, Any] = {}
         self._rates: dict[Any, Any] = {}
-        self._ranges: dict[str, dict[Any, Range]] = {}
+        self._ranges: dict[tuple[str, ...], dict[Any, Range]] = {}
         self._remembered: dict[Any, Any] = {}
 
     def placed(self, expr: Any) -> Any:
@@ -180,7 +182,9 @@ class Dynamics:
         """Whether there is a point of a mode's states, inputs and time where all constraints hold."""
         return self.ladder.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
 
-    def ask_any(self, mode: Mode, alternatives: Sequence[Clause] | None, *more: Constraint, prove: bool = False) -> Answer:
+    def ask_any(
+        self, mode: Mode, alternatives: Sequence[Clause] | None, *more: Constraint, prove: bool = False
+    ) -> Answer:
         """The same for alternatives: the first point found; `never` where none has one."""
         if alternatives is None:
             return UNKNOWN
@@ -194,20 +198,24 @@ class Dynamics:
         weakest = [a for a in answers if a.decided == "interval"]
         return (unknown or weakest or answers or [Answer("never", "symbolic")])[0]
 
+    def contradicts(self, mode: Mode, given: Clause, constraint: Constraint) -> bool:
+        """Whether constraints and one more inequality are known to have no point."""
+        return self.ladder.contradicts(given, constraint, self.ranges(mode))
+
     def vanishes(self, mode: Mode, expr: Any, given: Clause) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
         return self.ladder.vanishes(expr, given, self.ranges(mode))
 
     def ranges(self, mode: Mode) -> dict[Any, Range]:
         """What is known of the values of a mode's states, of the sampled inputs and of time."""
-        if mode.name not in self._ranges:
+        if mode.states not in self._ranges:
             states = {symbol(s): self._of_state(s) for s in mode.states}
-            self._ranges[mode.name] = {**states, **self._common}
-        return self._ranges[mode.name]
+            self._ranges[mode.states] = {**states, **self._common}
+        return self._ranges[mode.states]
 
     def _of_state(self, name: str) -> Range:
         typical = float(self.start.get(name, Fraction(1)))
-        reach = 10 * max(1.0, abs(typical), self._levels.get(name, 0.0))
+        reach = 10 * max(1.0, abs(typical), min(self._levels.get(name, 0.0), float(_LARGEST)))
         return Range(None, None, (-reach, reach), typical)
 
     @cached_property
@@ -229,7 +237,9 @@ class Dynamics:
                 p = self.ladder.ring.of(self.residual(surface))
                 for name in p.names if len(p.names) == 1 else ():
                     coefficient = linear_in(p, name)
-                    level = abs(float(p.terms.get((), 0) / coefficient)) if coefficient else 0.0
+                    level = (
+                        float(min(abs(p.terms.get((), Fraction(0)) / coefficient), _LARGEST)) if coefficient else 0.0
+                    )
                     found[name.name] = max(found.get(name.name, 0.0), level)
         return found
 
@@ -251,5 +261,5 @@ class Dynamics:
 
 
 def _middle(expr: Any) -> Fraction:
-    low, high = enclosure(expr)
-    return (low + high) / 2
+    low, high = enclosure(expr) or (Fraction(0), Fraction(0))
+    return min(max((low + high) / 2, -_LARGEST), _LARGEST)

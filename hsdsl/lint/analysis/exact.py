@@ -22,10 +22,9 @@ from hsdsl.lint.analysis.polynomial import (
     linear_in,
     number,
 )
-from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, Relation
+from hsdsl.lint.analysis.question import Constraint, Range, Relation
 from hsdsl.lint.analysis.tape import enclosure
 
-NEVER = Answer("never", "symbolic")
 Row = tuple[Polynomial, Relation]
 _SIGNED = {"sin": (-1, 1), "cos": (-1, 1), "tanh": (-1, 1), "exp": (0, None), "cosh": (1, None), "absolute": (0, None)}
 _SIGNED |= {"sign": (-1, 1)}
@@ -54,17 +53,39 @@ class Reduced:
     bounds: dict[Any, Bounds] = field(default_factory=dict)
 
 
-def decide(constraints: Sequence[Constraint], ring: Ring, ranges: Mapping[Any, Range]) -> tuple[Answer, Reduced | None]:
-    """Answer a question if exact reasoning can, and say what is left of it."""
+def reduce(constraints: Sequence[Constraint], ring: Ring, ranges: Mapping[Any, Range]) -> Reduced | None:
+    """Say what is left of a question when its linear equations are solved; None where it has no answer."""
     try:
         reduced = Reduced([(ring.of(c.expr), c.relation) for c in constraints])
         _eliminate(reduced, ring, ranges)
         reduced.bounds = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
         _tighten(reduced)
     except Contradiction:
-        return NEVER, None
-    point = _point(reduced, ring, ranges)
-    return (UNKNOWN if point is None else Answer("somewhere", "symbolic", point)), reduced
+        return None
+    return reduced
+
+
+def contradicts(reduced: Reduced, constraint: Constraint, ring: Ring, ranges: Mapping[Any, Range]) -> bool:
+    """Whether one more constraint, an inequality, is found to leave nothing of a question."""
+    p = moved(ring.of(constraint.expr), reduced, ring)
+    bounds: dict[Any, Bounds] = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
+    try:
+        _tighten(Reduced([*reduced.rows, *_kept([(p, constraint.relation)])], reduced.solved, bounds))
+    except Contradiction:
+        return True
+    return False
+
+
+def linear(reduced: Reduced) -> bool:
+    """Whether nothing but linear inequalities is left, each of one name or direction."""
+    return all(atom.kind == "name" and e == 1 for p, _ in reduced.rows for m in p.terms if m for atom, e in m[:1])
+
+
+def moved(p: Polynomial, reduced: Reduced, ring: Ring) -> Polynomial:
+    """A polynomial where the equations hold."""
+    for symbol, value in reduced.solved:
+        p = ring.substituted(p, {symbol: value})
+    return p
 
 
 def _eliminate(reduced: Reduced, ring: Ring, ranges: Mapping[Any, Range]) -> None:
@@ -77,7 +98,7 @@ def _eliminate(reduced: Reduced, ring: Ring, ranges: Mapping[Any, Range]) -> Non
         reduced.solved.append((symbol, value))
         limits = _limits(value, ranges[symbol])
         rest = [row for i, row in enumerate(reduced.rows) if i != index]
-        touched = [(ring.substituted(p, {symbol: value}), r) for p, r in rest if symbol in p.names]
+        touched: list[Row] = [(ring.substituted(p, {symbol: value}), r) for p, r in rest if symbol in p.names]
         reduced.rows = [row for row in rest if symbol not in row[0].names] + _kept(touched + limits)
 
 
@@ -145,7 +166,7 @@ def _holds(bounds: Bounds, relation: Relation) -> bool | None:
 
 
 def _constants(atom: Atom) -> Bounds:
-    return enclosure(atom.head) if atom.kind == "constant" else _by_nature(atom)
+    return enclosure(atom.head) or (None, None) if atom.kind == "constant" else _by_nature(atom)
 
 
 def _by_nature(atom: Atom) -> Bounds:
@@ -186,14 +207,15 @@ def _tighten(reduced: Reduced) -> None:
 def _is_name(p: Polynomial) -> bool:
     """Whether a polynomial is a multiple of one name, and a constant."""
     monomials = [m for m in p.terms if m]
-    return len(monomials) == 1 and len(monomials[0]) == 1 and monomials[0][0][1] == 1 and monomials[0][0][0].kind == "name"
+    if len(monomials) != 1 or len(monomials[0]) != 1:
+        return False
+    ((atom, exponent),) = monomials[0]
+    return atom.kind == "name" and exponent == 1
 
 
 def _direction(p: Polynomial) -> tuple[tuple[tuple[Monomial, Fraction], ...], Fraction, bool]:
     """A polynomial as a multiple of ``direction - level``, and whether that multiple is positive."""
-    terms = sorted(
-        ((m, c) for m, c in p.terms.items() if m), key=lambda item: [(atom.index, e) for atom, e in item[0]]
-    )
+    terms = sorted(((m, c) for m, c in p.terms.items() if m), key=lambda item: [(atom.index, e) for atom, e in item[0]])
     lead = terms[0][1]
     return tuple((m, c / lead) for m, c in terms), -p.terms.get((), Fraction(0)) / lead, lead > 0
 
@@ -219,7 +241,7 @@ def _narrow(bounds: dict[Any, Bounds], symbol: Any, low: Fraction | None, high: 
     bounds[symbol] = first, last
 
 
-def _point(reduced: Reduced, ring: Ring, ranges: Mapping[Any, Range]) -> dict[Any, float] | None:
+def point(reduced: Reduced, ranges: Mapping[Any, Range]) -> dict[Any, float] | None:
     """A point that satisfies everything, where trying a few values exactly finds one."""
     if any(relation == "= 0" for _, relation in reduced.rows):
         return None
@@ -249,7 +271,7 @@ def _inside(bounds: Bounds, limits: Range) -> Fraction:
 
 def _valued(p: Polynomial, values: Mapping[Any, Fraction]) -> Bounds:
     def of_atom(atom: Atom) -> Bounds:
-        return (values[atom.head],) * 2 if atom.kind == "name" else _constants(atom)
+        return (values[atom.head], values[atom.head]) if atom.kind == "name" else _constants(atom)
 
     return bounds_of(p, of_atom)
 

@@ -1,8 +1,9 @@
 """Interval arithmetic on arrays: each operation returns bounds that contain every value it can take.
 
-Rigour. Sums, products and quotients of doubles are correctly rounded, so one step outward with ``nextafter`` is enough.
-The elementary functions of NumPy are taken to be within :data:`ULPS` units in the last place, and their bounds are widened
-by as much. Values outside a function's real domain are left out: an expression without a real value satisfies nothing.
+Rigour. Sums, products and quotients of doubles are correctly rounded, so one step outward with ``nextafter`` is
+enough. The elementary functions of NumPy are taken to be within :data:`ULPS` units in the last place, and their
+bounds are widened by as much. Values outside a function's real domain are left out: an expression without a real
+value satisfies nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of doubles, or of truth values
 ULPS = 8
 _RELATIVE = ULPS * 2.0**-52
 _TINY = 1e-300
@@ -31,7 +32,8 @@ class Intervals:
 
 def constant(value: float, low: float, high: float) -> Intervals:
     """A number between two doubles; ``value`` is the nearest double, and exact where the three agree."""
-    return Intervals(np.array([low]), np.array([high])) if low < high else Intervals(np.array([value]), np.array([value]))
+    ends = (low, high) if low < high else (value, value)
+    return Intervals(np.array(ends[:1]), np.array(ends[1:]))
 
 
 def _hull(low: Array, high: Array) -> Intervals:
@@ -109,13 +111,13 @@ def integer_power(a: Intervals, exponent: int) -> Intervals:
 
 def real_power(a: Intervals, b: Intervals) -> Intervals:
     """A to a power that is no whole number: a is not negative."""
-    corners = np.stack(
+    corners: Any = np.stack(
         np.broadcast_arrays(*(np.power(np.maximum(x, 0.0), y) for x in (a.low, a.high) for y in (b.low, b.high)))  # type: ignore[arg-type]
     )
     # a < 1 and a > 1 turn over in b, so 1 is a corner too where it lies inside
     one = (a.low < 1) & (a.high > 1)
-    low = np.where(one, np.minimum(corners.min(axis=0), 1.0), corners.min(axis=0))
-    high = np.where(one, np.maximum(corners.max(axis=0), 1.0), corners.max(axis=0))
+    low: Any = np.where(one, np.minimum(corners.min(axis=0), 1.0), corners.min(axis=0))
+    high: Any = np.where(one, np.maximum(corners.max(axis=0), 1.0), corners.max(axis=0))
     wide = _widened(low, high)
     return Intervals(np.maximum(wide.low, 0.0), wide.high)
 

@@ -102,4 +102,4 @@ class _Overlap:
         return edge.condition is None and self._never(at_most_zero(carried))
 
     def _never(self, constraint: Constraint) -> bool:
-        return self.dynamics.ask(self.mode, (*self.clause, constraint)).never
+        return self.dynamics.contradicts(self.mode, self.clause, constraint)

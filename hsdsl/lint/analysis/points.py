@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -120,7 +121,7 @@ class Search:
                 wanted[k] = np.where(values[k] > (-_ROOM * room if relation == "< 0" else 0.0), values[k] + room, 0.0)
         active = wanted != 0
         matrix = np.where(active[..., None], slopes, 0.0).transpose(1, 0, 2)
-        usable = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=0)
+        usable: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=0)
         matrix, right = np.where(usable[:, None, None], matrix, 0.0), np.where(usable[:, None], wanted.T, 0.0)
         try:
             step = (np.linalg.pinv(matrix, rcond=1e-9) @ right[..., None])[..., 0]

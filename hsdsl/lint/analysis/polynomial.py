@@ -2,10 +2,10 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
 """Expressions as polynomials with exact coefficients, in which equal things look equal.
 
-The unknowns of such a polynomial are its *atoms*: names, pi, and what is no polynomial (``sin(x + 1)``, a square root,
-the reciprocal of a sum), whose arguments are polynomials again. ``sin(a)**2 + cos(a)**2`` becomes 1 and the square of a
-square root what is under it, so that the landing of a reset on a surface is seen to be exact. Every step is bounded:
-what would grow beyond :data:`MOST_TERMS` stays a product.
+The unknowns of such a polynomial are its *atoms*: names, pi, and what is no polynomial (``sin(x + 1)``, a square
+root, the reciprocal of a sum), whose arguments are polynomials again. ``sin(a)**2 + cos(a)**2`` becomes 1 and the
+square of a square root what is under it, so that the landing of a reset on a surface is seen to be exact. Every step
+is bounded: what would grow beyond :data:`MOST_TERMS` stays a product.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class Ring:
         return self._atoms[key]
 
     def product(self, p: Polynomial, q: Polynomial) -> Polynomial:
-        """p q, multiplied out unless that is large."""
+        """The product, multiplied out unless that is large."""
         if len(p.terms) * len(q.terms) > MOST_TERMS:
             p, q = self._whole(p), self._whole(q)
         for one, other in ((p, q), (q, p)):
@@ -148,7 +148,7 @@ class Ring:
         return result
 
     def power(self, p: Polynomial, exponent: int) -> Polynomial:
-        """p to an integer power, multiplied out unless that is large."""
+        """An integer power, multiplied out unless that is large."""
         if exponent == 1:
             return p
         if exponent < 0 or len(p.terms) == 1:
@@ -223,8 +223,8 @@ class Ring:
 
     def _call(self, head: Any, arguments: tuple[Polynomial, ...]) -> Polynomial:
         numbers = [argument.number for argument in arguments]
-        if all(n is not None for n in numbers):  # SymPy folds sin(0), our own classes abs(-2)
-            value = head(*(sp.Rational(n.numerator, n.denominator) for n in numbers))
+        if None not in numbers:  # SymPy folds sin(0), our own classes abs(-2)
+            value = head(*(_rational(n) for n in numbers))
             if value.is_Rational:
                 return number(Fraction(int(value.p), int(value.q)))
         return _alone(self.atom("call", head, arguments))
@@ -298,7 +298,7 @@ def _expression(atom: Atom) -> Any:
     return atom.head(*arguments)
 
 
-def _rational(value: Fraction) -> sp.Rational:
+def _rational(value: Any) -> Any:
     return sp.Rational(value.numerator, value.denominator)
 
 
@@ -354,8 +354,10 @@ def _times(left: Bounds, right: Bounds) -> Bounds:
                 corners.append((_end_sign(a, i) * _end_sign(b, j), None))
             else:
                 corners.append((0, a * b))
-    low = None if any(v is None and s < 0 for s, v in corners) else min((v for _, v in corners if v is not None), default=None)
-    high = None if any(v is None and s > 0 for s, v in corners) else max((v for _, v in corners if v is not None), default=None)
+    finite = [value for _, value in corners if value is not None]
+    endless = {sign for sign, value in corners if value is None}
+    low = None if -1 in endless else min(finite, default=None)
+    high = None if 1 in endless else max(finite, default=None)
     return low, high
 
 

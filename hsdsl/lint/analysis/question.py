@@ -87,3 +87,4 @@ class Answer:
 
 
 UNKNOWN = Answer("unknown")
+NEVER = Answer("never", "symbolic")

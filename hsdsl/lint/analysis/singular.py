@@ -17,7 +17,7 @@ from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, pos
 from hsdsl.lint.analysis.tape import too_large
 from hsdsl.lint.written import Written
 
-_LEVELS = (0, 1, -1, 2)  # whole numbers that the argument of a floor is looked for at
+_LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
 @dataclass(frozen=True)

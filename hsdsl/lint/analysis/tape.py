@@ -139,21 +139,26 @@ def _interval(step: Step, values: Sequence[Intervals], low: Array, high: Array) 
 
 def _enclosed(expr: Any) -> tuple[float, float, float]:
     """The nearest double, and doubles on both sides; all three the same where it is exact."""
-    low, high = enclosure(expr)
+    bounds = enclosure(expr)
+    if bounds is None:
+        return np.nan, -np.inf, np.inf
+    low, high = bounds
     nearest = _double(low + (high - low) / 2)
     if low == high and np.isfinite(nearest) and Fraction(nearest) == low:
         return nearest, nearest, nearest
     return nearest, float(np.nextafter(nearest, -np.inf)), float(np.nextafter(nearest, np.inf))
 
 
-def enclosure(expr: Any) -> tuple[Fraction, Fraction]:
-    """Exact bounds of a number; for pi and the like of thirty digits."""
+def enclosure(expr: Any) -> tuple[Fraction, Fraction] | None:
+    """Exact bounds of a number; for pi and the like of thirty digits; None where there is no finite real number."""
     if expr.is_Rational:
         value = Fraction(int(expr.p), int(expr.q))
         return value, value
+    number = sp.N(expr, 40)
+    if not (number.is_Float and number.is_finite):
+        return None
     with mpmath.workdps(40):
-        mantissa = mpmath.mpf(sp.N(expr, 40))
-        value = Fraction(int(mpmath.floor(mantissa * 10**32)), 10**32)
+        value = Fraction(int(mpmath.floor(mpmath.mpf(number) * 10**32)), 10**32)
     return value, value + Fraction(2, 10**32)
 
 

@@ -81,7 +81,8 @@ FAMILIES = {
 class Rule:
     """A rule: its module, and how much its findings weigh.
 
-    A warning says that something is probably not what was meant; a note, that something is worth knowing. Both count.
+    A warning says that something is probably not what was meant; a note, that something is worth knowing:
+    notes alone leave the exit code at 0.
     """
 
     module: ModuleType

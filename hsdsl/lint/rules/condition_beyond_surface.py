@@ -8,8 +8,8 @@ where `if` can then become true while the state is still beyond the surface.
 ## Why it is bad
 
 Nothing fires there: a transition fires where the flow *crosses* its surface and `if` holds at the crossing
-([M3](../../meaning.md#m3-crossing)). Who reads `when: x >= 1` with `if: v >= 2` as "as soon as both are true" has written a
-model that misses events.
+([M3](../../meaning.md#m3-crossing)). Who reads `when: x >= 1` with `if: v >= 2` as "as soon as both are true" has
+written a model that misses events.
 
 ## Example
 
@@ -35,9 +35,9 @@ modes:
 
 ## How it is decided
 
-Two points are looked for, symbolically or by search: one on the surface where the flow passes and no `if` of that surface
-holds, and one beyond it where a comparison of the `if` turns true along the flow. The message has the second one. Whether
-a run gets from the one to the other is not looked at.
+Two points are looked for, symbolically or by search: one on the surface where the flow passes and no `if` of that
+surface holds, and one beyond it where a comparison of the `if` turns true along the flow. The message has the second
+one. Whether a run gets from the one to the other is not looked at.
 
 ## How to fix it
 
@@ -66,7 +66,8 @@ def check(subject: Subject) -> Iterator[Finding]:
                 continue
             about = [subject.dynamics.residual(edge.edge.surface), subject.dynamics.placed(edge.edge.condition)]
             where = at(subject.dynamics, part.mode, answer, about)
-            message = f"the `if` of '{edge.edge.name}' can become true beyond its surface, {where}, and nothing fires there"
+            name = edge.edge.name
+            message = f"the `if` of '{name}' can become true beyond its surface, {where}, and nothing fires there"
             hint = "to fire when both hold, put both into `when` with min(..., ...) >= 0"
             decided = answer.decided or "sampled"
             yield Finding(edge.document.condition.place.span, message, hint, decided)

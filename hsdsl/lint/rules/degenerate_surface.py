@@ -2,13 +2,13 @@
 
 ## What it does
 
-Finds guards and walls r = 0 on which the gradient of r vanishes: a warning where r does not change its sign, as the square of
-something, a note where it is one point of the surface, as where two lines cross.
+Finds guards and walls r = 0 on which the gradient of r vanishes: a warning where r does not change its sign, as the
+square of something, a note where it is one point of the surface, as where two lines cross.
 
 ## Why it is bad
 
-How deep a state is beyond a surface is measured as r/|grad r|, which says nothing where the gradient vanishes: the relaxed
-scheme halves its steps to no end. A function that does not change its sign is never crossed at all.
+How deep a state is beyond a surface is measured as r/|grad r|, which says nothing where the gradient vanishes: the
+relaxed scheme halves its steps to no end. A function that does not change its sign is never crossed at all.
 
 ## Example
 
@@ -30,8 +30,8 @@ modes:
 
 ## How it is decided
 
-A point of the surface where all derivatives vanish is looked for, symbolically or by search, and one where r is positive and
-one where it is negative.
+A point of the surface where all derivatives vanish is looked for, symbolically or by search, and one where r is
+positive and one where it is negative.
 
 ## How to fix it
 
@@ -73,7 +73,10 @@ def _look(subject: Subject, part: ModePart, surface: Surface, scalar: Scalar) ->
     if passes:
         message = f"the gradient of the surface '{surface.text}' vanishes on it {where}"
     else:
-        message = f"the surface '{surface.text}' is never crossed: r does not change its sign, and its gradient vanishes {where}"
+        message = (
+            f"the surface '{surface.text}' is never crossed: r does not change its sign, and its gradient vanishes "
+            f"{where}"
+        )
     hint = None if passes else "compare what passes through zero, not its square"
     severity = "note" if passes else "warning"
     yield Finding(scalar.place.span, message, hint, answer.decided or "sampled", severity=severity)

@@ -6,8 +6,8 @@ Finds transitions with an `if` whose surface can be passed where no `if` of that
 
 ## Why it is bad
 
-It may be meant. But the theory asks for guards on the boundary of the domain, so that a run cannot go round a guard: two
-runs on both sides of the edge of such a guard, one that fires and one that passes, are close before and far apart
+It may be meant. But the theory asks for guards on the boundary of the domain, so that a run cannot go round a guard:
+two runs on both sides of the edge of such a guard, one that fires and one that passes, are close before and far apart
 afterwards, and the simulation's error has no bound there.
 
 ## Example
@@ -37,8 +37,8 @@ modes:
 
 ## How it is decided
 
-A point of the surface is looked for, in the domain and with the flow not pointing back, where no transition with the same
-surface has an `if` that holds: symbolically, or by search.
+A point of the surface is looked for, in the domain and with the flow not pointing back, where no transition with the
+same surface has an `if` that holds: symbolically, or by search.
 
 ## How to fix it
 

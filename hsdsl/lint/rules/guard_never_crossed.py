@@ -8,8 +8,8 @@ the mode are left out, as their transitions fire then.
 
 ## Why it is bad
 
-The transition is as good as not written. Mostly the inequality is the wrong way round, or another guard or wall ends the
-domain before.
+The transition is as good as not written. Mostly the inequality is the wrong way round, or another guard or wall ends
+the domain before.
 
 ## Example
 
@@ -36,8 +36,8 @@ initial: {mode: falling, h: 1, v: 0}
 
 ## How it is decided
 
-Symbolically where the surface and the domain are linear; else by interval arithmetic over the domain, and the message says
-how far was looked in names that nothing bounds. Where neither proves it, nothing is said.
+Symbolically where the surface and the domain are linear; else by interval arithmetic over the domain, and the message
+says how far was looked in names that nothing bounds. Where neither proves it, nothing is said.
 
 ## How to fix it
 

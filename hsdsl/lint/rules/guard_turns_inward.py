@@ -7,9 +7,9 @@ state it points out at some times and back into the domain at others.
 
 ## Why it is bad
 
-The theory's guards are sets of states that the flow leaves through, once and for all. Here a state on the surface can leave
-or stay, depending on when it gets there, and the distances of the theory treat the surface as if it could always be
-passed. A moving stop or a switching threshold is of this kind.
+The theory's guards are sets of states that the flow leaves through, once and for all. Here a state on the surface can
+leave or stay, depending on when it gets there, and the distances of the theory treat the surface as if it could
+always be passed. A moving stop or a switching threshold is of this kind.
 
 ## Example
 
@@ -35,8 +35,8 @@ experiment: {until: 10}
 
 ## How it is decided
 
-The rate of the surface function, L_f r, is computed symbolically. Where it contains time or an input, two points of the
-surface are looked for, one with each sign.
+The rate of the surface function, L_f r, is computed symbolically. Where it contains time or an input, two points of
+the surface are looked for, one with each sign.
 
 ## How to fix it
 

@@ -2,7 +2,8 @@
 
 ## What it does
 
-Finds flows, surfaces and resets with `sign`, `floor` or `atan2` that jump at a point of the domain (a reset: of its guard).
+Finds flows, surfaces and resets with `sign`, `floor` or `atan2` that jump at a point of the domain (a reset: of its
+guard).
 
 ## Why it is bad
 
@@ -35,8 +36,8 @@ initial: {mode: slide, x: 0, v: 1}
 
 ## How it is decided
 
-A point of the domain where the function jumps, and where what it is multiplied with does not vanish, is looked for: symbolically,
-or by search. `floor` is looked at where its argument is -1, 0, 1 or 2.
+A point of the domain where the function jumps, and where what it is multiplied with does not vanish, is looked for:
+symbolically, or by search. `floor` is looked at where its argument is -1, 0, 1 or 2.
 
 ## How to fix it
 

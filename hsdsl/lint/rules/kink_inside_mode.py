@@ -6,8 +6,8 @@ Finds flows with `abs`, `min` or `max` that have a kink at a point of the domain
 
 ## Why it is bad
 
-The flow is continuous, and all of the theory holds. But methods of high order lose their order where a step crosses the
-kink, so runs become slower or less accurate than they could be.
+The flow is continuous, and all of the theory holds. But methods of high order lose their order where a step crosses
+the kink, so runs become slower or less accurate than they could be.
 
 ## Example
 
@@ -31,8 +31,8 @@ modes:
 
 ## How it is decided
 
-A point of the domain where the two sides are equal, and where what the function is multiplied with does not vanish, is looked
-for: symbolically, or by search. So `v*abs(v)`, which is smooth enough, is not reported.
+A point of the domain where the two sides are equal, and where what the function is multiplied with does not vanish,
+is looked for: symbolically, or by search. So `v*abs(v)`, which is smooth enough, is not reported.
 
 ## How to fix it
 

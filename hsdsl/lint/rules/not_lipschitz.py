@@ -2,7 +2,8 @@
 
 ## What it does
 
-Finds flows with a root, a fractional power, `asin`, `acos` or `acosh` whose slope is infinite at a point of the domain.
+Finds flows with a root, a fractional power, `asin`, `acos` or `acosh` whose slope is infinite at a point of the
+domain.
 
 ## Why it is bad
 
@@ -33,8 +34,8 @@ initial: {mode: drain, h: 1}
 
 ## How it is decided
 
-A point of the domain where the slope is infinite, and where the argument does change with a state, is looked for: symbolically, or
-by search. So the length of a vector, `sqrt(x**2 + y**2)`, is not reported.
+A point of the domain where the slope is infinite, and where the argument does change with a state, is looked for:
+symbolically, or by search. So the length of a vector, `sqrt(x**2 + y**2)`, is not reported.
 
 ## How to fix it
 
@@ -70,7 +71,10 @@ def check(subject: Subject) -> Iterator[Finding]:
                 answer = dynamics.ask_any(part.mode, places)
                 if answer.somewhere:
                     where = at(dynamics, part.mode, answer, [argument.expr])
-                    message = f"the flow of '{expression.written.name}' is not Lipschitz {where}: {argument.said} has an infinite slope"
+                    message = (
+                        f"the flow of '{expression.written.name}' is not Lipschitz {where}: "
+                        f"{argument.said} has an infinite slope"
+                    )
                     hint = "end the domain before, with a guard or a wall"
                     finding = Finding(expression.written.span(), message, hint, answer.decided or "sampled")
                     found.add(argument.expr, finding)

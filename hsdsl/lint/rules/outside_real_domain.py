@@ -2,13 +2,13 @@
 
 ## What it does
 
-Finds arguments of `sqrt`, fractional powers, `log`, `asin`, `acos`, `acosh` and `atanh` that leave the function's real domain at
-a point of the mode's domain, or, in a reset, of its guard.
+Finds arguments of `sqrt`, fractional powers, `log`, `asin`, `acos`, `acosh` and `atanh` that leave the function's
+real domain at a point of the mode's domain, or, in a reset, of its guard.
 
 ## Why it is bad
 
-The expression has no real value there, and a run that gets there stops with `not_finite`. A trial step of the integrator may
-get there even where the run does not.
+The expression has no real value there, and a run that gets there stops with `not_finite`. A trial step of the
+integrator may get there even where the run does not.
 
 ## Example
 

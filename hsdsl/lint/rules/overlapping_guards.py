@@ -2,14 +2,14 @@
 
 ## What it does
 
-Finds pairs of transitions of one mode whose guards overlap. A warning where the order matters: where the two orders are not
-known to lead to one mode with the same states. A note where they do: the transitions commute.
+Finds pairs of transitions of one mode whose guards overlap. A warning where the order matters: where the two orders
+are not known to lead to one mode with the same states. A note where they do: the transitions commute.
 
 ## Why it is bad
 
 Of transitions that are reached together, one goes first: that of the higher `priority`, then the first in the file
-([M6](../../meaning.md#m6-together)). Where the order matters, runs that pass on both sides of the overlap differ for good,
-and round-off decides. Where the transitions commute, either order is right.
+([M6](../../meaning.md#m6-together)). Where the order matters, runs that pass on both sides of the overlap differ for
+good, and round-off decides. Where the transitions commute, either order is right.
 
 ## Example
 
@@ -45,13 +45,14 @@ initial: {mode: table, x: 0, y: 0}
 
 ## How it is decided
 
-A point on both guards is looked for, symbolically or by search. Then both orders are followed through the transitions that are
-sure to fire at that instant, at most three, and the states they lead to are compared symbolically, or at sampled points.
+A point on both guards is looked for, symbolically or by search. Then both orders are followed through the transitions
+that are sure to fire at that instant, at most three, and the states they lead to are compared symbolically, or at
+sampled points.
 
 ## How to fix it
 
-Separate the guards with an `if` each, add the transitions that let both orders meet again, or say with `priority` which
-goes first and ignore the finding.
+Separate the guards with an `if` each, add the transitions that let both orders meet again, or say with `priority`
+which goes first and ignore the finding.
 """
 
 from __future__ import annotations

@@ -2,13 +2,13 @@
 
 ## What it does
 
-Finds transitions whose reset can land beyond a surface of the mode it leads to: outside that mode's domain. A warning where
-it always does, a note where it can.
+Finds transitions whose reset can land beyond a surface of the mode it leads to: outside that mode's domain. A warning
+where it always does, a note where it can.
 
 ## Why it is bad
 
-Beyond a guard, the next transition fires at once ([M5](../../meaning.md#m5-on-entry)); beyond a wall, the run stops. The
-theory has no such case: its resets land inside the next domain.
+Beyond a guard, the next transition fires at once ([M5](../../meaning.md#m5-on-entry)); beyond a wall, the run stops.
+The theory has no such case: its resets land inside the next domain.
 
 ## Example
 
@@ -36,8 +36,8 @@ modes:
 
 ## How it is decided
 
-The surfaces of the next mode are put behind the reset, and a point of the guard is looked for where one of them is positive:
-symbolically, or by search. That it is positive everywhere is proved symbolically or by intervals.
+The surfaces of the next mode are put behind the reset, and a point of the guard is looked for where one of them is
+positive: symbolically, or by search. That it is positive everywhere is proved symbolically or by intervals.
 
 ## How to fix it
 

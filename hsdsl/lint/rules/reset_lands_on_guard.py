@@ -2,14 +2,14 @@
 
 ## What it does
 
-Finds transitions whose reset lands exactly on a surface of the mode it leads to, wherever they fire, with the flow there
-pointing out, or along the surface where the transition leads back to itself.
+Finds transitions whose reset lands exactly on a surface of the mode it leads to, wherever they fire, with the flow
+there pointing out, or along the surface where the transition leads back to itself.
 
 ## Why it is bad
 
-Nothing fires on a surface by itself ([M4](../../meaning.md#m4-on-the-surface)), so most such resets are harmless: a bounce
-lands on the floor and flies off. But with the flow pointing out the next transition follows at once, and where the flow does
-not lead away from its own guard transitions can pile up in finite time (Zeno).
+Nothing fires on a surface by itself ([M4](../../meaning.md#m4-on-the-surface)), so most such resets are harmless: a
+bounce lands on the floor and flies off. But with the flow pointing out the next transition follows at once, and where
+the flow does not lead away from its own guard transitions can pile up in finite time (Zeno).
 
 ## Example
 
@@ -42,8 +42,9 @@ initial: {mode: fly, h: 1, v: 0}
 
 ## How it is decided
 
-The next mode's surface function and its rate are put behind the reset. That the first vanishes on the whole guard is decided
-symbolically, or at sampled points; a point where the second has the wrong sign is looked for symbolically, or by search.
+The next mode's surface function and its rate are put behind the reset. That the first vanishes on the whole guard is
+decided symbolically, or at sampled points; a point where the second has the wrong sign is looked for symbolically, or
+by search.
 
 ## How to fix it
 
@@ -84,6 +85,7 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, landing: Landing, fo
     own = landing.edge is not None and landing.edge.name == name and landing.edge.source == edge.edge.source
     on = f"the guard of '{landing.edge.name}'" if landing.edge else f"the wall '{landing.surface.text}'"
     on = "its own guard" if own else on
+    then = ""
     if answer.somewhere:
         then = "the flow can cross it at once" if landing.edge else "the flow can leave the domain there"
     elif own and landing.bend is not None:
@@ -91,7 +93,9 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, landing: Landing, fo
         then = "the flow does not lead away from it (Zeno is possible)"
     if not answer.somewhere:
         return
-    where = at(dynamics, part.mode, answer, [dynamics.residual(edge.edge.surface), landing.rate, landing.bend if own else None])
+    where = at(
+        dynamics, part.mode, answer, [dynamics.residual(edge.edge.surface), landing.rate, landing.bend if own else None]
+    )
     message = f"the reset of '{name}' lands on {on}, and {where} {then}"
     decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
     found.add(kind, Finding(edge.document.to.place.span, message, None, decided))

@@ -2,14 +2,14 @@
 
 ## What it does
 
-Finds pairs of transitions, from A to B and back, on one surface, where the flow of A pushes through it and the flow of B pushes
-back: sliding.
+Finds pairs of transitions, from A to B and back, on one surface, where the flow of A pushes through it and the flow
+of B pushes back: sliding.
 
 ## Why it is bad
 
-The run switches back and forth without end, at one place. The relaxed scheme makes a transition each `relaxation`, and
-follows the sliding motion only on average; the theory says nothing about such runs. What is meant is mostly a third mode
-that moves along the surface, or a switch with hysteresis.
+The run switches back and forth without end, at one place. The relaxed scheme makes a transition each `relaxation`,
+and follows the sliding motion only on average; the theory says nothing about such runs. What is meant is mostly a
+third mode that moves along the surface, or a switch with hysteresis.
 
 ## Example
 
@@ -40,8 +40,8 @@ initial: {mode: left, x: -1}
 
 ## How it is decided
 
-That the second surface is met on landing, and that its reset leads back to the same state, is decided symbolically or at
-sampled points. A point where both flows push against the surface is looked for symbolically, or by search.
+That the second surface is met on landing, and that its reset leads back to the same state, is decided symbolically or
+at sampled points. A point where both flows push against the surface is looked for symbolically, or by search.
 
 ## How to fix it
 
@@ -82,7 +82,8 @@ def check(subject: Subject) -> Iterator[Finding]:
                     continue
                 told.add((edge.edge.source, edge.edge.name, back.source, back.name))
                 where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
-                message = f"'{edge.edge.name}' and '{back.name}' push against one surface from both sides (sliding): {where}"
+                names = f"'{edge.edge.name}' and '{back.name}'"
+                message = f"{names} push against one surface from both sides (sliding): {where}"
                 hint = "give the two surfaces a distance, or add a mode that moves along the surface"
                 decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
                 finding = Finding(edge.document.when.place.span, message, hint, decided)

@@ -38,9 +38,9 @@ initial: {mode: heating, T: 20}
 
 ## How it is decided
 
-A point of the guard with L_f r = 0 is looked for, symbolically or by search. Where the second derivative of r along the flow
-can be negative there, runs from inside the domain can come to it (they graze); else only a run that rests on the surface
-or starts there does.
+A point of the guard with L_f r = 0 is looked for, symbolically or by search. Where the second derivative of r along
+the flow can be negative there, runs from inside the domain can come to it (they graze); else only a run that rests on
+the surface or starts there does.
 
 ## How to fix it
 
@@ -73,9 +73,7 @@ def check(subject: Subject) -> Iterator[Finding]:
             answer, grazing = _touched(subject, part, edge, rate, bend)
             if answer.somewhere:
                 where = at(subject.dynamics, part.mode, answer, [residual, rate, bend if grazing else None])
-                how = (
-                    "runs can graze it" if grazing else "runs come there only by resting on it, or by starting there"
-                )
+                how = "runs can graze it" if grazing else "runs come there only by resting on it, or by starting there"
                 message = f"the flow does not cross the guard of '{edge.edge.name}' {where}, where L_f r = 0: {how}"
                 span = edge.document.when.place.span
                 found.add(rate, Finding(span, message, None, answer.decided or "sampled"))

@@ -6,8 +6,8 @@ Finds states that neither a guard nor a wall bounds in their mode. They are told
 
 ## Why it is bad
 
-The theory asks for compact domains: its constants are those of a bounded set. A simulation does not need that. But a run that
-diverges goes on to `not_finite`, and checks that look at a whole domain look too far.
+The theory asks for compact domains: its constants are those of a bounded set. A simulation does not need that. But a
+run that diverges goes on to `not_finite`, and checks that look at a whole domain look too far.
 
 ## Example
 
@@ -29,8 +29,8 @@ modes:
 
 ## How it is decided
 
-From bounds that surfaces without `if` give for single states, symbolically; for other surfaces it is asked whether a point
-with a state beyond a million times its usual size can satisfy them all.
+From bounds that surfaces without `if` give for single states, symbolically; for other surfaces it is asked whether a
+point with a state beyond a million times its usual size can satisfy them all.
 
 ## How to fix it
 

@@ -2,9 +2,9 @@
 
 ## What it does
 
-Finds divisors (and cosines under a `tan`) that vanish at a point of the mode's domain, or, in a reset, of its guard. A warning
-where the divisor passes through zero, a note where it is zero only at a point that runs miss, such as the length
-of a vector.
+Finds divisors (and cosines under a `tan`) that vanish at a point of the mode's domain, or, in a reset, of its guard.
+A warning where the divisor passes through zero, a note where it is zero only at a point that runs miss, such as the
+length of a vector.
 
 ## Why it is bad
 
@@ -34,7 +34,8 @@ initial: {mode: fall, r: 1, v: 0}
 
 ## How it is decided
 
-A zero of the divisor is looked for in the domain, symbolically or by search, and one where its gradient does not vanish.
+A zero of the divisor is looked for in the domain, symbolically or by search, and one where its gradient does not
+vanish.
 
 ## How to fix it
 

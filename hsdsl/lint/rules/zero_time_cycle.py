@@ -2,7 +2,8 @@
 
 ## What it does
 
-Finds states from which transitions fire at once, one after the other, until they come back to a state they have been in.
+Finds states from which transitions fire at once, one after the other, until they come back to a state they have been
+in.
 
 ## Why it is bad
 
@@ -36,9 +37,9 @@ initial: {mode: a, x: 0}
 
 ## How it is decided
 
-Points of guards are looked for, symbolically or by search, from which the reset lands beyond or on a guard with the flow
-pointing out. From each of them the transitions are followed with numbers. Two flows that push against one surface have
-[a rule of their own](#hs509-sliding).
+Points of guards are looked for, symbolically or by search, from which the reset lands beyond or on a guard with the
+flow pointing out. From each of them the transitions are followed with numbers. Two flows that push against one
+surface have [a rule of their own](#hs509-sliding).
 
 ## How to fix it
 
