@@ -222,7 +222,12 @@ def rule_index() -> str:
     parts = [LINT_RULES]
     for name in FAMILIES:
         rows = [
-            (f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})", rule.name, rule.title, rule.severity)
+            (
+                f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})",
+                rule.name,
+                rule.title,
+                rule.severity if rule.by_default else "note, on request",
+            )
             for code, rule in RULES.items()
             if family(code) == name
         ]

@@ -115,10 +115,10 @@ def real_power(a: Intervals, b: Intervals) -> Intervals:
         np.broadcast_arrays(*(np.power(np.maximum(x, 0.0), y) for x in (a.low, a.high) for y in (b.low, b.high)))  # type: ignore[arg-type]
     )
     # a < 1 and a > 1 turn over in b, so 1 is a corner too where it lies inside
-    one = (a.low < 1) & (a.high > 1)
-    low: Any = np.where(one, np.minimum(corners.min(axis=0), 1.0), corners.min(axis=0))
-    high: Any = np.where(one, np.maximum(corners.max(axis=0), 1.0), corners.max(axis=0))
-    wide = _widened(low, high)
+    one: Any = (a.low < 1) & (a.high > 1)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    ends: Any = np.where(one, np.minimum(low, 1.0), low), np.where(one, np.maximum(high, 1.0), high)
+    wide = _widened(*ends)
     return Intervals(np.maximum(wide.low, 0.0), wide.high)
 
 

@@ -87,6 +87,7 @@ class Rule:
 
     module: ModuleType
     severity: Literal["warning", "note"] = "warning"
+    by_default: bool = True  # False: only where it is selected, by its code, its name or its family
 
     @property
     def name(self) -> str:
@@ -173,6 +174,6 @@ RULES: dict[str, Rule] = {
     "HS513": Rule(vanishing_divisor),
     "HS514": Rule(outside_real_domain),
     "HS515": Rule(not_lipschitz),
-    "HS516": Rule(unbounded_domain, severity="note"),
+    "HS516": Rule(unbounded_domain, severity="note", by_default=False),
     "HS517": Rule(degenerate_surface),
 }

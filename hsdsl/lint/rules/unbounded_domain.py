@@ -2,7 +2,8 @@
 
 ## What it does
 
-Finds states that neither a guard nor a wall bounds in their mode. They are told once for the model.
+Finds states that neither a guard nor a wall bounds in their mode. They are told once for the model, and only
+where the rule is selected: nearly every model has some.
 
 ## Why it is bad
 
