@@ -89,6 +89,14 @@ answer. With the tolerance e the order is 1 - log(e)/2, rounded up: 12 for 1e-9,
 order of round-off, 20 for float64. Flows must be smooth: with `abs`, `sign`, `min`, `max` or `floor` in one the method
 is refused, and a run stops where a flow has a value but no series (the square root of 0)."""
 
+RADAU = """A step is implicit: its slopes solve a system of equations, by Newton's method with the derivatives of the
+flow, which come from the model's expressions. It is L-stable, so that what decays fast does not bound the step once it
+has decayed. Inside a step: the collocation polynomial, of degree 3 and order 3 in general (its error is O(h^4)), exact
+to order 5 at the step's end. The error estimate falls as h^4 and holds for the curve between the samples too; right
+after a switch to a fast decay the steps are therefore short enough to show it. Where the equations are not solved, the
+step is halved. It has no compiled loop yet: the Python engine runs it. When to take it is in
+[theory](../theory.md#stiff-modes)."""
+
 SCALARS = {
     frozenset({"number", "string"}): "expression",
     frozenset({"string", "number", "boolean"}): "text",
@@ -246,11 +254,12 @@ def rule_family(name: str) -> str:
 
 def integrator_page() -> str:
     """Document every integrator from its table."""
-    methods, taylor = integrators.INTEGRATORS, integrators.METHODS["taylor"]
+    methods, taylor, radau = integrators.INTEGRATORS, integrators.METHODS["taylor"], integrators.RADAU
     summary = [
         (f"[`{name}`](#{name})", str(m.order), str(m.stages), "adaptive" if m.adaptive else "fixed")
         for name, m in methods.items()
     ] + [(f"[`{taylor.name}`](#{taylor.name})", "by the tolerance", "", "adaptive")]
+    summary.append((f"[`{radau.name}`](#{radau.name})", str(radau.order), "3, implicit", "adaptive"))
     parts = [
         INTEGRATORS.format(auto=integrators.AUTO),
         table(("method", "order", "stages", "steps"), summary),
@@ -263,6 +272,7 @@ def integrator_page() -> str:
         parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.{known}\n\n")
         parts.append(f"Source: {method.source}.\n\n{tableau(method)}")
     parts.append(f"## {taylor.name}\n\n{taylor.title}. {TAYLOR}\n\nSource: {taylor.source}.\n")
+    parts.append(f"\n## {radau.name}\n\n{radau.title}, order {radau.order}. {RADAU}\n\nSource: {radau.source}.\n")
     return "".join(parts)
 
 

@@ -76,6 +76,10 @@ class Kernel(Protocol):
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
         ...
 
+    def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
+        """Return the derivatives of a mode's flow by its states, n * n of them row by row."""
+        ...
+
     def expressions(self, mode: int, data: Sequence[Number]) -> Sequence[tuple[str, Routine]]:
         """Return a mode's expressions one by one, named for a person: which of them is not finite?"""
         ...

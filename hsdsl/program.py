@@ -115,6 +115,9 @@ class ModeProgram:
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
+    ``jacobian`` has one routine, ``jacobian``, called like the others: the n * n derivatives of the flow by the states,
+    row by row. It stands apart because only implicit methods ask for it.
+
     ``tape`` gives Taylor coefficients along the flow; None where the flow is kinked (`abs`, `sign`, `min`, `max`,
     `floor`).
 
@@ -129,6 +132,7 @@ class ModeProgram:
     walls: tuple[str, ...]
     flow_texts: tuple[str, ...]
     routines: Routines
+    jacobian: Routines
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines

@@ -42,6 +42,7 @@ class PythonKernel:
         self._program = program
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
+        self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
 
@@ -79,6 +80,13 @@ class PythonKernel:
         if mode not in self._tapes:
             self._tapes[mode] = compile_tape(program.tape, len(program.states), self.arithmetic, f"mode {mode}")
         return self._tapes[mode](data)
+
+    def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
+        """Return the derivatives of a mode's flow by its states; compiled when they are first asked for."""
+        if mode not in self._jacobians:
+            text = self._program.modes[mode].jacobian
+            self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
+        return self._jacobians[mode](*data)[0]
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""

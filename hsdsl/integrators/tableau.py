@@ -115,6 +115,11 @@ class ButcherTableau:
         return self.embedded_order or self.order - 1
 
     @property
+    def error_order(self) -> int:
+        """The power of h that the error estimate falls with."""
+        return self.order
+
+    @property
     def stages(self) -> int:
         """Number of stages."""
         return len(self.b)

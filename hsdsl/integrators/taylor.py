@@ -38,6 +38,11 @@ class TaylorMethod:
         """Degree of a step's polynomial."""
         return self.order
 
+    @property
+    def error_order(self) -> int:
+        """The power of h that the error estimate falls with."""
+        return self.order
+
     def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> TaylorMethod:
         """Choose the order; without a tolerance that of round-off."""
         smallest = max(arithmetic.unit, tolerance or 0)

@@ -156,10 +156,17 @@ def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram
         walls=tuple(wall.text for wall in mode.walls),
         flow_texts=mode.flow_texts,
         routines=print_routines(_mode_routines(mode, names), names.data),
+        jacobian=print_routines((_jacobian(mode, names),), names.data),
         tape=_tape(mode, names),
         expressions=tuple(text for text, _ in _expressions(mode)),
         diagnosis=print_routines(_diagnosis(mode, names), names.data),
     )
+
+
+def _jacobian(mode: Mode, names: Names) -> Definition:
+    states, mapping, done = names.of_states(mode.states), names.mapping(mode.states), {}
+    slopes = Gradient([replaced(sp.sympify(e), mapping, done) for e in mode.flow], states)
+    return Definition("jacobian", (TIME, *states), tuple(d for row in slopes.rows for d in row), slopes.statements)
 
 
 def _tape(mode: Mode, names: Names) -> lowered.Tape | None:

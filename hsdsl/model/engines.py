@@ -67,7 +67,8 @@ def _refusal(settings: Settings, precision: int | None) -> str | None:
     if settings.scheme not in SCHEMES:
         return f"scheme '{settings.scheme}' has no compiled loop"
     if not isinstance(settings.method, ButcherTableau):
-        return "its method has no compiled form"
+        name = settings.method.name if settings.method else settings.scheme
+        return f"method '{name}' has no compiled loop"
     return None
 
 

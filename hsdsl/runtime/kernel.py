@@ -82,6 +82,10 @@ class CompiledKernel:
         """Return Taylor coefficients along a mode's flow, by the Python kernel."""
         return self._python.taylor(mode, data)
 
+    def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
+        """Return the derivatives of a mode's flow by its states, by the Python kernel."""
+        return self._python.jacobian(mode, data)
+
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""
         table, outputs = self._compiled.table.mode[mode], len(self._program.outputs)

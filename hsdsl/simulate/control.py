@@ -2,7 +2,8 @@
 
 With e the estimate and x, z the step's ends, the error ratio is max_i |e_i| / (tolerance (1 + max(|x_i|, |z_i|))). A
 step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
-above 1 after a rejection). Trials halved to stay in the relaxed domain do not feed the formula.
+above 1 after a rejection), order being the power of h that the estimate falls with. A step whose equations could not
+be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
 """
 
 from __future__ import annotations
@@ -51,10 +52,10 @@ class Control:
         proposed = taken * self.factor(ratio)
         self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
 
-    def reject(self, taken: Number, ratio: Number) -> None:
-        """Shrink after a rejected, unhalved step."""
+    def reject(self, taken: Number, ratio: Number | None) -> None:
+        """Shrink after a rejected, unhalved step; without a ratio it has no end at all."""
         self.rejected += 1
-        self.h = taken * min(1, self.factor(ratio))
+        self.h = taken / 2 if ratio is None else taken * min(1, self.factor(ratio))
 
     @property
     def struggles(self) -> bool:
@@ -64,7 +65,7 @@ class Control:
 
 def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     """Start from the fixed step, or from a hundredth of the largest step and the error formula."""
-    order = settings.method.order if settings.method else 1
+    order = settings.method.error_order if settings.method else 1
     if settings.step is not None:
         return Control(settings.step, None, order, settings.step, None)
     largest = settings.until * LARGEST_SHARE

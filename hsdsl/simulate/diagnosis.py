@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators import TaylorMethod
+from hsdsl.integrators import RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import NoSeries, terms
 from hsdsl.simulate.run import Here, Run
@@ -27,6 +27,9 @@ def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop
     if has_no_series(run, here, t):
         sentence = f"the flow of mode {here.mode.name} has no Taylor series at t = {show(t)}; another method may go on"
         return Stop("not_finite", t, sentence)
+    if has_no_jacobian(run, here, t):
+        sentence = f"the flow of mode {here.mode.name} has no derivatives at t = {show(t)}; another method may go on"
+        return Stop("not_finite", t, sentence)
     return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
 
 
@@ -41,6 +44,17 @@ def has_no_series(run: Run, here: Here, t: Number) -> bool:
     except NoSeries:
         return True
     return False
+
+
+def has_no_jacobian(run: Run, here: Here, t: Number) -> bool:
+    """Whether the method is implicit and the flow has no derivatives where the run stands."""
+    if not isinstance(run.settings.method, RadauMethod):
+        return False
+    try:
+        slopes = run.kernel.jacobian(run.program.modes.index(here.mode), here.segment.data)(t, *here.x)
+    except DOMAIN_ERRORS:
+        return True
+    return not all(map(run.arithmetic.isfinite, slopes))
 
 
 def _largest(here: Here) -> str:

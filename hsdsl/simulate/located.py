@@ -213,7 +213,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
 
 def stuck(run: Run, here: Here, obstacle: Obstacle) -> Landing | Stop:
     """No step is short enough: take a guard that the state stands on, or stop and say why."""
-    if obstacle.kind == "not finite" and (standing := standing_on(run, here)):
+    if obstacle.kind in ("not finite", "unsolved") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
         return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
     try:

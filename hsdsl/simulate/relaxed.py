@@ -13,6 +13,7 @@ from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
+from hsdsl.integrators.radau import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
@@ -22,7 +23,7 @@ from hsdsl.simulate.stops import reached, reached_in_strip, show
 from hsdsl.simulate.surfaces import TIE, Crossing, Obstacle, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-NOT_FINITE, TOO_WRONG = Obstacle("not finite"), Obstacle("error")
+NOT_FINITE, TOO_WRONG, UNSOLVED = Obstacle("not finite"), Obstacle("error"), Obstacle("unsolved")
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,13 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             if not isinstance(found, Obstacle):
                 break
             obstacle = found
-            if found is TOO_WRONG and halvings == 0:
-                control.reject(h, ratio)
+            too_long = found is TOO_WRONG or (found is UNSOLVED and estimate is not None)
+            if too_long and halvings == 0:
+                control.reject(h, None if found is UNSOLVED else ratio)
                 h = control.h
             else:
                 h, halvings = h / 2, halvings + 1
-            if halvings > most_halvings or (found is TOO_WRONG and (control.struggles or not t + h > t)):
+            if halvings > most_halvings or (too_long and (control.struggles or not t + h > t)):
                 return stuck(run, here.moved(t, x), found, slope)
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
@@ -120,6 +122,8 @@ def attempts(run: Run, here: Here, method: Stepper) -> Attempt:
             found = here.surfaces.judge(trial, values, epsilon)
             if found or trial.end is not None:  # beyond a guard the flow need not have a value, inside it must
                 return found, z, stages, trial.end
+        except NoConvergence:
+            return UNSOLVED, x, (), None
         except DOMAIN_ERRORS:
             pass
         return NOT_FINITE, x, (), None
@@ -191,7 +195,8 @@ def standing_on(run: Run, here: Here) -> list[Crossing]:
 
 def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | Stop:
     """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
-    if obstacle.kind in ("wall", "deep", "flat", "inward", "not finite") and (standing := standing_on(run, here)):
+    shrunk = obstacle.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
+    if shrunk and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
         return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
     return no_way_on(run, here, obstacle, slope)
@@ -203,11 +208,12 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
     grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
-    if obstacle.kind == "not finite" or (obstacle.kind in ("error", "creeping") and grown):
+    if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
         ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
         return not_finite(run, here, t, ahead)
     why = {
+        "unsolved": "the equations of an implicit step are not solved by Newton's method",
         "error": "the error estimate stays above the tolerance, as where a flow jumps",
         "creeping": "steps had to be cut below a thousandth thousands of times in a row",
         "flat": "the gradient of a guard's surface vanishes on it",

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
-from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators import ButcherTableau, RadauMethod
+from hsdsl.integrators.radau import radau_stepper
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import Kernel, ModeKernel
@@ -62,7 +63,11 @@ class Run:
         assert method is not None
         if isinstance(method, ButcherTableau):
             return stepper(method, len(here.x), self.arithmetic)
-        series = self.kernel.taylor(self.program.modes.index(here.mode), here.segment.data)
+        mode = self.program.modes.index(here.mode)
+        if isinstance(method, RadauMethod):
+            jacobian = self.kernel.jacobian(mode, here.segment.data)
+            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic)
+        series = self.kernel.taylor(mode, here.segment.data)
         assert series is not None
         return taylor_stepper(method, series, self.arithmetic)
 

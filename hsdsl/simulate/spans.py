@@ -12,12 +12,13 @@ from typing import Protocol
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators import TaylorMethod
+from hsdsl.integrators.radau import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
 from hsdsl.simulate.along import Piece, interpolated
 from hsdsl.simulate.isolate import value
-from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG
+from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
@@ -97,8 +98,8 @@ class TableSteps:
                 if control.tolerance is not None and halvings == 0:
                     control.accept(h, ratio)
                 return span
-            if tried is TOO_WRONG and halvings == 0:
-                control.reject(h, self._ratio)
+            if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
+                control.reject(h, None if tried is UNSOLVED else self._ratio)
                 h = control.h
             else:
                 h, halvings = h / 2, halvings + 1
@@ -121,6 +122,8 @@ class TableSteps:
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
             curves = interpolate(self.run, self.here, t, h, x, z, piece, max(4, len(piece)))
             ends = self.here.kernel.surfaces(t1, *z)
+        except NoConvergence:
+            return UNSOLVED
         except DOMAIN_ERRORS:
             return NOT_FINITE
         self.slope, self.at_time = end, t1

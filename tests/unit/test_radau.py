@@ -1,0 +1,212 @@
+"""Radau IIA: its coefficients, its stability, and stiff equations with known solutions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import hsdsl
+from hsdsl.arithmetic import FLOAT64, multiprecision
+from hsdsl.backends.python import PythonKernel
+from hsdsl.integrators.linear import Singular, factored
+from hsdsl.integrators.radau import NoConvergence, coefficients, radau_stepper
+
+MANY = multiprecision(50)
+MODELS = Path(__file__).parents[2] / "models"
+
+
+def model(directory: Path, flow: str, initial: str, until: Any = 1, transitions: str = "") -> Any:
+    """A model of one mode ``m``."""
+    path = directory / "model.yaml"
+    path.write_text(
+        f"hsdsl: 1\nmodes:\n  m:\n    flow: {flow}\n    {transitions}\n"
+        f"initial: {{mode: m, {initial}}}\nexperiment: {{until: {until}, method: radau}}\n"
+    )
+    return hsdsl.load(path)
+
+
+def test_coefficients_as_published() -> None:
+    """The table in closed form, with the root of 6 in fifty digits."""
+    known, root = coefficients(MANY), MANY.sqrt(MANY.zero + 6)
+    published = [
+        [(88 - 7 * root) / 360, (296 - 169 * root) / 1800, (-2 + 3 * root) / 225],
+        [(296 + 169 * root) / 1800, (88 + 7 * root) / 360, (-2 - 3 * root) / 225],
+        [(16 - root) / 36, (16 + root) / 36, (MANY.zero + 1) / 9],
+    ]
+    for row, wanted in zip(known.a, published, strict=True):
+        assert all(abs(a - w) <= 8 * MANY.unit for a, w in zip(row, wanted, strict=True))
+
+
+def test_quadrature_of_order_five_and_no_more() -> None:
+    known = coefficients(MANY)
+    off = [
+        abs(sum(b * c ** (k - 1) for b, c in zip(known.a[-1], known.nodes, strict=True)) - MANY.sqrt(MANY.zero + 1) / k)
+        for k in range(1, 7)
+    ]
+    assert max(off[:5]) <= 8 * MANY.unit
+    assert off[5] > 1e-4
+
+
+def test_the_estimate_vanishes_up_to_degree_two_and_no_further() -> None:
+    """Flow at the start and weighted slopes: the embedded method has order 3, so the estimate falls as h**4."""
+    known = coefficients(MANY)
+    sums = [sum(e * c**k for e, c in zip(known.estimate, known.nodes, strict=True)) + (k == 0) for k in range(4)]
+    assert max(map(abs, sums[:3])) <= 64 * MANY.unit
+    assert abs(sums[3]) > 0.01
+    matrix = [[(i == j) - known.real * w for j, w in enumerate(row)] for i, row in enumerate(known.a)]
+    assert abs(mp.det(mp.matrix([[mp.mpf(str(v)) for v in row] for row in matrix]))) <= 1e-13
+
+
+def one_step(rate: float, h: float) -> tuple[float, float]:
+    """End and error estimate of one step from 1 along x' = rate x."""
+    stepper = radau_stepper(lambda t, x: (rate,), None, FLOAT64)
+    z, stages = stepper.step(lambda t, x: (rate * x,), 0.0, h, (1.0,), (rate,))
+    assert stepper.error is not None
+    return z[0], stepper.error(h, stages, (rate * z[0],))[0]
+
+
+@pytest.mark.parametrize("product", [-0.1, -1.0, -10.0, -1e3, -1e8, 0.5])
+def test_stability_function(product: float) -> None:
+    """One step multiplies by the (2, 3) Pade approximant of the exponential, which vanishes at infinity."""
+    s = mp.mpf(product)
+    wanted = (1 + 2 * s / 5 + s**2 / 20) / (1 - 3 * s / 5 + 3 * s**2 / 20 - s**3 / 60)
+    for h in (1.0, 1e-3):
+        assert abs(one_step(product / h, h)[0] - wanted) <= 1e-15
+
+
+def test_what_decays_is_gone_after_one_step() -> None:
+    end, error = one_step(-1e8, 1.0)
+    assert abs(end) <= 4e-8
+    assert abs(abs(error) - 1) <= 0.1  # but the curve inside the step is wrong by that much, and the estimate says so
+
+
+@pytest.mark.parametrize("rate", [-1e2, -1e6, -1e9])
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+def test_prothero_robinson(rate: float, scheme: str, tmp_path: Path) -> None:
+    """The equation x' = rate (x - cos t) - sin t is solved by cos t, whatever the rate; between the samples too."""
+    made = model(tmp_path, f"{{x: {rate!r}*(x - cos(t)) - sin(t)}}", "x: 1", 10)
+    for tolerance in (1e-4, 1e-7):
+        run = made.simulate(tolerance=tolerance, scheme=scheme)
+        times = np.linspace(0, 10, 501)
+        assert np.max(np.abs(run.sample(times)["x"] - np.cos(times))) <= 10 * tolerance
+        assert len(run.times) <= 10 * tolerance**-0.25
+
+
+def test_van_der_pol(tmp_path: Path) -> None:
+    """At mu = 1000, in its own time, against the reference solution of the Test Set for IVP Solvers."""
+    made = model(tmp_path, '{x: v, v: "((1 - x**2)*v - x)/1e-6"}', "x: 2, v: 0", 2)
+    run = made.simulate(tolerance=1e-8)
+    assert abs(run.final.state["x"] - 1.706167732170483) <= 1e-8
+    assert abs(run.final.state["v"] + 0.8928097010247975) <= 1e-8
+    assert len(run.times) <= 5000
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_linear_systems(seed: int, tmp_path: Path) -> None:
+    """Rates from 1 to 1e6 in random directions: against the matrix exponential, and another Radau code."""
+    rng = np.random.default_rng(seed)
+    basis = rng.normal(size=(3, 3))
+    matrix = basis @ np.diag(-(10.0 ** rng.uniform(0, 6, 3))) @ np.linalg.inv(basis)
+    start = rng.normal(size=3)
+    rows = [" + ".join(f"({float(a)!r})*{s}" for a, s in zip(row, "xyz", strict=True)) for row in matrix]
+    flow = "{" + ", ".join(f'{s}: "{row}"' for s, row in zip("xyz", rows, strict=True)) + "}"
+    initial = ", ".join(f"{s}: {float(a)!r}" for s, a in zip("xyz", start, strict=True))
+    run = model(tmp_path, flow, initial).simulate(tolerance=1e-6)
+    theirs = solve_ivp(
+        lambda t, x: matrix @ x, (0, 1), start, "Radau", rtol=1e-8, atol=1e-8, jac=matrix, dense_output=True
+    ).sol
+    for t in np.concatenate([10.0 ** np.linspace(-7, 0, 20), [0.5]]):
+        found = np.array(list(run(float(t)).state.values()))
+        assert np.max(np.abs(found - expm(matrix * t) @ start)) <= 1e-5
+        assert np.max(np.abs(found - theirs(t))) <= 1e-5
+
+
+FLOWS = ["x*v", "sin(x)/(2 + v**2)", "sqrt(x)*exp(-v)", "x**v + atan2(x, v)", "abs(x - v) + min(x, v)", "sign(x)*t"]
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_jacobian(flow: str, tmp_path: Path) -> None:
+    """Against differences in fifty digits."""
+    made = PythonKernel(model(tmp_path, f"{{x: {flow!r}, v: x - t*v}}", "x: 0, v: 0").program, MANY)
+    slopes, field = made.jacobian(0, ()), made.bind(0, ()).flow
+    t, x, v, h = (MANY.zero + n for n in (0.5, 0.75, 1.25, 1e-20))
+    columns = [
+        [(a - b) / (2 * h) for a, b in zip(field(t, *up), field(t, *down), strict=True)]
+        for up, down in [((x + h, v), (x - h, v)), ((x, v + h), (x, v - h))]
+    ]
+    wanted = [columns[j][i] for i in range(2) for j in range(2)]
+    assert all(abs(a - b) <= 1e-28 for a, b in zip(slopes(t, x, v), wanted, strict=True))
+
+
+def test_many_digits(tmp_path: Path) -> None:
+    """A decay with rate 1000 beside a slow one, in thirty digits."""
+    run = model(tmp_path, "{x: -1000*(x - v), v: -v}", "x: 1, v: 1", "1/100").simulate(precision=30, tolerance=1e-15)
+    with mp.workdps(40):
+        v = mp.exp(mp.mpf(-1) / 100)
+        x = mp.mpf(1000) / 999 * v + (1 - mp.mpf(1000) / 999) * mp.exp(-10)
+        assert abs(mp.mpf(str(run.final.state["x"])) - x) <= 1e-14
+        assert abs(mp.mpf(str(run.final.state["v"])) - v) <= 1e-14
+
+
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+def test_crossings(scheme: str, tmp_path: Path) -> None:
+    """A ball on the way down, up and down again: bounces at the known times."""
+    bounce = "transitions: [{when: h <= 0, to: m, reset: {v: -v}}]"
+    run = model(tmp_path, "{h: v, v: -2}", "h: 1, v: 0", 4.5, bounce).simulate(
+        tolerance=1e-9, scheme=scheme, relaxation=1e-12
+    )
+    assert np.allclose([t.time for t in run.transitions], [1, 3], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+@pytest.mark.parametrize("size", [{"tolerance": 1e-6}, {"step": 0.01}])
+def test_blow_up(scheme: str, size: dict[str, float], tmp_path: Path) -> None:
+    run = model(tmp_path, "{x: x**2}", "x: 1", 2).simulate(scheme=scheme, **size)
+    assert run.stop.reason == "not_finite"
+    assert abs(run.stop.time - 1) <= 1e-3
+
+
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+def test_a_flow_without_derivatives(scheme: str, tmp_path: Path) -> None:
+    run = model(tmp_path, "{x: 1 + sqrt(x)}", "x: 0").simulate(scheme=scheme)
+    assert run.stop.reason == "not_finite"
+    assert "the flow of mode m has no derivatives at t = 0" in run.stop.message
+
+
+def test_a_step_that_newton_does_not_solve() -> None:
+    stepper = radau_stepper(lambda t, x: (2 * x,), None, FLOAT64)
+    with pytest.raises(NoConvergence):
+        stepper.step(lambda t, x: (x * x,), 0.0, 10.0, (1.0,), (1.0,))
+
+
+def test_engines(tmp_path: Path) -> None:
+    made = model(tmp_path, "{x: -x}", "x: 1")
+    assert made.simulate().engine == "python"
+    with pytest.raises(hsdsl.UsageError, match="method 'radau' has no compiled loop"):
+        made.simulate(engine="c")
+
+
+def test_a_mode_without_states(tmp_path: Path) -> None:
+    path = tmp_path / "model.yaml"
+    path.write_text("hsdsl: 1\nmodes: {m: {flow: {}}}\ninitial: {mode: m}\nexperiment: {until: 1, method: radau}\n")
+    assert hsdsl.load(path).simulate().stop.reason == "until"
+
+
+@pytest.mark.parametrize("size", [1, 2, 7])
+def test_linear_equations(size: int) -> None:
+    matrix = np.random.default_rng(size).normal(size=(size, size))
+    matrix[0, 0] = 0 if size > 1 else 1  # a pivot must be looked for
+    right = np.arange(1.0, size + 1)
+    found = factored(matrix.tolist()).solve(right.tolist())
+    assert np.allclose(matrix @ found, right, rtol=0, atol=1e-12)
+
+
+def test_a_singular_matrix() -> None:
+    with pytest.raises(Singular):
+        factored([[1.0, 2.0], [2.0, 4.0]])
