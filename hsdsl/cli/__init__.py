@@ -15,6 +15,7 @@ import typer
 
 from hsdsl import __version__
 from hsdsl.cli.chart import chart
+from hsdsl.cli.console import WRONG_USAGE
 from hsdsl.cli.distance import distance
 from hsdsl.cli.doctor import doctor
 from hsdsl.cli.explain import explain
@@ -58,15 +59,37 @@ def _options(  # pyright: ignore[reportUnusedFunction]
 
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
+    _prepare_streams()
     try:
         code = app(standalone_mode=False)
+        sys.stdout.flush()  # a full disk shows here rather than when the interpreter ends
     except WrongWords as error:
         error.show()
         code = error.exit_code
     except (typer.Abort, KeyboardInterrupt):
         print("interrupted", file=sys.stderr)
         code = INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads: nothing left to say
+    except (BrokenPipeError, SystemExit) as error:  # typer makes an exit of a broken pipe
+        if not isinstance(error, BrokenPipeError) and not isinstance(error.__context__, BrokenPipeError):
+            raise
+        _drop_output()  # nobody reads: nothing left to say
         code = 0
+    except OSError as error:
+        _drop_output()
+        print(f"hsdsl: the answer cannot be written: {error.strerror or error}", file=sys.stderr)
+        code = WRONG_USAGE
     sys.exit(code or 0)
+
+
+def _prepare_streams() -> None:
+    """See to it that there are streams, also where they were closed, and that they can write any name."""
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _drop_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)

@@ -13,6 +13,7 @@ import sympy as sp
 LARGEST_EXPONENT = 1000
 MOST_BITS = 6_000  # of one exact number: the product of two must still print as a decimal (4,300 digits)
 MOST_BITS_WITHIN = 1_000_000  # of the numbers SymPy meets when it brings sums to a common denominator
+MOST_BITS_WITHIN_A_POWER = 12_000  # of those it meets in powers of sums: now and then it asks whether one is prime
 MOST_NODES = 100_000
 MOST_NODES_OF_A_CONSTANT = 500  # SymPy computes one as often as it asks for its sign
 MOST_LEVELS_OF_A_CONSTANT = 12  # and computes it anew at each of its levels

@@ -204,7 +204,8 @@ class _Builder:
         if constant and not expr.is_Rational:
             self.refuse_large_constant(tree, size, depth)
         within = _bits_within(tree, parts)
-        if within > bounds.MOST_BITS_WITHIN:
+        most = bounds.MOST_BITS_WITHIN_A_POWER if isinstance(tree, Power) else bounds.MOST_BITS_WITHIN
+        if within > most:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
             raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
         if depth > bounds.MOST_LEVELS:

@@ -279,6 +279,9 @@ class Model:
         most = number("max_transitions")
         if most < 0 or most != int(most):
             raise UsageError(f"max_transitions must be a whole number, not {most}")
+        step = positive("step") if request.size == "step" else None
+        if step is not None and until > 0 and until + step == until:
+            raise UsageError(f"a step of {step} is lost in round-off beside until = {until}", "take a larger step")
         check_digits(request.method, values.kernel.arithmetic)
         check_smooth(request.method, self.program)
         tolerance = positive("tolerance") if request.size == "tolerance" else None
@@ -288,7 +291,7 @@ class Model:
         return Settings(
             scheme=request.scheme,
             method=method,
-            step=positive("step") if request.size == "step" else None,
+            step=step,
             tolerance=tolerance,
             relaxation=positive("relaxation"),
             until=until,

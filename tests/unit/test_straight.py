@@ -29,7 +29,7 @@ LARGE = {
     "nested quotients": ("1/(1.1 + " * 60 + "x*v" + ")" * 60, "{}"),
     "a product": ("*".join(f"(1 + sin(x*{i} + v)/{i}0)" for i in range(1, 100)), "{}"),
     "a sum of products": ("+".join(f"sin(x/{i})*cos(v*{i})" for i in range(1, 100)), "{}"),
-    "squares of squares": ("l14", doubling("", "L**2/2 + 0.3", 15)),
+    "squares of squares": ("l9", doubling("", "L**2/2 + 0.3", 10)),
     "doubling": ("l9", doubling("", "sin(L)*cos(L) + 0.4", 10)),
 }
 
