@@ -16,6 +16,7 @@ refined run, and an estimate of its error.
 `oscillators`       its two examples as executions
 `ball`              a bouncing ball
 `heater`            a thermostat
+`stiff_switch`      a stiff model of two states with switching
 `quadrants`         the digital control system
 `pendulum`          a pendulum caught by a pin, by series
 `runner`            the pronking runner, by series
@@ -35,6 +36,7 @@ from hsdsl.exact.quadrants import digital_control
 from hsdsl.exact.references import reference
 from hsdsl.exact.refined import precise
 from hsdsl.exact.runner import pronking_runner
+from hsdsl.exact.stiff_switch import stiff_switch
 
 __all__ = [
     "bouncing_ball",
@@ -44,5 +46,6 @@ __all__ = [
     "precise",
     "pronking_runner",
     "reference",
+    "stiff_switch",
     "thermostat",
 ]

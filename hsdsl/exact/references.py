@@ -20,6 +20,7 @@ from hsdsl.exact.pendulum import constrained_pendulum
 from hsdsl.exact.quadrants import digital_control
 from hsdsl.exact.residual import residual
 from hsdsl.exact.runner import pronking_runner
+from hsdsl.exact.stiff_switch import stiff_switch
 from hsdsl.execution import Execution
 from hsdsl.program import Program
 from hsdsl.store import load
@@ -35,6 +36,7 @@ CLOSED_FORMS: dict[str, tuple[Solution, ...]] = {
     ),
     "oscillator-with-stop-1": (lambda: oscillator(1),),
     "oscillator-with-stop-2": (lambda: oscillator(2),),
+    "stiff-switch": (stiff_switch,),
     "thermostat": (thermostat,),
 }
 """By a model's name, for each block of its ``reference:``: solved by formula, when asked for."""

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.arithmetic import FLOAT64
+from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.backends.python import PythonKernel
 from hsdsl.execution import Arc, Array, Execution, Transition
-from hsdsl.kernel import ModeKernel
+from hsdsl.kernel import ModeKernel, Routine
 from hsdsl.program import EdgeProgram, ModeProgram, Program
 
 SHARES = (0.0, 0.3, 0.9)  # of a piece, at which it is compared
@@ -24,7 +24,8 @@ def residual(program: Program, run: Execution) -> float:
 
     Compared are slopes with the flow within each piece, guards and resets at each transition, and at every row how far
     it is outside its domain. A defect counts relative to 1 plus the size of what is compared, and a slope's only as far
-    as it exceeds its round-off. Where the state rests, only that it stands on a guard is looked at.
+    as it exceeds its round-off and what round-off of the state makes of a stiff flow. Where the state rests, only that
+    it stands on a guard is looked at.
 
     Raises
     ------
@@ -46,6 +47,7 @@ class _Check:
         for k in range(len(program.parameters)):
             parameters = (*parameters, *kernel.constant(f"parameter_{k}", parameters))
         self.modes = {mode.name: (mode, kernel.bind(k, parameters)) for k, mode in enumerate(program.modes)}
+        self._jacobians = {mode.name: kernel.jacobian(k, parameters) for k, mode in enumerate(program.modes)}
 
     def mode(self, name: str, states: tuple[str, ...]) -> tuple[ModeProgram, ModeKernel]:
         if name not in self.modes or (self.modes[name][0].states != states and not self.modes[name][0].final):
@@ -65,10 +67,10 @@ class _Check:
             beyond = [kernel.surfaces(float(run.times[k]), *x)[i] for i in bounds]
             worst = max([worst, *(r / (1 + float(np.max(np.abs(x)))) for r in beyond)])
         for k in range(arc.first, arc.last):
-            worst = max(worst, self._piece(run, k, width, kernel))
+            worst = max(worst, self._piece(run, k, width, kernel, self._jacobians[arc.mode]))
         return worst
 
-    def _piece(self, run: Execution, k: int, width: int, kernel: ModeKernel) -> float:
+    def _piece(self, run: Execution, k: int, width: int, kernel: ModeKernel, jacobian: Routine) -> float:
         h = float(run.times[k + 1] - run.times[k])
         if h < SHORTEST:
             return 0.0
@@ -79,7 +81,8 @@ class _Check:
             if not np.any(slope) and np.any(flow):  # at rest: on a guard
                 worst = max(worst, float(np.min(np.abs(kernel.surfaces(t, *x)))))
                 continue
-            noise = 2.0**-46 * (1 + float(np.max(np.abs(x)))) / h
+            off = 2.0**-46 * (1 + float(np.max(np.abs(x))))  # of the state
+            noise = off / h + off * _steepness(jacobian, t, x) + 2.0**-52 * t / h * np.abs(slope / h)
             worst = max(worst, float(np.max(np.maximum(np.abs(slope / h - flow) - noise, 0) / (1 + np.abs(flow)))))
         return worst
 
@@ -104,6 +107,15 @@ class _Check:
             if edge.name == t.edge:
                 return k, edge
         raise ValueError(f"no transition {t.edge}")
+
+
+def _steepness(jacobian: Routine, t: float, x: Array) -> Array:
+    """How much each slope changes with the state, at most; 0 where that is not known."""
+    try:
+        rows = np.abs(np.array(jacobian(t, *x), float)).reshape(len(x), len(x))
+    except DOMAIN_ERRORS:
+        return np.zeros(len(x))
+    return np.where(np.isfinite(rows), rows, 0).sum(axis=1)
 
 
 def _at(run: Execution, k: int, share: float, width: int) -> tuple[float, Array, Any]:

@@ -85,10 +85,13 @@ def test_another_integrator_agrees(name: str, block: int) -> None:
     assert compared >= 3
 
 
+DEFECTS = {"stiff-switch": 2e-10}  # pieces of 2e-7 s: values right to 1e-14 leave that much in a slope of 1e5
+
+
 @pytest.mark.parametrize("name", [*CLOSED_FORMS, *STORED])
 def test_the_models_equations_hold(name: str) -> None:
     for block in range(len({**CLOSED_FORMS, **STORED}[name])):
-        assert residual(model(name).program, reference(model(name), block)) <= 1e-11
+        assert residual(model(name).program, reference(model(name), block)) <= DEFECTS.get(name, 1e-11)
 
 
 @pytest.mark.slow
