@@ -216,7 +216,8 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
         "unsolved": "the equations of an implicit step are not solved by Newton's method",
         "error": "the error estimate stays above the tolerance, as where a flow jumps",
         "creeping": "steps had to be cut below a thousandth thousands of times in a row",
-        "flat": "the gradient of a guard's surface vanishes on it",
+        "flat": "the gradient of a guard's surface vanishes on it, as that of sign, floor and squares: "
+        "write the guard without them, x >= 1 for floor(x) >= 1",
     }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
 

@@ -75,7 +75,8 @@ def mentions(paths: Iterable[Path]) -> Counter[str]:
     texts = (
         path.read_text(encoding="utf-8", errors="replace") for path in paths if path.is_file() and path.suffix != ".pyc"
     )
-    return Counter(code for text in texts for code in re.findall(r"\bHS\d{3}\b", text))
+    # lint rules have the codes above
+    return Counter(code for text in texts for code in re.findall(r"\bHS[0-3]\d{2}\b", text))
 
 
 def test_error_codes_are_registered_and_used():
