@@ -15,6 +15,7 @@ from hsdsl.expression.syntax import Tree
 from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.influence import Influence, influence
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
+from hsdsl.lint.units.model import Units
 from hsdsl.lint.uses import Definition, unused
 from hsdsl.lint.written import Written, written
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
@@ -152,6 +153,11 @@ class Subject:
         """The number that an expression of parameters stands for in this file."""
         value = symbolic.number(parse(scalar.value), self.reading.top, scalar.value)
         return evaluate(value.expr, self.numbers)
+
+    @cached_property
+    def units(self) -> Units:
+        """The units that the file gives, and those of its expressions."""
+        return Units(self.document, self.expressions)
 
     @cached_property
     def dynamics(self) -> Dynamics:

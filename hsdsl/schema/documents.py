@@ -244,7 +244,7 @@ class Model(Document):
     )
     units: OpenTable[Text] = Field(
         default_factory=empty,
-        description="Unit of a state, parameter, input or output.",
+        description="Unit of a state, parameter, input or output, or of `t`.",
         examples=[{"h": "m", "v": "m/s"}],
     )
     initial: Initial = Field(

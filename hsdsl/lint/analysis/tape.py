@@ -17,7 +17,9 @@ from hsdsl.functions import FUNCTIONS
 from hsdsl.lint.analysis import intervals
 from hsdsl.lint.analysis.intervals import Array, Intervals
 
-_NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name not in ("sqrt",)}
+_NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name != "sqrt"}
+_NAMES |= {sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor", sp.Min: "min", sp.Max: "max"}  # where SymPy makes its own
+_NOTHING = (np.nan, -np.inf, np.inf)  # of what is no function of the language, nothing is known
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,12 @@ class Tape:
             if base is sp.E:
                 return self._add("exp", self._of(exponent))
             return self._add("real power", self._of(base), self._of(exponent))
-        return self._add(_NAMES[expr.func], *map(self._of, expr.args))
+        if expr.func not in _NAMES:
+            return self._add("number", value=_NOTHING)
+        name, parts = _NAMES[expr.func], [self._of(argument) for argument in expr.args]
+        while name in ("min", "max") and len(parts) > 2:
+            parts = [self._add(name, *parts[:2]), *parts[2:]]
+        return self._add(name, *parts)
 
 
 def _number(step: Step, values: Sequence[Array], points: Array) -> Array:
@@ -141,7 +148,7 @@ def _enclosed(expr: Any) -> tuple[float, float, float]:
     """The nearest double, and doubles on both sides; all three the same where it is exact."""
     bounds = enclosure(expr)
     if bounds is None:
-        return np.nan, -np.inf, np.inf
+        return _NOTHING
     low, high = bounds
     nearest = _double(low + (high - low) / 2)
     if low == high and np.isfinite(nearest) and Fraction(nearest) == low:

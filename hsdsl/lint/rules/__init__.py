@@ -10,6 +10,7 @@ from typing import Literal
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.rules import (
     after_the_end,
+    argument_units,
     condition_beyond_surface,
     confusable_names,
     constant_condition,
@@ -19,6 +20,7 @@ from hsdsl.lint.rules import (
     duplicate_transition,
     empty_section,
     ends_on_event,
+    flow_units,
     guard_inside_domain,
     guard_never_crossed,
     guard_turns_inward,
@@ -26,6 +28,7 @@ from hsdsl.lint.rules import (
     idle_parameter,
     idle_priority,
     idle_state,
+    inconsistent_units,
     invented_state,
     jump_inside_mode,
     kink_inside_mode,
@@ -55,12 +58,14 @@ from hsdsl.lint.rules import (
     undecided,
     uneven_relaxation,
     unknown_ignore,
+    unknown_unit,
     unreachable_mode,
     unused_ignore,
     unused_input,
     unused_let,
     unused_parameter,
     unused_state,
+    value_units,
     vanishing_divisor,
     zero_time_cycle,
 )
@@ -176,4 +181,10 @@ RULES: dict[str, Rule] = {
     "HS515": Rule(not_lipschitz),
     "HS516": Rule(unbounded_domain, severity="note", by_default=False),
     "HS517": Rule(degenerate_surface),
+    # units
+    "HS601": Rule(unknown_unit),
+    "HS602": Rule(inconsistent_units),
+    "HS603": Rule(argument_units),
+    "HS604": Rule(flow_units),
+    "HS605": Rule(value_units),
 }

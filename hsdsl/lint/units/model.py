@@ -1,0 +1,100 @@
+"""The units of a model: those its file gives, and what is found in each of its expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from hsdsl.lint.units.unit import Unit, UnknownUnit, read
+from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
+from hsdsl.lint.written import Written
+from hsdsl.schema import Model, ParameterEntry
+from hsdsl.source import Scalar
+
+_VALUES = ("parameter", "input", "initial", "output")
+
+
+@dataclass(frozen=True)
+class Checked:
+    """An expression, its unit, and what does not fit in it."""
+
+    written: Written
+    measure: Measure
+    misfits: tuple[Misfit, ...]
+
+
+@dataclass(frozen=True)
+class Misread:
+    """A text that is no unit, with the names in it that nobody knows."""
+
+    scalar: Scalar
+    names: tuple[str, ...]
+
+
+class Units:
+    """The units of one model.
+
+    Parameters
+    ----------
+    document : Model
+        The file.
+    expressions : tuple of Written
+        Its expressions.
+    """
+
+    def __init__(self, document: Model, expressions: tuple[Written, ...]) -> None:
+        self._document = document
+        self._expressions = expressions
+        self._lets: dict[tuple[str | None, str], Measure] = {}
+        self._texts = {str(key): scalar for key, scalar in document.units.items() if scalar is not None}
+        for key, entry in document.parameters.items():
+            if isinstance(entry, ParameterEntry) and entry.unit is not None:
+                self._texts.setdefault(str(key), entry.unit)
+
+    @property
+    def given(self) -> bool:
+        """Whether the file gives units at all."""
+        return bool(self._texts)
+
+    @cached_property
+    def _read(self) -> tuple[Mapping[str, Unit], tuple[Misread, ...]]:
+        known: dict[str, Unit] = {}
+        wrong: list[Misread] = []
+        for name, scalar in self._texts.items():
+            try:
+                known[name] = read(scalar.value)
+            except UnknownUnit as error:
+                wrong.append(Misread(scalar, error.names))
+        if "t" not in self._texts and any(n == "[time]" for unit in known.values() for n, _ in unit.powers):
+            known["t"] = read("s")
+        return known, tuple(wrong)
+
+    @property
+    def misread(self) -> tuple[Misread, ...]:
+        """The texts that are no units."""
+        return self._read[1]
+
+    def of(self, name: str) -> Unit | None:
+        """The unit of a state, a parameter, an input, an output or `t`; None where it is not known."""
+        return self._read[0].get(name)
+
+    @cached_property
+    def checked(self) -> tuple[Checked, ...]:
+        """Every expression that units say something about."""
+        roles = (*_VALUES, "let", "flow", "domain", "when", "if", "reset")
+        return tuple(self._check(e) for e in self._expressions if e.role in roles) if self.given else ()
+
+    def _check(self, written: Written) -> Checked:
+        walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value)
+        measure = walk.measure(written.tree)
+        if written.role == "let":
+            self._lets[written.mode, str(written.name)] = measure
+        return Checked(written, measure, tuple(walk.misfits))
+
+    def _name(self, mode: str | None, name: str) -> Measure:
+        unknown: Any_ = "unknown"
+        for scope in (mode, None):
+            if (scope, name) in self._lets:
+                return self._lets[scope, name]
+        return self.of(name) or unknown

@@ -1,0 +1,181 @@
+# pyright: basic
+"""Units as a factor and powers of base dimensions, read by our own grammar; pint knows the names.
+
+A temperature in degC counts as one in kelvin: differences are what equations are made of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+from hsdsl.expression import ExpressionError, parse
+from hsdsl.expression.syntax import Name, Negative, Number, Power, Product, Tree
+
+_LONGEST = 100  # characters
+_LARGEST_POWER = 100
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What something is measured in.
+
+    Attributes
+    ----------
+    factor : float
+        Its size in SI base units.
+    powers : tuple of (str, Fraction)
+        Its dimensions, sorted, without those of power 0.
+    """
+
+    factor: float = 1.0
+    powers: tuple[tuple[str, Fraction], ...] = ()
+
+    def times(self, other: Unit) -> Unit:
+        """The product."""
+        powers = dict(self.powers)
+        for name, power in other.powers:
+            powers[name] = powers.get(name, Fraction(0)) + power
+        return Unit(self.factor * other.factor, tuple(sorted((n, p) for n, p in powers.items() if p)))
+
+    def to(self, exponent: Fraction) -> Unit:
+        """A power."""
+        try:
+            factor = self.factor ** float(exponent)
+        except (OverflowError, ZeroDivisionError):
+            factor = float("inf")
+        return Unit(factor, tuple((n, p * exponent) for n, p in self.powers if exponent))
+
+    def same(self, other: Unit) -> bool:
+        """Whether both are one unit, by size too."""
+        return self.powers == other.powers and abs(self.factor - other.factor) <= 1e-9 * abs(self.factor)
+
+    @property
+    def pure(self) -> bool:
+        """Whether it is that of a plain number, or the radian."""
+        return not self.powers and abs(self.factor - 1) <= 1e-9
+
+    def __str__(self) -> str:
+        """In base units, as ``1000 kg*m/s**2``."""
+        above, below = (
+            [(_BASE.get(n, n.strip("[]")), abs(p)) for n, p in sorted(self.powers, key=_order) if (p > 0) is up]
+            for up in (True, False)
+        )
+        over, under = ("*".join(n if p == 1 else f"{n}**{_plain(p)}" for n, p in part) for part in (above, below))
+        under = f"({under})" if len(below) > 1 else under
+        whole = (over or "1") + (f"/{under}" if under else "")
+        size = f"{self.factor:.6g}"
+        return whole if abs(self.factor - 1) <= 1e-9 else f"{size} {whole}" if over else size + whole[1:]
+
+
+def _order(item: tuple[str, Fraction]) -> tuple[bool, str]:
+    return item[0] != "[mass]", item[0]  # kg*m, as people write it
+
+
+ONE = Unit()
+_BASE = {
+    "[length]": "m",
+    "[mass]": "kg",
+    "[time]": "s",
+    "[current]": "A",
+    "[temperature]": "K",
+    "[substance]": "mol",
+    "[luminosity]": "cd",
+}
+
+
+def _plain(power: Fraction) -> str:
+    return str(power) if power.denominator == 1 else f"({power})"
+
+
+class UnknownUnit(Exception):
+    """A text that is no unit; carries the names in it that nobody knows."""
+
+    def __init__(self, names: tuple[str, ...] = ()) -> None:
+        super().__init__(", ".join(names))
+        self.names = names
+
+
+def read(text: str) -> Unit:
+    """The unit that a text such as ``kg*m/s**2`` means.
+
+    Raises
+    ------
+    UnknownUnit
+        It is not written so, or has an unknown name.
+    """
+    if len(text) > _LONGEST:
+        raise UnknownUnit
+    try:
+        tree = parse(text)
+    except ExpressionError:
+        raise UnknownUnit from None
+    return _of(tree)
+
+
+def _of(tree: Tree) -> Unit:
+    match tree:
+        case Name():
+            return _named(tree.name)
+        case Number():
+            return Unit(float(tree.value)) if tree.value > 0 else _refuse()
+        case Product():
+            result = ONE
+            for divided, factor in tree.factors:
+                result = result.times(_of(factor).to(Fraction(-1 if divided else 1)))
+            return result
+        case Power():
+            return _of(tree.base).to(exponent_of(tree.exponent) or _refuse())
+    return _refuse()
+
+
+def exponent_of(tree: Tree) -> Fraction | None:
+    """An exponent that is written as a number: ``2``, ``-1``, ``(1/2)``."""
+    match tree:
+        case Number():
+            return tree.value if abs(tree.value) <= _LARGEST_POWER else None
+        case Negative():
+            inner = exponent_of(tree.operand)
+            return None if inner is None else -inner
+        case Product():
+            result = Fraction(1)
+            for divided, factor in tree.factors:
+                part = exponent_of(factor)
+                if part is None or (divided and not part):
+                    return None
+                result = result / part if divided else result * part
+            return result
+    return None
+
+
+def _refuse() -> Any:
+    raise UnknownUnit
+
+
+@cache
+def _named(name: str) -> Unit:
+    import pint
+
+    registry = _registry()
+    try:
+        factor, _ = registry.get_base_units(name, check_nonmult=False)
+        powers = registry.get_dimensionality(name)
+    except (pint.UndefinedUnitError, pint.DefinitionSyntaxError, ValueError, TypeError):
+        raise UnknownUnit((name,)) from None
+    return Unit(float(factor), tuple(sorted((n, Fraction(p).limit_denominator(1000)) for n, p in powers.items())))
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def names_like(name: str) -> list[str]:
+    """Names of units, and plurals, that begin like a name and are about as long."""
+    known = sorted(other for other in _registry() if other.isascii())
+    known += [f"{other}s" for other in known if len(other) > 2]
+    return [other for other in known if other[:1] == name[:1] and abs(len(other) - len(name)) <= 2]

@@ -1,0 +1,53 @@
+"""Units read by our own grammar: what pint would make of the same text, and nothing evaluated."""
+
+import pint
+import pytest
+
+from hsdsl.lint.units.unit import Unit, UnknownUnit, read
+
+TEXTS = ["m", "kg*m/s**2", "km/h", "1/min", "N*mm**-1", "m**(1/2)", "rad/s", "degree", "W/(m**2*K)", "2*m", "µs", "rpm"]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_as_pint_reads_it(text):
+    quantity = pint.UnitRegistry().parse_expression(text).to_base_units()
+    found = read(text)
+    assert found.factor == pytest.approx(quantity.magnitude, rel=1e-12)
+    wanted = {name: float(power) for name, power in quantity.dimensionality.items()}
+    assert {name: float(power) for name, power in found.powers} == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "m/s^2",
+        "m s",
+        "furlongz",
+        "m**(10**9)",
+        "m**1e9",
+        "m+s",
+        "sin(m)",
+        "0*m",
+        "-m",
+        "m" * 101,
+        "().__class__",
+        "1/0",
+    ],
+)
+def test_refused(text):
+    with pytest.raises(UnknownUnit):
+        read(text)
+
+
+def test_said_as_people_write_it():
+    for text in ("m", "m/s", "kg*m/s**2", "1/s", "m**(1/2)", "1/(m*s)"):
+        assert str(read(text)) == text
+    assert str(read("mm/s")) == "0.001 m/s" and str(read("1/ms")) == "1000/s" and str(read("degree"))[:6] == "0.0174"
+
+
+def test_size_counts():
+    assert (
+        read("J").same(read("N*m")) and not read("mm").same(read("m")) and read("rad").pure and not read("degree").pure
+    )
+    assert Unit().pure and not read("s").pure
