@@ -80,7 +80,7 @@ def mentions(paths: Iterable[Path]) -> Counter[str]:
 
 
 def test_error_codes_are_registered_and_used():
-    found = mentions(SOURCES)
+    found = {code: times for code, times in mentions(SOURCES).items() if code < "HS400"}  # above: lint rules
     registered_only = {code for code, times in found.items() if times == 1}
     assert set(found) == set(CODES)
     assert registered_only == set()
