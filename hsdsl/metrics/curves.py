@@ -21,7 +21,7 @@ from hsdsl.metrics.on_space import OnSpace, PointMetric
 from hsdsl.metrics.supremum import Supremum, supremum
 from hsdsl.metrics.trace import names_of, trace
 
-GAP = 0.01  # of the lower bound, at which refinement stops
+GAP = 1e-6  # of the lower bound, at which refinement stops: so that what is printed is the distance
 ROUNDOFF = 64 * 2.0**-53  # times the largest state: no smaller gap is asked for
 RESOLVED = 0.05  # a wider gap is explained in the note
 

@@ -56,6 +56,8 @@ def _columns(cells: Cells, coordinates: Sequence[str] | None) -> Array:
         if not everywhere:
             raise UsageError("rho-hat compares states that every mode visited has, and these runs have none")
         coordinates = everywhere
+    if not coordinates:
+        raise UsageError("rho-hat: no coordinates are given", did_you_mean("", everywhere))
     for name in coordinates:
         if name not in names:
             raise UsageError(f"rho-hat: the runs have no state '{name}'", did_you_mean(name, names))

@@ -98,7 +98,7 @@ class _Search:
     def run(self) -> None:
         """Best first until nothing open can be shorter."""
         self._finish(())
-        self._extend(())
+        self._go_on((), self.fixed)
         while self.heap:
             bound, _, sequence = heapq.heappop(self.heap)
             if bound >= self._enough():
@@ -109,10 +109,13 @@ class _Search:
                 self.found.ended_early = True
                 break
             self._finish(sequence)
-            if len(sequence) < self.hops:
-                self._extend(sequence)
-            elif (least := self._cut(sequence, bound)) < self._enough():
-                self.found.cut = min(self.found.cut, least)
+            self._go_on(sequence, bound)
+
+    def _go_on(self, sequence: tuple[int, ...], bound: float) -> None:
+        if len(sequence) < self.hops:
+            self._extend(sequence)
+        elif (least := self._cut(sequence, bound)) < self._enough():
+            self.found.cut = min(self.found.cut, least)
 
     def _enough(self) -> float:
         return self.found.upper * (1 - TOLERANCE)

@@ -60,7 +60,9 @@ def coupling(p: Polyline, q: Polyline) -> float:
     """
     largest = max(_cost(p, q, np.arange(len(p)), np.zeros(len(p), dtype=int)).max(), 1.0)
     visits_p, visits_q = _visits(p), _visits(q)
-    limit = 4 * max(p.reach, q.reach)
+    # Ends are coupled with ends; without them, curves of no length would begin at a limit that doubling never raises.
+    ends = _cost(p, q, np.array([0, len(p) - 1]), np.array([0, len(q) - 1]))
+    limit = max(4 * max(p.reach, q.reach), float(ends.max()))
     if len(visits_p) != len(visits_q) or (p.label[visits_p] != q.label[visits_q]).any():
         limit = max(limit, 1.0)
     elif len(visits_p) > 1:
@@ -72,7 +74,7 @@ def coupling(p: Polyline, q: Polyline) -> float:
         found = _within(p, q, limit)
         if found < np.inf or limit == np.inf:
             return found
-        limit = 2 * limit if limit < 8 * largest else np.inf
+        limit = 2 * limit if 0 < limit < 8 * largest else np.inf
 
 
 def _visits(p: Polyline) -> Array:

@@ -15,6 +15,7 @@ Array = npt.NDArray[Any]
 
 CHUNK = 65_536  # cells whose polynomials are held at once
 FIRST_BATCH, LARGEST_BATCH = 32, 4096
+ROUGH, FEW = 0.01, 0.1  # within so much of the lower bound, spend only so much of the evaluations allowed
 
 
 class CellDistance(Protocol):
@@ -191,7 +192,8 @@ class _Search:
         highest = float(np.max(bound))
         self.budget.tell(self.found.lower, max(highest, self.found.points))
         over = self.found.evaluations > 0 and self.budget.spent()  # a first look is always taken
-        if self.found.evaluations < self.most and not over:
+        near = highest <= self.found.accepted(max(self.gap, ROUGH), self.floor)
+        if self.found.evaluations < self.most * (FEW if near else 1) and not over:
             return False
         self.found.complete = False
         self.found.upper = max(self.found.upper, highest)

@@ -43,6 +43,8 @@ def distance_of_points(
     depth = None if metric == "quotient" else _relaxation(values, relaxation)
     if metric == "quotient" and relaxation is not None:
         raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
+    if hops is not None and not (hops >= 0 and hops == int(hops)):
+        raise UsageError(f"hops must be a whole number, not {hops}")
     space = make_space(values.system, [float(v) for v in values.parameters])
     start, end = (read_place(values, space, given) if isinstance(given, str) else given for given in (p, q))
     for place in (start, end):

@@ -39,6 +39,14 @@ def whole_table(p, q):
     return best[-1, -1]
 
 
+@pytest.mark.parametrize(("apart", "size"), [(0.0, 1), (1e-3, 1), (4.0, 2)])
+def test_curves_of_no_length_are_as_far_apart_as_their_points(apart, size):
+    at_once = np.zeros(size), np.zeros((size, 2)), np.zeros(size, dtype=int)
+    p = Polyline(*at_once, np.arange(size), np.ones(size - 1, dtype=bool), 0.0)
+    q = Polyline(p.times, p.states + np.array([apart, 0.0]), p.label, p.jump, p.jumps, 0.0)
+    assert coupling(p, q) == apart
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_coupling_is_the_one_of_the_whole_table(seed):
     rng = np.random.default_rng(seed)

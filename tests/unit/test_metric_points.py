@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hsdsl
+from hsdsl.errors import UsageError
 from hsdsl.metrics.chain import Problem
 from hsdsl.metrics.cones import solve
 from hsdsl.metrics.interval import INFINITE, ZERO
@@ -125,6 +126,29 @@ def test_same_point_and_no_path(tmp_path, oscillator):
     assert distance(space, Place("a", (0,)), Place("b", (0,))).interval == INFINITE
     lower, upper = distances(space, "a", np.zeros((3, 1)), "b", np.zeros((3, 1)))
     assert np.all(lower == np.inf) and np.all(upper == np.inf)
+
+
+def test_no_path_has_more_passages_than_asked_for(tmp_path):
+    """Each passage halves v, so that n of them leave 16 / 2**n - 1 to go from 16 to 1."""
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1, v: 0}\n"
+        "    transitions: [{when: x >= 0, to: a, reset: {v: v/2}}]\n"
+        "initial: {mode: a, x: -1, v: 1}\nexperiment: {until: 1}\n"
+    )
+    space = make_space(hsdsl.load(model).system, [])
+    for hops, expected in enumerate((15, 7, 3, 1, 0)):
+        found = distance(space, Place("a", (0, 16)), Place("a", (0, 1)), hops=hops)
+        assert found.interval.lower <= expected <= found.interval.upper
+        assert len(found.path) - 1 == hops
+        assert found.interval.width < 1e-9
+
+
+@pytest.mark.parametrize("hops", [-1, 1.5, float("nan")])
+def test_hops_are_counted(hops):
+    model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
+    with pytest.raises(UsageError, match="whole number"):
+        model.distance("free x=1 v=2", "free x=1 v=3", hops=hops)
 
 
 def test_guard_on_time_makes_time_a_coordinate(tmp_path):
