@@ -18,6 +18,7 @@ from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
 from hsdsl.simulate.along import Piece, interpolated
 from hsdsl.simulate.isolate import value
+from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
@@ -97,7 +98,8 @@ class TableSteps:
                 ratio, span = tried
                 if control.tolerance is not None and halvings == 0:
                     control.accept(h, ratio)
-                return span
+                self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
+                return span if self._creeping <= MOST_CREEPING else Obstacle("creeping")
             if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
                 control.reject(h, None if tried is UNSOLVED else self._ratio)
                 h = control.h
@@ -107,6 +109,7 @@ class TableSteps:
                 return tried
 
     _ratio: Number = 1
+    _creeping: int = 0
 
     def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | Obstacle:
         flow, method, control = self.here.kernel.flow, self.method, self.run.control

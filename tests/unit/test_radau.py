@@ -173,6 +173,26 @@ def test_blow_up(scheme: str, size: dict[str, float], tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
+@pytest.mark.parametrize("size", [{"tolerance": 1e-6}, pytest.param({"step": 0.01}, marks=pytest.mark.slow)])
+def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float], tmp_path: Path) -> None:
+    """No step over x = 0 solves x' = -sign(x), which stays there; the run ends and says so."""
+    run = model(tmp_path, "{x: -sign(x)}", "x: 1", 2).simulate(scheme=scheme, **size)
+    assert run.stop.reason == "step_underflow"
+    assert abs(run.final.state["x"]) <= 1e-8
+    assert 1 - 1e-8 <= run.stop.time <= 1 + 1e-4
+
+
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+def test_robertson(scheme: str, tmp_path: Path) -> None:
+    """Three reactions with rates from 0.04 to 3e7, against published values at t = 40; their sum is kept."""
+    rates = '{a: "-0.04*a + 1e4*b*c", b: "0.04*a - 1e4*b*c - 3e7*b**2", c: "3e7*b**2"}'
+    run = model(tmp_path, rates, "a: 1, b: 0, c: 0", 40).simulate(tolerance=1e-9, scheme=scheme)
+    found = run.final.state
+    assert np.allclose(list(found.values()), [0.7158270688, 9.185534765e-6, 0.2841637457], rtol=1e-8, atol=0)
+    assert abs(sum(found.values()) - 1) <= 1e-14
+
+
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
 def test_a_flow_without_derivatives(scheme: str, tmp_path: Path) -> None:
     run = model(tmp_path, "{x: 1 + sqrt(x)}", "x: 0").simulate(scheme=scheme)
     assert run.stop.reason == "not_finite"
