@@ -31,7 +31,7 @@ NOTE = "<!-- Written by docs/generate.py: edit the code it reads, not this page.
 LANGUAGE = """# Language
 
 A model is one YAML document. `schemas/model.schema.json` is this page for editors. What a model *means* is on
-[its own page](../meaning.md).
+[its own page](../meaning.md), and how much it may ask for on [another](../security.md).
 
 An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers, names, `+ - * / **`,
 parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
