@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -62,7 +63,7 @@ def chart(
         }
         found: list[tuple[str, list[Row]]] = []
         with _progress(quiet or json) as watch:
-            for scene in [_scene(text, _split(states), samples, clearance) for text in models]:
+            for scene in [_scene(text, _split(states), samples, clearance, watch) for text in models]:
                 rows, remarks = work_precision(
                     scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
                 )
@@ -72,9 +73,11 @@ def chart(
         _report(found, out, plot, json, quiet)
 
 
-def _scene(text: str, states: list[str], samples: int, clearance: float) -> Any:
+def _scene(text: str, states: list[str], samples: int, clearance: float, watch: Callable[[str], None]) -> Any:
     from hsdsl.chart import Scene
     from hsdsl.model import load
+
+    watch(f"{text}: the exact execution (where no formula is known, in many digits)")
 
     path, colon, block = text.rpartition(":")
     if not (colon and block.isdecimal()):

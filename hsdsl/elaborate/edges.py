@@ -109,7 +109,9 @@ def _check_reset(world: World, source: str, target: str, states: tuple[str, ...]
     for key in transition.reset:
         if key not in states:
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
-            world.reader.add(key.place, "HS306", message, did_you_mean(key, states))
+            name, equals, value = (part.strip() for part in key.partition("="))
+            written = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
+            world.reader.add(key.place, "HS306", message, written)
             complete = False
     own = world.states[source]
     for state in states:
