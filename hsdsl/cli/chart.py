@@ -35,6 +35,9 @@ def chart(
     clearance: Annotated[
         float, typer.Option(metavar="DT", help="Samples nearer than this to an exact jump do not count.")
     ] = 1e-4,
+    digits: Annotated[
+        int, typer.Option(metavar="N", help="Digits of the reference where no exact execution is known.")
+    ] = 8,
     rounds: Annotated[int, typer.Option(metavar="N", help="Timed turns, after one that warms up.")] = 5,
     patience: Annotated[float, typer.Option(metavar="S", help="Slower tools get no tighter setting.")] = 10.0,
     rho: Annotated[bool, typer.Option("--rho/--no-rho", help="Also compute rho of our runs.")] = True,
@@ -63,7 +66,8 @@ def chart(
         }
         found: list[tuple[str, list[Row]]] = []
         with _progress(quiet or json) as watch:
-            for scene in [_scene(text, _split(states), samples, clearance, watch) for text in models]:
+            taken = {"states": _split(states), "samples": samples, "clearance": clearance, "digits": digits}
+            for scene in [_scene(text, taken, watch) for text in models]:
                 rows, remarks = work_precision(
                     scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
                 )
@@ -73,16 +77,15 @@ def chart(
         _report(found, out, plot, json, quiet)
 
 
-def _scene(text: str, states: list[str], samples: int, clearance: float, watch: Callable[[str], None]) -> Any:
+def _scene(text: str, taken: dict[str, Any], watch: Callable[[str], None]) -> Any:
     from hsdsl.chart import Scene
     from hsdsl.model import load
 
     watch(f"{text}: the exact execution (where no formula is known, in many digits)")
-
     path, colon, block = text.rpartition(":")
     if not (colon and block.isdecimal()):
         path, block = text, "0"
-    return Scene.of(load(path), block=int(block), states=states, samples=samples, clearance=clearance)
+    return Scene.of(load(path), block=int(block), **taken)
 
 
 def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
