@@ -5,7 +5,7 @@ Started by `unit/test_sanitizers.py`; a fault ends the process with a message of
 
 from __future__ import annotations
 
-from conformance.test_agreement import FLOATS, LONG, MODELS, STEPS, arguments
+from conformance.test_agreement import FLOATS, LONG, MODELS, SHORT, STEPS, arguments
 from conformance.test_conformance import CASES, Run, model, read
 from property.random_models import SETTINGS, random_model
 
@@ -24,11 +24,14 @@ def main() -> None:
         for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():
             for setting in list(FLOATS.values())[::3]:
                 count += model(name).simulate(**arguments(run, setting), engine="c").engine == "c"
-    for path in MODELS.values():
+    for name, path in MODELS.items():
         loaded = hsdsl.load(path)
         for method in INTEGRATORS:
-            for setting in STEPS:
-                count += loaded.simulate(method=method, max_transitions=40, **setting, engine="c").engine == "c"
+            for setting in ({**s, **SHORT.get(name, {})} for s in STEPS):
+                count += (
+                    loaded.simulate(method=method, max_transitions=40, scheme="relaxed", **setting, engine="c").engine
+                    == "c"
+                )
     for seed in range(25):
         try:
             drawn = Model(elaborate("random.yaml", text=random_model(seed).encode()))
