@@ -213,7 +213,7 @@ def test_interrupt_keeps_what_was_computed(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "hsdsl", "run", *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    time.sleep(4)
+    time.sleep(8)
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr.decode()
