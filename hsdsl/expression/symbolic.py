@@ -33,11 +33,17 @@ from hsdsl.names import shown
 
 _RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
 _NOT_REAL = frozenset((sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I))
-# SymPy's own kinked functions, which it makes by itself, against those the rest of the house knows
-_KINKED: dict[Any, Any] = {
+# functions that SymPy makes by itself (tan(x + pi/2) is a cotangent), against those the rest of the house knows
+_FOREIGN: dict[Any, Any] = {
     sp.Abs: functions.absolute,
     sp.sign: functions.sign,
     sp.floor: functions.floor,
+    sp.cot: lambda x: 1 / sp.tan(x),
+    sp.sec: lambda x: 1 / sp.cos(x),
+    sp.csc: lambda x: 1 / sp.sin(x),
+    sp.coth: lambda x: 1 / functions.tanh(x),
+    sp.sech: lambda x: 1 / functions.cosh(x),
+    sp.csch: lambda x: 1 / functions.sinh(x),
     sp.Heaviside: lambda x, *_: (sp.S.One + functions.sign(x)) / 2,
 }
 
@@ -187,7 +193,7 @@ class _Builder:
     def value(self, tree: Tree, expr: Any, number: Any, parts: list[Value]) -> Value:
         """A value made of parts, checked."""
         constant = all(part.constant for part in parts)
-        expr = _with_our_kinks(expr)
+        expr = _with_our_functions(expr)
         if _not_real(expr) or bounds.beyond_floats(expr):
             raise self.not_finite(tree)
         if bounds.bits(expr) > bounds.MOST_BITS:
@@ -303,9 +309,9 @@ def _root_of_negative(base: Any, exponent: Any) -> bool:
     return bool(base.is_Rational and base < 0 and exponent.is_Rational and not exponent.is_Integer)
 
 
-def _with_our_kinks(expr: Any) -> Any:
-    if expr.is_Atom or expr.is_Add or not expr.has(*_KINKED):
+def _with_our_functions(expr: Any) -> Any:
+    if expr.is_Atom or expr.is_Add or not expr.has(*_FOREIGN):
         return expr
-    for theirs, ours in _KINKED.items():
+    for theirs, ours in _FOREIGN.items():
         expr = expr.replace(theirs, ours)
     return expr

@@ -30,6 +30,9 @@ _NAMES = {
     **{name: name for name in ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")},
 }
 
+# SymPy makes these by itself: tan(pi/3 - x) becomes cot(x + pi/6)
+_RECIPROCALS = {"cot": "tan", "sec": "cos", "csc": "sin", "coth": "tanh", "sech": "cosh", "csch": "sinh"}
+
 
 def constant_name(value: Fraction) -> str:
     """Name an exact constant."""
@@ -60,6 +63,8 @@ class KernelPrinter(PythonCodePrinter):
     _print_ImaginaryUnit = _print_ComplexInfinity = _print_Infinity = _print_NegativeInfinity = _print_NaN
 
     def _print_Function(self, expr):
+        if type(expr).__name__ in _RECIPROCALS:
+            return f"({constant_name(Fraction(1))}/{_RECIPROCALS[type(expr).__name__]}({self._print(expr.args[0])}))"
         name = _NAMES[type(expr).__name__]
         return f"{name}({', '.join(self._print(a) for a in expr.args)})"
 

@@ -1,5 +1,6 @@
 """Large expressions cut into small statements: the same numbers, the right derivatives, in little time."""
 
+import math
 import time
 
 import mpmath
@@ -85,3 +86,16 @@ def test_every_statement_is_small_and_uses_earlier_ones_only():
     for symbol, part in reversed(cut.statements):
         result = result.xreplace({symbol: part})
     assert sp.expand(result - expr) == 0
+
+
+@pytest.mark.parametrize(
+    "flow", ["tan(x + pi/2)", "tan((pi - x)/3)", "1/tan(x + v)", "tan(pi/2 - x)**2*tan(3*pi/2 - v)"]
+)
+def test_functions_that_come_up_by_themselves_have_their_values(flow):
+    """SymPy makes cotangents of tangents of sums with pi."""
+    text = f"hsdsl: 1\nmodes: {{A: {{flow: {{x: 0, v: '{flow}'}}}}}}\ninitial: {{mode: A, x: 0.3, v: 0.2}}\n"
+    model = Model(elaborate("m.yaml", text=(text + "experiment: {until: 1}\n").encode()))
+    known = {"tan": math.tan, "pi": math.pi, "x": 0.3, "v": 0.2}
+    expected = eval(flow, known)
+    kernel = PythonKernel(model.program, FLOAT64)
+    assert kernel.bind(0, ()).flow(0.0, 0.3, 0.2)[1] == pytest.approx(expected, rel=1e-12)
