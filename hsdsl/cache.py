@@ -73,7 +73,7 @@ def find(kind: str, key: str) -> Path | None:
 
 
 def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Path:
-    """Make an entry: ``write`` is given a path to write to. Returns the file.
+    """Make an entry in place of what it was: ``write`` is given a path to write to. Returns the file.
 
     Raises
     ------
@@ -89,6 +89,9 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
         write(part)
         path = entry / f"{_checksum(part.read_bytes())}{suffix}"
         os.replace(part, path)
+        for other in entry.iterdir():
+            if other != path and other.suffix != ".part":
+                other.unlink(missing_ok=True)
     finally:
         part.unlink(missing_ok=True)
     _prune(folder() / kind)

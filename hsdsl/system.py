@@ -147,6 +147,7 @@ class HybridSystem:
     initial: Initial
     experiment: Experiment
     reference: tuple[dict[str, Any], ...]  # checked plain data, numbers as text
+    files: dict[str, str]  # data files that were read, relative to the model, and their sha256
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

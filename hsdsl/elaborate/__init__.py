@@ -107,10 +107,11 @@ def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = 
     except OutOfTime:
         _say_too_long(reader)
     findings.raise_if_any()
-    digest = hashlib.sha256(b"".join((data, *world.files))).hexdigest()
+    digest = hashlib.sha256(b"".join((data, *world.files.values()))).hexdigest()
+    files = {name: hashlib.sha256(content).hexdigest() for name, content in world.files.items()}
     title, about = world.text(document.title), world.text(document.source)
     try:
-        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, **parts)
+        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=files, **parts)
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
     top = world.scope(("time", "parameters", "inputs", "states", "let"), "")

@@ -27,7 +27,7 @@ def read_samples(world: World, name: Key, file: Scalar) -> Samples | None:
     data = None if path is None else _bytes(world, file, path)
     if path is None or data is None:
         return None
-    world.files.append(data)
+    world.files[file.value] = data
     try:
         lines = data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:

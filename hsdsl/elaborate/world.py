@@ -31,8 +31,8 @@ class World:
         The states of each mode in file order; empty for a final mode without a flow.
     scopes : dict
         What names mean in each mode, once it is elaborated.
-    files : list of bytes
-        The data files that were read.
+    files : dict
+        The data files that were read: their content by name, relative to the model.
     """
 
     document: Model
@@ -43,7 +43,7 @@ class World:
     values: Values = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
     scopes: dict[str, Scope] = field(default_factory=dict)
-    files: list[bytes] = field(default_factory=list)
+    files: dict[str, bytes] = field(default_factory=dict)
 
     @classmethod
     def of(cls, document: Model, reader: Reader, folder: Path, path: str) -> World:

@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.limits import Limits, applied
-from hsdsl.lower import lower
-from hsdsl.model import engines
+from hsdsl.model import engines, seen
 from hsdsl.model.estimate import Estimate, compare, finer_settings
-from hsdsl.model.mechanical import one_stop
 from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
@@ -29,10 +26,10 @@ from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Settings, simulate
 from hsdsl.simulate.recorder import Progress
-from hsdsl.system import HybridSystem
 
 if TYPE_CHECKING:
     from hsdsl.metrics.points import Place, PointDistance
+    from hsdsl.system import HybridSystem
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
@@ -55,32 +52,80 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
         The file cannot be read.
     """
     began = time.perf_counter()
+    data = _read(path)
+    key = None if data is None else seen.key_of(data, limits)
+    program = None if key is None else seen.find(Path(path), key)
+    if program is not None:
+        return Model(None, time.perf_counter() - began, limits, program)
+    system = _elaborate(path, limits)
+    return Model(system, time.perf_counter() - began, limits, key=key)
+
+
+def _elaborate(path: str | os.PathLike[str], limits: Limits | None) -> HybridSystem:
+    from hsdsl.elaborate import elaborate
+
     with applied(limits):
-        system = elaborate(path)
-    return Model(system, time.perf_counter() - began, limits)
+        return elaborate(path)
+
+
+def _read(path: str | os.PathLike[str]) -> bytes | None:
+    """The file's bytes; what is wrong with a file that has none is said by who reads it next."""
+    try:
+        return Path(path).read_bytes()
+    except (OSError, ValueError):
+        return None
 
 
 class Model:
     """A checked model. ``system`` is the mathematics, ``program`` what an engine runs."""
 
-    def __init__(self, system: HybridSystem, load_seconds: float = 0.0, limits: Limits | None = None) -> None:
-        self.system = system
+    def __init__(
+        self,
+        system: HybridSystem | None,
+        load_seconds: float = 0.0,
+        limits: Limits | None = None,
+        program: Program | None = None,
+        key: str | None = None,
+    ) -> None:
+        if system is not None:
+            self.system = system
+        if program is not None:
+            self.program = program
+        self._key = key
         self._limits = limits
         self._seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | None = None
         self._kernels: dict[int | None, PythonKernel] = {}
 
     def __repr__(self) -> str:
-        modes = ", ".join(mode.name for mode in self.system.modes[:8])
-        return f"<hsdsl model {Path(self.system.path).name}: modes {modes}{', ...' * (len(self.system.modes) > 8)}>"
+        modes = ", ".join(mode.name for mode in self.program.modes[:8])
+        return f"<hsdsl model {Path(self.program.path).name}: modes {modes}{', ...' * (len(self.program.modes) > 8)}>"
+
+    @cached_property
+    def system(self) -> HybridSystem:
+        """The mathematics; of a model seen before it is read when it is asked for.
+
+        Raises
+        ------
+        UsageError
+            The file has changed meanwhile.
+        """
+        system = _elaborate(self.program.path, self._limits)
+        if system.digest != self.program.digest:
+            raise UsageError(f"{system.path} has changed since it was loaded", "load it again")
+        return system
 
     @cached_property
     def program(self) -> Program:
         """The model lowered to routines, free of SymPy."""
+        from hsdsl.lower import lower
+
         began = time.perf_counter()
         with applied(self._limits):
             program = lower(self.system)
         self._seconds["compile"] += time.perf_counter() - began
+        if self._key is not None and program.method in (None, "auto", *METHODS):  # else it is refused, with its place
+            seen.keep(Path(program.path), self._key, program, self.system.files)
         return program
 
     def simulate(
@@ -155,6 +200,8 @@ class Model:
         chosen = self._settings(request, values)
         mode, states, x = initial_state(values, initial or {})
         if request.method is None:
+            from hsdsl.model.mechanical import one_stop
+
             chosen = replace(chosen, one_stop=one_stop(values, x))
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return simulate(
@@ -187,7 +234,7 @@ class Model:
         from hsdsl.plot import plot
 
         values = with_parameters(self._values(FLOAT64), parameters or {})
-        plot(execution, path, guards=guard_lines(values), units=self.system.units)
+        plot(execution, path, guards=guard_lines(values), units=self.program.units)
 
     def distance(
         self,
@@ -234,14 +281,16 @@ class Model:
     @property
     def columns(self) -> list[str]:
         """Names of all states and outputs."""
-        states = dict.fromkeys(name for mode in self.system.modes for name in mode.states)
-        initial = dict.fromkeys(name for name, _ in self.system.initial.values)
-        return list(dict.fromkeys((*states, *initial, *self.system.outputs)))
+        states = dict.fromkeys(name for mode in self.program.modes for name in mode.states)
+        return list(dict.fromkeys((*states, *self.program.initial_states, *self.program.outputs)))
 
     def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
         """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.requests`)."""
-        experiment = self.system.experiment
-        in_file = {key: getattr(experiment, key) for key in KEYS}
+        program, given = self.program, self.program.constants.names
+        in_file: dict[str, Any] = {"scheme": program.scheme, "method": program.method}
+        in_file |= {key: key for key in KEYS if key in given}  # their values are routines
+        if "sample_times" in given or "sample_count" in given:
+            in_file["samples"] = "samples"
         return resolve((Source(FILE, in_file), Source("--set", settings or {}), Source("the call", asked or {})))
 
     def _values(self, arithmetic: Arithmetic) -> Values:
@@ -250,7 +299,7 @@ class Model:
             began = time.perf_counter()
             self._kernels[arithmetic.digits] = PythonKernel(program, arithmetic)
             self._seconds["compile"] += time.perf_counter() - began
-        return Values(self.system, program, self._kernels[arithmetic.digits])
+        return Values(lambda: self.system, program, self._kernels[arithmetic.digits])
 
     def _compile(self) -> CompiledModel:
         if self._compiled is None:

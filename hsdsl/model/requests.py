@@ -18,7 +18,6 @@ from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate import SCHEMES
-from hsdsl.source import Key
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
 OWN_FORMULA = ("paoli-schatzman",)
@@ -119,6 +118,8 @@ def _method(asked: Asked, size_asked: Asked, size: str) -> Method:
         return METHODS[AUTO]
     if asked.value not in METHODS:
         hint = _method_meant(str(asked.value))
+        from hsdsl.source import Key
+
         if asked.place == FILE and isinstance(asked.value, Key):
             raise ModelError([asked.value.place.diagnostic("HS204", f"there is no method '{asked.value}'", hint)])
         raise UsageError(f"there is no method '{asked.value}' ({asked.place})", hint)

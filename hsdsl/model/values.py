@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.backends.python import PythonKernel, compile_routines
-from hsdsl.elaborate import parameter_expression
 from hsdsl.errors import UsageError
-from hsdsl.lower import lower_expressions
 from hsdsl.model.requests import KEYS
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show
-from hsdsl.system import HybridSystem
+
+if TYPE_CHECKING:
+    from hsdsl.system import HybridSystem
+
+_NUMBER = re.compile(r"-?[0-9]{1,30}(\.[0-9]{0,30})?([eE][+-]?[0-9]{1,2})?")  # needs no parsing
 
 
 @dataclass(frozen=True)
 class Values:
-    """A model's numbers for one run: its kernel, and parameter values with overrides applied."""
+    """A model's numbers for one run: its kernel, and parameter values with overrides applied.
 
-    system: HybridSystem
+    ``read`` gives the mathematics, which a run of a model seen before does not have at hand.
+    """
+
+    read: Callable[[], HybridSystem]
     program: Program
     kernel: PythonKernel
     parameters: tuple[Number, ...] = ()
+
+    @property
+    def system(self) -> HybridSystem:
+        """The mathematics."""
+        return self.read()
 
     def number(self, value: Any, where: str) -> Number:
         """Turn a number or an expression of parameters into a finite number.
@@ -47,7 +58,12 @@ class Values:
 
     def _evaluate(self, value: Any, where: str) -> Number:
         arithmetic = self.kernel.arithmetic
+        if isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
+            return arithmetic.constant(Fraction(value.strip()))
         if isinstance(value, str):
+            from hsdsl.elaborate import parameter_expression
+            from hsdsl.lower import lower_expressions
+
             known = self.program.parameters[: len(self.parameters)]
             expression = parameter_expression(self.system, value, where, allowed=known)
             routine = compile_routines(lower_expressions(self.system, {"value": expression}), arithmetic, where)()[0]
@@ -88,7 +104,7 @@ def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
                 value = values.constant(f"parameter_{i}")[0]
             except DOMAIN_ERRORS:
                 raise UsageError(f"parameter {name} has no finite value with these parameters") from None
-        values = Values(values.system, program, values.kernel, (*values.parameters, value))
+        values = Values(values.read, program, values.kernel, (*values.parameters, value))
     _check_bounds(values)
     return values
 

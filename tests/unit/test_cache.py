@@ -1,0 +1,156 @@
+"""What is kept between runs: private, checked, made again where damaged, safe among processes, and never stale."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from engines import alike, needs_compiler
+
+import hsdsl
+from hsdsl import cache
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.model import seen
+from hsdsl.runtime import library
+from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+
+ROOT = Path(__file__).parents[2]
+MODELS = sorted((ROOT / "models").glob("*.yaml"))
+posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="POSIX permissions")
+WITH_DATA = """
+hsdsl: 1
+inputs: {u: {file: u.csv, hold: linear}}
+modes: {m: {flow: {x: u}}}
+initial: {mode: m, x: 0}
+experiment: {until: 1, method: rk4, step: 0.1, scheme: relaxed}
+"""
+LIGHT = """
+import sys, hsdsl
+hsdsl.load(sys.argv[1]).simulate(engine="c")
+print([name for name in sys.argv[2:] if name in sys.modules])
+"""
+HEAVY = ("sympy", "mpmath", "scipy", "pydantic", "yaml", "matplotlib", "rich", "typer")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of each test's own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    return tmp_path / "caches" / "hsdsl"
+
+
+def write(text: str):
+    return lambda path: path.write_text(text)
+
+
+@posix
+def test_the_folder_is_private_and_another_is_refused(folder: Path) -> None:
+    cache.keep("words", "k", ".txt", write("word"))
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o777)
+    assert "written by other users" in str(cache.private(folder))
+    assert cache.find("words", "k") is None
+    with pytest.raises(PermissionError):
+        cache.keep("words", "k", ".txt", write("word"))
+
+
+def test_a_damaged_entry_is_gone(folder: Path) -> None:
+    path = cache.keep("words", "k", ".txt", write("word"))
+    assert cache.find("words", "k") == path and path.read_text() == "word"
+    path.write_text("wort")
+    assert cache.find("words", "k") is None and not path.exists()
+
+
+def test_only_so_many_entries_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "MOST_ENTRIES", 3)
+    for k in range(6):
+        os.utime(cache.keep("words", f"k{k}", ".txt", write("word")), (k, k))
+    assert [cache.find("words", f"k{k}") is not None for k in range(6)] == [False] * 3 + [True] * 3
+
+
+@needs_compiler
+def test_compiled_code_is_kept_and_made_again_where_damaged(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    program, made = hsdsl.load(MODELS[0]).program, []
+    monkeypatch.setattr(library, "_compile", lambda *a, original=library._compile: (made.append(1), original(*a)))
+    for expected in (1, 1):
+        CompiledModel(program)
+        assert len(made) == expected
+    (kept,) = (folder / library.KIND).rglob("*.so")
+    kept.rename(folder / "old.so")  # a library that is loaded must not be written over
+    kept.write_bytes(b"no library")
+    assert CompiledKernel(program, CompiledModel(program)).arithmetic is FLOAT64
+    assert len(made) == 2
+
+
+@needs_compiler
+@posix
+def test_without_a_folder_it_compiles_for_this_process(monkeypatch, tmp_path: Path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    CompiledModel(hsdsl.load(MODELS[0]).program)
+    assert "not kept" in capsys.readouterr().err
+
+
+@needs_compiler
+def test_processes_may_compile_the_same_at_once() -> None:
+    command = [sys.executable, "-m", "hsdsl", "run", str(MODELS[0]), "--json", "--engine", "c", "--scheme", "relaxed"]
+    running = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(3)]
+    for process in running:
+        _, errors = process.communicate()
+        assert process.returncode == 0 and not errors, errors.decode()
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_a_program_seen_before_is_the_program(path: Path) -> None:
+    first, second = hsdsl.load(path), None
+    program = first.program
+    second = hsdsl.load(path)
+    assert "program" in second.__dict__ and second.program == program
+    assert second.columns == first.columns and repr(second) == repr(first)
+    assert second.system.digest == first.system.digest
+
+
+def test_a_run_seen_before_is_the_run() -> None:
+    path = ROOT / "models" / "pronking-runner.yaml"
+    first, second = hsdsl.load(path), hsdsl.load(path)
+    assert alike(first.simulate(engine="python")) == alike(hsdsl.load(path).simulate(engine="python"))
+    assert second.simulate(until="1/3", parameters={second.program.parameters[0]: "2/2"}).final.time == 1 / 3
+
+
+def test_a_change_of_the_data_or_the_model_is_seen(tmp_path: Path) -> None:
+    model, data = tmp_path / "m.yaml", tmp_path / "u.csv"
+    model.write_text(WITH_DATA)
+    finals = []
+    for slope in (1, 1, 2):
+        data.write_text(f"time,u\n0,{slope}\n1,{slope}\n")
+        finals.append(hsdsl.load(model).simulate().final["x"])
+    assert finals == pytest.approx([1, 1, 2])
+    loaded = hsdsl.load(model)
+    model.write_text(WITH_DATA.replace("x: 0", "x: 5"))
+    assert hsdsl.load(model).simulate().final["x"] == pytest.approx(7)
+    with pytest.raises(UsageError, match="has changed"):
+        loaded.simulate(until="1/2 + 1/4")
+
+
+def test_what_is_no_program_is_not_taken(folder: Path) -> None:
+    path = MODELS[0]
+    program = hsdsl.load(path).program
+    key = seen.key_of(path.read_bytes(), None)
+    assert seen.find(path, key) == program
+    for changed in (replace(program, parameters=(1,)), replace(program, modes=None), replace(program, title=3)):
+        for entry in (folder / seen.KIND / key).iterdir():
+            entry.unlink()
+        seen.keep(path, key, changed, {})  # type: ignore[arg-type]
+        assert seen.find(path, key) is None
+
+
+@needs_compiler
+def test_a_run_of_a_model_seen_before_imports_little() -> None:
+    command = [sys.executable, "-c", LIGHT, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
+    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() for _ in range(2)]
+    assert "sympy" in said[0] and said[1] == "[]"
