@@ -13,11 +13,13 @@ import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators import Method as Integrator
 
 ARC = np.dtype([("first", "i8"), ("jump", "i8"), ("mode", "i4"), ("kind", "i4")])
 TRANSITION = np.dtype(
     [("time", "f8"), ("resumed", "f8"), ("mode", "i4"), ("edge", "i4"), ("entry", "i4"), ("alternatives", "i4")]
 )
+METHOD_KINDS = ("table", "taylor", "radau")
 INTERPOLANTS = ("secant", "hermite", "dense")
 KINDS = ("flow", "strip")
 REASONS = (
@@ -57,6 +59,9 @@ class Mode(ctypes.Structure):
     gradients: Any
     rates: Any
     edge: Any
+    series: int | None
+    surface_series: int | None
+    surface_line: Any
 
     _fields_ = (
         *((name, c_int) for name in ("dimension", "edges", "surfaces", "final")),
@@ -64,6 +69,9 @@ class Mode(ctypes.Structure):
         ("gradients", POINTER(c_void_p)),
         ("rates", POINTER(c_void_p)),
         ("edge", POINTER(Edge)),
+        ("series", c_void_p),
+        ("surface_series", c_void_p),
+        ("surface_line", POINTER(c_int)),
     )
 
 
@@ -74,10 +82,11 @@ class Model(ctypes.Structure):
     surfaces: int
     edges: int
     outputs: int
+    lines: int
     mode: Any
 
     _fields_ = (
-        *((name, c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data")),
+        *((name, c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data", "lines")),
         ("mode", POINTER(Mode)),
     )
 
@@ -92,7 +101,7 @@ class Method(ctypes.Structure):
     """``hs_method``."""
 
     _fields_ = (
-        *((name, c_int) for name in ("stages", "extra", "order", "interpolant", "degree")),
+        *((name, c_int) for name in ("kind", "stages", "extra", "order", "interpolant", "degree")),
         ("c", POINTER(c_double)),
         ("a", POINTER(Row)),
         ("b", Row),
@@ -225,13 +234,26 @@ STRUCTURES = (Edge, Mode, Model, Row, Method, Timeline, Settings, Chunk, Visited
 
 
 @cache
-def method_table(table: ButcherTableau) -> Method:
-    """Write an integrator's table as the runtime takes it: numbers instead of fractions, rows without their zeros."""
+def method_table(method: Integrator) -> Method:
+    """Write a method as the runtime takes it."""
+    if isinstance(method, ButcherTableau):
+        return _butcher_table(method)
+    return Method(
+        kind=METHOD_KINDS.index(method.name),
+        order=method.error_order,
+        interpolant=INTERPOLANTS.index("dense"),
+        degree=method.degree,
+    )
+
+
+def _butcher_table(table: ButcherTableau) -> Method:
+    """Write a tableau: numbers instead of fractions, rows without their zeros."""
     stages = table.stages - table.last_is_next
     end: tuple[Fraction, ...] = ()
     rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
     dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
     return Method(
+        kind=METHOD_KINDS.index("table"),
         stages=stages,
         extra=len(table.extra),
         order=table.order,

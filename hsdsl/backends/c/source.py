@@ -41,7 +41,7 @@ def model_source(program: Program) -> str:
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.modes)}, {max(len(m.edges) for m in program.modes)}, "
-        f"{len(program.outputs)}, {len(writer.data)}, {table}}};\n"
+        f"{len(program.outputs)}, {len(writer.data)}, 0, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -73,6 +73,7 @@ class _Writer:
             self.pointers(routine[f"gradient_{k}"] for k in surfaces),
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
+            *("0", "0", "0"),
         ]
         return f"{{{', '.join(fields)}}}"
 

@@ -5,6 +5,8 @@
 
 #include "run.h"
 
+#include "table.c"
+#include "taylor.c"
 #include "stepper.c"
 
 #include "control.c"
@@ -52,6 +54,7 @@ static void lay_out(hs_run *run, hs_store *store) {
     if (store->numbers) run->k[i] = stage;
   }
   if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
+  if (run->method->kind == HS_TAYLOR) run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
   run->values = numbers(store, m);
   run->ahead = numbers(store, m);
   run->magnitudes = numbers(store, m);

@@ -16,6 +16,14 @@
 
 typedef int hs_routine(const double *p, double t, const double *x, double *out);
 
+/* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
+   lines[l*(order + 2) + m]. Line 0 is time, lines 1 to n are the states, with coefficients 0 to order + 1; the others
+   have those from 0 to order. No value where one of them has none. */
+typedef int hs_series(const double *p, int order, double t, const double *x, double *lines);
+
+/* The same of the lines behind them, which surfaces need besides: coefficients 0 to order. */
+typedef int hs_surface_series(const double *p, int order, double *lines);
+
 typedef struct {
   int target;           /* index of the target mode */
   int target_dimension; /* number of states it is entered with */
@@ -39,6 +47,9 @@ typedef struct {
   hs_routine *const *gradients;
   hs_routine *const *rates;
   const hs_edge *edge;
+  hs_series *series; /* 0 where the flow is kinked: it has no Taylor coefficients everywhere; then there are no others */
+  hs_surface_series *surface_series;
+  const int *surface_line; /* for each surface; -1 where it is kinked */
 } hs_mode;
 
 typedef struct {
@@ -48,6 +59,7 @@ typedef struct {
   int edges;    /* of the mode with most */
   int outputs;
   int data; /* numbers in `p` */
+  int lines; /* of series, of the mode with most */
   const hs_mode *mode;
 } hs_model;
 

@@ -20,10 +20,14 @@ typedef struct {
 
 enum { HS_SECANT, HS_HERMITE, HS_DENSE };
 
+typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_kind;
+
+/* Only tables have what stands behind `degree`. */
 typedef struct {
+  int kind;
   int stages; /* to evaluate in a step */
   int extra;  /* stages of the dense output's own */
-  int order;
+  int order;  /* the power of h that the error estimate falls with; of Taylor's method the degree */
   int interpolant;
   int degree; /* of the pieces that are kept; 0 for straight lines */
   const double *c;

@@ -96,6 +96,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
   const double limit = run->task->timeline->end[here->segment];
   run->patience.reached = NAN;
   run->patience.idle = run->patience.creeping = 0;
+  forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   while (here->t < limit) {
     double h = control->h, t1, ratio = NAN;

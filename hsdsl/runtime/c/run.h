@@ -81,6 +81,8 @@ typedef struct {
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
   double **k;          /* stages, then the flow at the end */
+  double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
+  int expanded;        /* whether it has written them, in this mode */
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
   int *stood_on, *beyond;
   int *tied;           /* one for each edge */
