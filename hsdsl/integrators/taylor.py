@@ -112,8 +112,10 @@ def proposed_step(stages: Stages, x: State, tolerance: Number, arithmetic: Arith
     """
     power, least = arithmetic.functions["pow"], None
     for m in (len(stages) - 1, len(stages)):
+        largest = arithmetic.zero
         for c, a in zip(stages[m - 1], x, strict=True):
-            if c != 0:
-                h = power(tolerance * (1 + abs(a)) / abs(c), (arithmetic.zero + 1) / m)
-                least = h if least is None else min(h, least)
+            largest = max(largest, abs(c) / (tolerance * (1 + abs(a))))
+        if largest > 0:
+            h = power(1 / largest, (arithmetic.zero + 1) / m)
+            least = h if least is None else min(h, least)
     return least

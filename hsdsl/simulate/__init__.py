@@ -14,7 +14,7 @@
 `paoli_schatzman`   the rival: a two-step formula for one mass and one stop
 `run`               what stays for a whole run, and where it stands
 `recorder`          rows, arcs and transitions, and the execution's columns
-`stops`             how runs end, in sentences
+`stops`, `notes`    how runs end, and what else they say of themselves, in sentences
 `compiled`          the same loop in C: what it is given and what it says
 `chunks`            what the compiled loop writes to
 `interrupt`         Ctrl-C while it runs

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.simulate.isolate import Coefficients, last_root, rises, value
+from hsdsl.simulate.isolate import Coefficients, last_root, rises, total, value
 
 LEAST_DEGREE = 4
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
@@ -61,15 +61,15 @@ def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Numbe
     outside = pieces[0].coefficients[0] > level
     for piece in pieces:
         c, at = piece.coefficients, piece.start * 0
-        above = max(level, ROUNDING * unit * sum(map(abs, c)))
+        zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at))
         while True:
             if outside:
-                below = rises([-a for a in c], at, at, unit)
+                below = rises([-a for a in c], zero, at, unit)
                 if below is None:
                     break
                 at, outside = below, False
             high = rises(c, above, at, unit)
-            if high is None and piece is pieces[-1] and risen:
+            if high is None and piece is pieces[-1] and risen and at < 1:
                 high = at * 0 + 1
             if high is None:
                 break
@@ -87,39 +87,39 @@ def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
 
 
 def _slope(c: Coefficients, s: Number) -> Number:
-    total = s * 0
+    slope = s * 0
     for k in range(len(c) - 1, 0, -1):
-        total = k * c[k] + s * total
-    return total
+        slope = k * c[k] + s * slope
+    return slope
 
 
 def interpolated(
     functions: Callable[[Number], Sequence[Number]],
     count: int,
     degree: int,
-    allowed: Sequence[Number],
+    allowed: Callable[[int], Number],
     share: Number,
     arithmetic: Arithmetic,
 ) -> list[list[Piece]]:
-    """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``allowed`` or
-    ``share`` of their largest value.
+    """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
+    their largest value, or ``allowed(k)`` more.
     """
     degree = max(LEAST_DEGREE, degree)
     nodes = [arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1)]
     tests = [arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1)]
     matrix = _to_powers(degree, arithmetic)
-    share = share + arithmetic.unit * sum(abs(m) for line in matrix for m in line)
     zero = arithmetic.zero
+    share = share + arithmetic.unit * total((abs(m) for line in matrix for m in line), zero)
     parts: list[tuple[Number, Number, int]] = [(zero, zero + 1, 0)]
     found: list[list[Piece]] = [[] for _ in range(count)]
     while parts and count:
         start, width, halvings = parts.pop()
         rows = list(zip(*(functions(start + width * s) for s in nodes), strict=True))
         checks = list(zip(*(functions(start + width * s) for s in tests), strict=True))
-        pieces = [[sum((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
+        pieces = [[total((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
         settled = [
-            residual(c, tests, check) <= limit + share * max(abs(r) for r in row)
-            for c, row, check, limit in zip(pieces, rows, checks, allowed, strict=True)
+            settles(residual(c, tests, check), share * max(abs(r) for r in row), allowed, k)
+            for k, (c, row, check) in enumerate(zip(pieces, rows, checks, strict=True))
         ]
         if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < MOST_PIECES:
             half = width / 2
@@ -129,6 +129,11 @@ def interpolated(
             c = pieces[k] if settled[k] else [row[0], row[-1] - row[0]]
             found[k].append(Piece(start, width, c, settled[k]))
     return found
+
+
+def settles(off: Number, enough: Number, allowed: Callable[[int], Number], k: int) -> bool:
+    """Whether a residual of function k is small enough; what is allowed beyond that is asked where it matters."""
+    return off <= enough or off <= allowed(k) + enough
 
 
 def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number]) -> Number:

@@ -8,7 +8,7 @@ retrospective, Computer Aided Geometric Design 29, 2012 (doi:10.1016/j.cagd.2012
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import pairwise
 from math import comb
@@ -20,20 +20,32 @@ MOST_REFINEMENTS = 300
 
 
 @cache
-def _weights(degree: int) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """For each Bernstein coefficient i the quotients C(i, k) / C(degree, k), k = 0 to i."""
-    return tuple(tuple((comb(i, k), comb(degree, k)) for k in range(i + 1)) for i in range(degree + 1))
+def _binomials(degree: int) -> tuple[int, ...]:
+    return tuple(comb(degree, k) for k in range(degree + 1))
+
+
+def total(terms: Iterable[Number], zero: Number) -> Number:
+    """Sum from left to right (Python's own ``sum`` compensates round-off from 3.12 on, and C does not)."""
+    for term in terms:
+        zero = zero + term
+    return zero
 
 
 def bernstein(c: Coefficients) -> list[Number]:
-    """Return the Bernstein coefficients on [0, 1] of c_0 + c_1 s + ..."""
-    found: list[Number] = []
-    for row in _weights(len(c) - 1):
-        total = c[0]
-        for k in range(1, len(row)):
-            total = total + c[k] * row[k][0] / row[k][1]
-        found.append(total)
-    return found
+    """Return the Bernstein coefficients on [0, 1] of c_0 + c_1 s + ...: b_i = sum_k C(i, k) c_k / C(n, k).
+
+    The sums are made as in Pascal's triangle, without products.
+    """
+    b = [a / n for a, n in zip(c, _binomials(len(c) - 1), strict=True)]
+    for k in range(1, len(b)):
+        for i in range(len(b) - 1, k - 1, -1):
+            b[i] = b[i] + b[i - 1]
+    return b
+
+
+def stays_below(c: Coefficients, level: Number) -> bool:
+    """Whether the polynomial is nowhere above ``level`` on [0, 1], by bounds that may not see it."""
+    return total((a for a in c[1:] if a > 0), c[0]) <= level or max(bernstein(c)) <= level
 
 
 def split(b: list[Number], s: Number) -> tuple[list[Number], list[Number]]:
@@ -68,11 +80,7 @@ def rises(c: Coefficients, level: Number, start: Number, tiny: Number) -> Number
 
     None where it is nowhere above, up to intervals shorter than ``tiny``.
     """
-    if c[0] + sum(a for a in c[1:] if a > 0) <= level:
-        return None
     b = [x - level for x in bernstein(c)]
-    if max(b) <= 0:
-        return None
     pieces = [((split(b, start)[1] if start > 0 else b), start, start * 0 + 1)]
     while pieces:
         b, low, high = pieces.pop()

@@ -12,14 +12,16 @@ from collections.abc import Callable
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate import notes
 from hsdsl.simulate.along import Rise, deflated, rises_along
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.isolate import stays_below
 from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
 from hsdsl.simulate.rest import hold, rests
 from hsdsl.simulate.run import Here, Run, choose, reset
 from hsdsl.simulate.spans import Span, stepping
-from hsdsl.simulate.stops import reached, reached_in_strip, show
+from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
 from hsdsl.simulate.tails import close_tail, contraction
 
@@ -30,7 +32,8 @@ MOST_CORRECTIONS = 8
 def located(run: Run, here: Here | Stop) -> Stop:
     """Follow the execution from ``here`` until it stops."""
     while not isinstance(here, Stop):
-        if (edge := rests(run, here)) is not None:
+        edge = rests(run, here) if here.t < run.settings.until else None
+        if edge is not None:
             here = hold(run, here, edge)
         outcome = flow(run, here) if here.t < here.segment.end else here
         if isinstance(outcome, Landing):
@@ -100,20 +103,15 @@ def write(here: Here, span: Span, crossing: Crossing) -> None:
 def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
     """Find the first point of a step where surface k is crossed and its condition holds."""
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
-    if span.ends[k] <= 0 and all(
-        p.coefficients[0] + sum(a for a in p.coefficients[1:] if a > 0) <= 0 for p in span.curves[k]
-    ):
+    pieces = deflated(span.curves[k]) if k in surfaces.stood_on else span.curves[k]
+    if span.ends[k] <= 0 and all(stays_below(piece.coefficients, zero) for piece in pieces):
         return None
-    stands = k in surfaces.stood_on
     first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
-    pieces = deflated(span.curves[k]) if stands else span.curves[k]
     for rise in rises_along(pieces, max(first, last), span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:
-                run.recorder.doubt(
-                    k, f"surface {k} of mode {here.mode.name} would not settle on a polynomial at t = {show(time)}"
-                )
+                notes.unsettled(run.recorder, here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return None
 
@@ -122,21 +120,21 @@ def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number,
     """Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket."""
     stands, s, best = k in here.surfaces.stood_on, rise.share, None
 
-    def residual(s: Number) -> tuple[Number, Number]:
+    def residual(s: Number) -> Number:
         time, q = span.point(s)
-        r = here.kernel.surfaces(time, *q)[k]
-        return r, abs(r) - here.surfaces.noise(k, time, q, entry=stands)
+        return here.kernel.surfaces(time, *q)[k]
 
     for _ in range(MOST_CORRECTIONS):
-        r, excess = residual(s)
+        time, q = span.point(s)
+        r = here.kernel.surfaces(time, *q)[k]
         if best is not None and not abs(r) < best[0]:
             break
         best = (abs(r), s)
-        if excess <= 0 or rise.slope == 0:
-            return s, *span.point(s)
+        if rise.slope == 0 or abs(r) <= here.surfaces.noise(k, time, q, entry=stands):
+            return s, time, q
         s = min(s * 0 + 1, max(s * 0, s - r / rise.slope))
     assert best is not None
-    s = bracketed(lambda s: residual(s)[0], best[1], here)
+    s = bracketed(residual, best[1], here)
     return s, *span.point(s)
 
 
@@ -163,9 +161,7 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
         return stop
     outcome, resumed = reset(here, crossing, landing.scale, run), t
     if crowded(run, t):
-        run.recorder.depart(
-            "crowded", f"more than {FREE} transitions within the relaxation, from t = {show(t)} on in strips"
-        )
+        notes.crowded(run.recorder, FREE, t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)

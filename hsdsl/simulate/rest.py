@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate import notes
 from hsdsl.simulate.along import interpolated, rises_along
+from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
-from hsdsl.simulate.stops import show
 
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
@@ -20,7 +21,7 @@ DEGREE, SHARE, CORRECTIONS = 6, 1e-12, 8
 
 def rests(run: Run, here: Here) -> int | None:
     """Return the edge on whose guard the state rests; None where it moves."""
-    if not here.surfaces.stood_on or not here.t < run.settings.until or here.mode.states != here.arc.states:
+    if not here.surfaces.stood_on or here.mode.states != here.arc.states:
         return None
     mode = run.program.modes.index(here.mode)
     for k in sorted(here.surfaces.stood_on):
@@ -51,7 +52,8 @@ def push_order(run: Run, here: Here, k: int) -> int | None:
     """Which derivative of the surface along the flow decides; None where the first one points inwards."""
     slope, gradient = here.kernel.flow(here.t, *here.x), here.kernel.gradients[k](here.t, *here.x)
     rate = here.kernel.rates[k](here.t, *here.x)[0]
-    size = sum((abs(g) * (1 + abs(f)) for g, f in zip(gradient[1:], slope, strict=True)), run.arithmetic.zero)
+    terms = (abs(g) * (1 + abs(f)) for g, f in zip(gradient[1:], slope, strict=True))
+    size = total(terms, run.arithmetic.zero)
     if abs(rate) <= ZERO_UNITS * run.arithmetic.unit * size:
         return 2
     return 1 if rate > 0 else None
@@ -101,7 +103,7 @@ def hold(run: Run, here: Here, k: int) -> Here:
     release = released(run, here, k, order, end)
     edge, until = here.mode.edges[k].name, end if release is None else release
     here.arc.append(until, here.x, (tuple(run.arithmetic.zero for _ in here.x),))
-    run.recorder.depart(None, f"at rest on the guard of {edge} from t = {show(here.t)} to t = {show(until)}")
+    notes.at_rest(run.recorder, edge, here.t, until)
     if release is None:
         return here.moved(end, here.x)
     mode = run.program.modes.index(here.mode)
@@ -115,7 +117,7 @@ def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | 
     def inward(s: Number) -> State:
         return (-push(run, here, k, order, t + s * span),)
 
-    pieces = interpolated(inward, 1, DEGREE, (run.arithmetic.zero,), SHARE, run.arithmetic)[0]
+    pieces = interpolated(inward, 1, DEGREE, lambda _: run.arithmetic.zero, SHARE, run.arithmetic)[0]
     rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
     if rise is None:
         return None

@@ -16,7 +16,7 @@ from hsdsl.integrators.radau import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
-from hsdsl.simulate.along import Piece, interpolated
+from hsdsl.simulate.along import Piece, interpolated, settles
 from hsdsl.simulate.isolate import value
 from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
@@ -241,17 +241,17 @@ class SeriesSteps:
             for c in row or ():
                 scaled.append(c * power)
                 power = power * h
-            if not scaled or not self._converges(scaled, end, here.surfaces.noise(k, t1, z)):
+            if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k):
                 return interpolate(run, here, t, h, x, z, piece, DEGREE)
             curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
         return curves
 
-    def _converges(self, c: list[Number], end: Number, noise: Number) -> bool:
+    def _converges(self, c: list[Number], end: Number, noise: Callable[[int], Number], k: int) -> bool:
         """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step."""
         given, largest = self.run.control.tolerance, max(abs(a) for a in c)
         tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
         tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
-        return tail and abs(value(c, end * 0 + 1) - end) <= 4 * noise + tolerance * largest
+        return tail and settles(abs(value(c, end * 0 + 1) - end), tolerance * largest, noise, k)
 
 
 def interpolate(
@@ -259,10 +259,12 @@ def interpolate(
 ) -> list[list[Piece]]:
     """Interpolate all surfaces along a step's interpolant."""
     surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
-    allowed = [max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z)) for k in range(count)]
 
     def values(s: Number) -> State:
         return surfaces(t + s * h, *at(x, piece, s))
+
+    def allowed(k: int) -> Number:
+        return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
 
     return interpolated(values, count, degree, allowed, share(run), run.arithmetic)
 

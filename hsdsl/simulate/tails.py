@@ -12,9 +12,9 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate import notes
 from hsdsl.simulate.rest import is_pushed, moves_alone, stays
 from hsdsl.simulate.run import Here, Run
-from hsdsl.simulate.stops import show
 
 LEAST_FLIGHTS = 3
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
@@ -23,7 +23,7 @@ MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
 def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
     """Return the last flight and the largest ratio of the last few, if one edge's flights shrink; else None."""
     last = made[-LEAST_FLIGHTS - 1 :]
-    if len(last) <= LEAST_FLIGHTS or any(t.edge != last[0].edge or t.source != t.target or t.entry for t in last):
+    if len(last) <= LEAST_FLIGHTS or not all(_one_edge(t, last[0]) for t in last):
         return None
     flights = [b.time - a.time for a, b in pairwise(last)]
     if not flights[-1] > 0:
@@ -31,6 +31,11 @@ def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
     ratios = [b / a for a, b in pairwise(flights) if a > 0]
     shrinking = len(ratios) == LEAST_FLIGHTS - 1 and max(ratios) < 1
     return (flights[-1], max(ratios)) if shrinking else None
+
+
+def _one_edge(one: Transition, other: Transition) -> bool:
+    same = (one.edge, one.source) == (other.edge, other.source)
+    return same and one.source == one.target and not one.entry
 
 
 def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
@@ -56,14 +61,8 @@ def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
         return here
     edge = here.mode.edges[k].name
     if not alone:
-        sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
-        run.recorder.depart(None, f"Zeno at t = {show(end)}: {sentence}")
-        return Stop("zeno", here.t, sentence)
-    run.recorder.depart(
-        None,
-        f"Zeno at t = {show(end)}: the transitions of {edge} after number {len(made) - 1}, all within {show(left)} "
-        "of each other, are replaced by their limit",
-    )
+        return notes.accumulates(run.recorder, edge, end, here.t)
+    notes.replaced(run.recorder, edge, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     mode = run.program.modes.index(here.mode)
     return run.place(mode, here.mode.states, end, q, here.surfaces.scale, stood_on={k})

@@ -99,3 +99,20 @@ def test_a_restart_on_the_guard_that_leaves_it_tangentially(push: str, fires: bo
     text = f"modes: {{a: {{flow: {{x: {push}}}, transitions: [{{when: x >= 0, to: b}}]}}, b: {{flow: {{x: 0}}}}}}\n"
     made = run(tmp_path, text + "initial: {mode: a, x: 0}\nexperiment: {until: 1}\n", method=method)
     assert [t.time for t in made.transitions] == ([0] if fires else [])
+
+
+TWICE = """
+modes:
+  a: {flow: {x: 1}, transitions: [{when: "(t - 1)*(t - 1.5)*(t - 1.8) >= 0", if: t > 1.7, to: b}]}
+  b: {flow: {x: 0}}
+initial: {mode: a, x: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("method", ["taylor", "rk4"])
+def test_a_second_rise_in_one_step_behind_a_shallow_dip(method: str, tmp_path: Any) -> None:
+    """Up at 1, where `if` is false, down by less than a hundredth at 1.5, up again at 1.8."""
+    made = run(tmp_path, TWICE, method=method, step=3)
+    assert [t.time for t in made.transitions] == pytest.approx([1.8], abs=1e-12)
+    assert len(made.times) == 4

@@ -1,0 +1,44 @@
+"""What a run says of itself besides its transitions, in sentences: one place for every loop.
+
+A departure is where a run left what the theorem is about, a doubt what could not be checked.
+"""
+
+from __future__ import annotations
+
+from hsdsl.arithmetic import Number
+from hsdsl.execution import Stop
+from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.stops import show
+
+
+def crowded(recorder: Recorder, free: int, t: Number) -> None:
+    """More transitions than cost no time fell within the relaxation."""
+    sentence = f"more than {free} transitions within the relaxation, from t = {show(t)} on in strips"
+    recorder.depart("crowded", sentence)
+
+
+def at_rest(recorder: Recorder, edge: str, start: Number, end: Number) -> None:
+    """The state rested on a guard."""
+    recorder.depart(None, f"at rest on the guard of {edge} from t = {show(start)} to t = {show(end)}")
+
+
+def replaced(recorder: Recorder, edge: str, number: int, end: Number, left: Number) -> None:
+    """The transitions after ``number`` were replaced by their limit."""
+    recorder.depart(
+        None,
+        f"Zeno at t = {show(end)}: the transitions of {edge} after number {number}, all within {show(left)} "
+        "of each other, are replaced by their limit",
+    )
+
+
+def accumulates(recorder: Recorder, edge: str, end: Number, t: Number) -> Stop:
+    """Transitions accumulate at ``end`` while something else moves on: the run stops at t."""
+    sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
+    recorder.depart(None, f"Zeno at t = {show(end)}: {sentence}")
+    return Stop("zeno", t, sentence)
+
+
+def unsettled(recorder: Recorder, mode: str, k: int, t: Number) -> None:
+    """A crossing was found on a piece of a surface that is no polynomial."""
+    sentence = f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}"
+    recorder.doubt((mode, k), sentence)
