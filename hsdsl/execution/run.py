@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.execution.deferred import Deferred
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.same import same
 from hsdsl.execution.samples import Samples
@@ -22,7 +23,7 @@ OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Execution:
+class Execution(Deferred):
     """A run's result; see the package's docstring for the arrays.
 
     Two executions are equal when every field is, not-a-number being equal to itself; ``output_function`` is

@@ -18,13 +18,14 @@ from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.limits import Limits, applied
 from hsdsl.model import engines, seen
 from hsdsl.model.estimate import Estimate, compare, finer_settings
+from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.values import samples as samples_of
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate import Settings, simulate
+from hsdsl.simulate import Prepared, Settings, prepare
 from hsdsl.simulate.recorder import Progress
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
+MOST_PREPARED = 16
 
 
 def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
@@ -96,6 +98,7 @@ class Model:
         self._seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | None = None
         self._kernels: dict[int | None, PythonKernel] = {}
+        self._prepared: Remembered[Prepared] = Remembered(MOST_PREPARED)
 
     def __repr__(self) -> str:
         modes = ", ".join(mode.name for mode in self.program.modes[:8])
@@ -194,19 +197,33 @@ class Model:
             samples=samples,
             max_transitions=max_transitions,
         )
+        key = key_of(asked, parameters, initial, settings, engine, precision)
+        ready = self._prepared.find(key)
+        if ready is None:
+            ready = self._prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
+            self._prepared.keep(key, ready)
+        return ready.simulate(watch, self._seconds)
+
+    def _prepare(
+        self,
+        settings: Mapping[str, Any] | None,
+        asked: Mapping[str, Any],
+        parameters: Mapping[str, Any],
+        initial: Mapping[str, Any],
+        engine: str,
+        precision: int | None,
+    ) -> Prepared:
         request = self.resolve(settings, asked)
         engines.check(engine)
-        values = with_parameters(self._values(_arithmetic(precision)), parameters or {})
+        values = with_parameters(self._values(_arithmetic(precision)), parameters)
         chosen = self._settings(request, values)
-        mode, states, x = initial_state(values, initial or {})
+        mode, states, x = initial_state(values, initial)
         if request.method is None:
             from hsdsl.model.mechanical import one_stop
 
             chosen = replace(chosen, one_stop=one_stop(values, x))
         compiled = engines.choose(engine, chosen, precision, self._compile)
-        return simulate(
-            self.program, values.kernel, chosen, values.parameters, mode, states, x, watch, compiled, self._seconds
-        )
+        return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""

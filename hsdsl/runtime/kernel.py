@@ -7,8 +7,9 @@ generator from one of the compiled loop. Constants and diagnoses are evaluated b
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache
+from typing import Any
 
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.backends.c import model_source
@@ -52,6 +53,7 @@ class CompiledModel:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
         self._library = load(repr((sizes, program.modes)), lambda: model_source(program))
         self.table = tables.Model.in_dll(self._library, "hs_the_model")
+        self._shared: dict[Hashable, Any] = {}
 
     def workspace(self, method: tables.Method) -> int:
         """How many numbers a run needs for itself."""
@@ -60,6 +62,10 @@ class CompiledModel:
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""
         runtime().hs_simulate(ctypes.byref(task))
+
+    def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """Return what runs of this model share under a key, made when it is first asked for."""
+        return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
 
 
 class CompiledKernel:

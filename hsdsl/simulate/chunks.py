@@ -1,11 +1,10 @@
-"""What the compiled loop writes to: chunks of columns, and the execution's columns and transitions made of them."""
+"""What the compiled loop writes to: chunks of columns, and the execution's arcs and transitions made of them."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,9 @@ from hsdsl.program import Program
 from hsdsl.runtime import tables
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
+MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
+BY_ROW = ("times", "values", "outputs", "depth")
+BY_TRANSITION = ("transition", "before", "after")
 
 
 @dataclass(frozen=True)
@@ -25,76 +27,95 @@ class Shape:
     degree: int
     edges: int
 
+    @property
+    def row_bytes(self) -> int:
+        """About how much memory a row takes."""
+        return 8 * (3 + self.width * (2 + self.degree) + self.outputs)
+
 
 class Chunks:
-    """The chunks of one run; ``table`` is the one that is being written."""
+    """The chunks of one run; ``table`` is the one that is being written.
 
-    def __init__(self, table: tables.Chunk, shape: Shape, rows: float) -> None:
+    A small one that is enough for its run is copied from and used again.
+    """
+
+    def __init__(self, table: tables.Chunk, shape: Shape) -> None:
         self.table, self._shape = table, shape
         self._full: list[dict[str, Array]] = []
-        self._rows = int(min(max(rows, LEAST_ROWS), MOST_ROWS))
-        self._open()
+        self._rows = 0  # of the chunk that is there
+
+    def clear(self, rows: float) -> None:
+        """Make ready for a run that may write about so many rows."""
+        wanted = int(min(max(rows, LEAST_ROWS), MOST_ROWS))
+        if wanted <= self._rows:
+            self._reset()
+        else:
+            self._open(wanted)
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large."""
         self._full.append(self._written())
-        self._rows = min(2 * self._rows, MOST_ROWS)
-        self._open()
+        self._open(min(2 * self._rows, MOST_ROWS))
 
-    def _open(self) -> None:
-        shape, rows = self._shape, self._rows
+    def _open(self, rows: int) -> None:
+        shape = self._shape
         arcs, transitions = rows // 2 + 8, rows // 4 + 8
         self._columns: dict[str, Array] = {
             "times": np.empty(rows),
             "values": np.empty((rows, shape.width)),
             "outputs": np.empty((rows, shape.outputs)),
-            "depth": np.zeros(rows),
-            "pieces": np.zeros((rows, shape.degree, shape.width)),
+            "depth": np.empty(rows),
+            "pieces": np.empty((rows + 1, shape.degree, shape.width)),
             "arc": np.empty(arcs, tables.ARC),
             "transition": np.empty(transitions, tables.TRANSITION),
             "before": np.empty((transitions, shape.width)),
             "after": np.empty((transitions, shape.width)),
             "alternatives": np.empty(transitions * shape.edges, np.int32),
         }
-        table = self.table
+        table, self._rows = self.table, rows
         table.row_room, table.arc_room, table.transition_room = rows, arcs, transitions
-        table.rows = table.arcs = table.transitions = table.alternatives_used = 0
         for name, column in self._columns.items():
             setattr(table, name, column.ctypes.data)
+        self._reset()
+
+    def _reset(self) -> None:
+        table = self.table
+        table.rows = table.arcs = table.transitions = table.alternatives_used = 0
 
     def _written(self) -> dict[str, Array]:
         table = self.table
         rows, transitions = table.rows, table.transitions
-        used = dict.fromkeys(("times", "values", "outputs", "depth", "pieces"), rows)
-        used |= dict.fromkeys(("transition", "before", "after"), transitions)
-        used |= {"arc": table.arcs, "alternatives": table.alternatives_used}
-        return {name: column[: used[name]] for name, column in self._columns.items()}
+        used = {name: self._columns[name][:rows] for name in BY_ROW}
+        used |= {name: self._columns[name][:transitions] for name in BY_TRANSITION}
+        used["pieces"] = self._columns["pieces"][: rows + 1]
+        used["arc"] = self._columns["arc"][: table.arcs]
+        used["alternatives"] = self._columns["alternatives"][: table.alternatives_used]
+        return used
 
     def whole(self) -> dict[str, Array]:
-        """Every column from the start of the run."""
+        """Take away every column from the start of the run.
+
+        ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it
+        leaves it.
+        """
         chunks = [*self._full, self._written()]
-        if len(chunks) == 1:
-            return chunks[0]
-        return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+        chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
+        self._full = []
+        if len(chunks) > 1:
+            whole = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0] if name != "pieces"}
+            pieces = [chunk["pieces"][:-1] for chunk in chunks]
+            whole["coefficients"] = np.concatenate([pieces[0][1:], *pieces[1:], chunks[-1]["pieces"][-1:]])
+        else:
+            whole = chunks[0]
+            whole["coefficients"] = whole.pop("pieces")[1:]
+            if self._rows * self._shape.row_bytes <= MOST_KEPT:
+                return {name: column.copy() for name, column in whole.items()}
+        self._rows, self._columns = 0, {}
+        return whole
 
 
-def execution_columns(whole: dict[str, Array], program: Program, states: tuple[str, ...]) -> dict[str, Any]:
-    """Make an execution's arrays of whole columns; ``states`` are those the run began with."""
-    arcs = tuple(_arcs(whole, program, states))
-    width = max(len(arc.states) for arc in arcs)
-    pieces = np.zeros_like(whole["pieces"])
-    pieces[:-1] = whole["pieces"][1:]  # here a row's piece leads to it, there it leaves it
-    return {
-        "times": whole["times"],
-        "values": np.ascontiguousarray(whole["values"][:, :width]),
-        "outputs": whole["outputs"],
-        "depth": whole["depth"],
-        "coefficients": np.ascontiguousarray(pieces[:, :, :width]),
-        "arcs": arcs,
-    }
-
-
-def _arcs(whole: dict[str, Array], program: Program, states: tuple[str, ...]) -> Iterator[Arc]:
+def arcs_of(whole: dict[str, Array], program: Program, states: tuple[str, ...]) -> Iterator[Arc]:
+    """Make the arcs of whole columns; ``states`` are those the run began with."""
     rows = len(whole["times"])
     opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
     ends = [first - 1 for first, *_ in opened[1:]] + [rows - 1]

@@ -81,8 +81,8 @@ typedef struct {
   double *times;   /* (row) */
   double *values;  /* (row, width) */
   double *outputs; /* (row, outputs) */
-  double *depth;   /* (row), zero where not written */
-  double *pieces;  /* (row, degree, width), zero where not written */
+  double *depth;   /* (row) */
+  double *pieces;  /* (row, degree, width) */
   hs_arc *arc;
   hs_transition *transition;
   double *before, *after;  /* (transition, width) */

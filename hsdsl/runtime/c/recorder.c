@@ -16,6 +16,16 @@ HS_INLINE int room(hs_run *run) {
          make_chunk(run);
 }
 
+/* Keep a piece, zero where it has nothing: of lower degree, or in a mode with fewer states. */
+HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece, double *kept) {
+  const int w = run->width, degree = run->method->degree, used = piece ? piece->degree : 0;
+  for (int m = 0; m < used; m++) {
+    copy(kept + m * w, piece->c + m * w, n);
+    for (int s = n; s < w; s++) kept[m * w + s] = 0.0;
+  }
+  for (int i = used * w; i < degree * w; i++) kept[i] = 0.0;
+}
+
 HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polynomial *piece, double depth,
                       hs_routine *outputs, const double *p) {
   hs_chunk *chunk = &run->task->chunk;
@@ -26,13 +36,10 @@ HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polyno
   chunk->times[row] = t;
   copy(values, x, n);
   for (int s = n; s < w; s++) values[s] = NAN;
-  if (depth != 0.0) chunk->depth[row] = depth;
+  chunk->depth[row] = depth;
   if (m && (!outputs || outputs(p, t, x, chunk->outputs + row * m)))
     for (int i = 0; i < m; i++) chunk->outputs[row * m + i] = NAN;
-  if (piece && run->method->degree > 0) {
-    double *kept = chunk->pieces + row * run->method->degree * w;
-    for (int i = 0; i < piece->degree; i++) copy(kept + i * w, piece->c + i * w, n);
-  }
+  if (run->method->degree > 0) write_piece(run, n, piece, chunk->pieces + row * run->method->degree * w);
   chunk->rows++;
   run->row++;
   run->task->now = t;

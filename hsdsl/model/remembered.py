@@ -1,0 +1,56 @@
+"""What was prepared for the last few calls, found by their arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from threading import Lock
+from typing import Any, Generic, TypeVar, cast
+
+Value = TypeVar("Value")
+
+
+class Remembered(Generic[Value]):
+    """The last ``most`` values, by key; of a key None nothing is kept."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._values: dict[Hashable, Value] = {}
+        self._lock = Lock()
+
+    def find(self, key: Hashable | None) -> Value | None:
+        """Return what was kept under a key."""
+        return self._values.get(key)
+
+    def keep(self, key: Hashable | None, value: Value) -> None:
+        """Keep a value, and forget the oldest where there are too many."""
+        if key is None:
+            return
+        with self._lock:
+            self._values[key] = value
+            while len(self._values) > self._most:
+                del self._values[next(iter(self._values))]
+
+
+def key_of(*arguments: Any) -> Hashable | None:
+    """Return a key that calls share only if their arguments are the same; None where they are not plain data."""
+    try:
+        return tuple(map(_key, arguments))
+    except TypeError:
+        return None
+
+
+def _key(value: Any) -> Hashable:
+    kind: type[Any] = type(value)
+    if value is None or kind is str:
+        return value
+    if kind is float:
+        return value if value else repr(value)  # zeros of both signs are equal
+    if kind is int or kind is bool:
+        return kind, value  # which equal floats
+    if kind is dict:
+        return tuple((name, _key(item)) for name, item in value.items())
+    if kind is list or kind is tuple:
+        return kind, tuple(map(_key, value))
+    if isinstance(value, Mapping):
+        return _key(dict(cast("Mapping[Any, Any]", value)))
+    raise TypeError(f"a {kind.__name__} is not plain data")

@@ -1,0 +1,114 @@
+"""Where the compiled loop works: its task and all of its memory, used again by the next run.
+
+To fetch fresh memory from the system costs more than a short run.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from threading import Event
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from hsdsl.integrators.stepper import State
+from hsdsl.runtime import tables
+from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate.chunks import Chunks, Shape, grown
+
+VISITED = 64
+MOST_KEPT = 4  # desks of one model and method
+
+
+class Desk:
+    """One task with its memory. One run works there at a time."""
+
+    def __init__(self, compiled: CompiledModel, method: tables.Method, shape: Shape) -> None:
+        model = compiled.table
+        self.task = tables.Task()
+        self.pressed, self.failed = Event(), list[BaseException]()
+        self.chunks = Chunks(self.task.chunk, shape)
+        self._width = model.width
+        self._workspace = np.empty(compiled.workspace(method))
+        self._x, self._slope = np.empty(self._width), np.empty(self._width)
+        self._visited = [grown(self.task.visited, VISITED, self._width)]  # the last is in use
+        self.task.model, self.task.method = ctypes.pointer(model), ctypes.pointer(method)
+        self.task.workspace = self._workspace.ctypes.data
+        self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
+        self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
+        _desks[ctypes.addressof(self.task)] = self
+
+    def clear(self, rows: float) -> None:
+        """Make ready for a run that may write about so many rows."""
+        self.pressed.clear()
+        self.failed.clear()
+        self.chunks.clear(rows)
+        if len(self._visited) > 1:  # a large set takes long to forget
+            self._visited = [grown(self.task.visited, VISITED, self._width)]
+        self.task.now, self.task.made = 0.0, 0
+
+    def x(self, dimension: int) -> State:
+        """The state the run stopped at."""
+        return tuple(self._x[:dimension].tolist())
+
+    def slope(self, dimension: int) -> State:
+        """The flow there, where it was stuck."""
+        return tuple(self._slope[:dimension].tolist())
+
+    def more_rows(self) -> int:
+        """Make room in the chunk; what `flush` answers."""
+        try:
+            self.chunks.flush()
+        except BaseException as error:  # none can pass through C
+            self.failed.append(error)
+            return 2
+        return int(self.pressed.is_set())
+
+    def more_visited(self, larger: tables.Visited) -> int:
+        """Make room for twice as many visited states."""
+        try:
+            self._visited.append(grown(larger, 2 * self.task.visited.room, self._width))
+        except BaseException as error:
+            self.failed.append(error)
+            return 1
+        return 0
+
+
+class Desks:
+    """The free desks of one model and method."""
+
+    def __init__(self, compiled: CompiledModel, method: tables.Method, shape: Shape) -> None:
+        self._made_of = compiled, method, shape
+        self._free: list[Desk] = []
+
+    def take(self) -> Desk:
+        """Return a desk that nobody works at."""
+        try:
+            return self._free.pop()
+        except IndexError:
+            return Desk(*self._made_of)
+
+    def leave(self, desk: Desk) -> None:
+        """Let the next run have a desk."""
+        if len(self._free) < MOST_KEPT:
+            self._free.append(desk)
+
+
+# The three functions that C calls are made once; they find the desk by its task's place in memory.
+_desks: WeakValueDictionary[int, Desk] = WeakValueDictionary()
+
+
+def _answer_flush(task: int) -> int:
+    return _desks[task].more_rows()
+
+
+def _answer_poll(task: int) -> int:
+    return int(_desks[task].pressed.is_set())
+
+
+def _answer_grow(task: int, larger: Any) -> int:
+    return _desks[task].more_visited(larger.contents)
+
+
+_flush, _poll, _grow = tables.Ask(_answer_flush), tables.Ask(_answer_poll), tables.Grow(_answer_grow)

@@ -1,0 +1,106 @@
+"""A run as far as its arguments decide it; to run it again costs little more than the loop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Number
+from hsdsl.execution import Execution, Stop
+from hsdsl.integrators.stepper import State
+from hsdsl.kernel import Kernel
+from hsdsl.program import Program
+from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
+from hsdsl.simulate.control import make_control
+from hsdsl.simulate.entry import enter
+from hsdsl.simulate.located import located
+from hsdsl.simulate.paoli_schatzman import paoli_schatzman
+from hsdsl.simulate.recorder import Progress, Recorder
+from hsdsl.simulate.relaxed import relaxed
+from hsdsl.simulate.result import Written, from_recorder
+from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.stops import interrupted
+from hsdsl.simulate.timeline import Timeline, make_timeline
+
+SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {
+    "relaxed": relaxed,
+    "located": located,
+    "paoli-schatzman": paoli_schatzman,
+}
+Watch = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A program, its numbers, and where it starts; ``plan`` is given where the compiled loop is to run it."""
+
+    program: Program
+    kernel: Kernel
+    settings: Settings
+    timeline: Timeline
+    mode: int
+    states: tuple[str, ...]
+    x: State
+    plan: CompiledPlan | None
+
+    def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
+        """Run to the end.
+
+        ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
+        An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
+        """
+        settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
+        degree = settings.method.degree if settings.method else 0
+        recorder = Recorder(arithmetic, settings.until, degree, len(program.outputs))
+        control = make_control(settings, arithmetic)
+        run, spent = Run(program, self.kernel, self.timeline, settings, control, recorder), dict(seconds or {})
+        if self.plan is not None:
+            return self._by_compiled_loop(run, self.plan, watch, spent)
+        return self._by_python_loop(run, watch, spent)
+
+    def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        if watch is not None:
+            watch(run.recorder)
+        zero = run.arithmetic.zero
+        began = time.perf_counter()
+        try:
+            here = enter(run, self.mode, self.states, zero, self.x, tuple(zero for _ in self.x))
+            stop = SCHEMES[self.settings.scheme](run, here)
+        except KeyboardInterrupt:
+            if not run.recorder.arcs:
+                raise
+            stop = interrupted(run.recorder.now)
+        spent["simulate"] = time.perf_counter() - began
+        return from_recorder(run, stop, spent)
+
+    def _by_compiled_loop(
+        self, run: Run, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]
+    ) -> Execution:
+        under_way = CompiledRun(run, plan, plan.desks.take())
+        if watch is not None:
+            watch(under_way)
+        began = time.perf_counter()
+        stop, whole = under_way.follow()
+        spent["simulate"] = time.perf_counter() - began
+        if watch is None:  # else someone may look at the desk for longer than the run lasts
+            plan.desks.leave(under_way.desk)
+        return Written(run, whole, self.states).execution(stop, spent)
+
+
+def prepare(
+    program: Program,
+    kernel: Kernel,
+    settings: Settings,
+    parameters: Sequence[Number],
+    mode: int,
+    states: tuple[str, ...],
+    x: State,
+    compiled: CompiledModel | None = None,
+) -> Prepared:
+    """Prepare a run from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given."""
+    timeline = make_timeline(program, kernel, parameters, settings.until)
+    plan = None if compiled is None else CompiledPlan(compiled, settings, timeline, mode, x)
+    return Prepared(program, kernel, settings, timeline, mode, states, x, plan)

@@ -1,0 +1,149 @@
+"""What a run has written, as an execution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hsdsl.arithmetic import Number
+from hsdsl.execution import Arc, Array, Execution, Point, Stop, Transition, Verdict
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.chunks import arcs_of, transitions_of
+from hsdsl.simulate.paoli_schatzman import NOTES
+from hsdsl.simulate.recorder import Recorder
+from hsdsl.simulate.run import Run
+from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.stops import show
+
+
+def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
+    """Make the execution of what the Python loop has recorded."""
+    columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
+    return Execution(
+        **_about(run, stop, seconds, "python"),
+        settings=described(run.settings),
+        transitions=transitions,
+        final=_final(columns["arcs"][-1], columns, run.program.outputs),
+        verdict=verdict(run.settings, transitions, run.recorder),
+        **columns,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What the compiled loop has written in a run that began with ``states``."""
+
+    run: Run
+    whole: dict[str, Array]
+    states: tuple[str, ...]
+
+    def execution(self, stop: Stop, seconds: dict[str, float]) -> Execution:
+        """Make the execution: its arrays now, what is made of objects when it is first asked for.
+
+        Of a short run those objects would take longer than the run.
+        """
+        whole, width = self.whole, self._width()
+        arrays = {name: whole[name] for name in ("times", "values", "outputs", "depth", "coefficients")}
+        if width < whole["values"].shape[1]:
+            for name in ("values", "coefficients"):
+                arrays[name] = np.ascontiguousarray(whole[name][..., :width])
+        later: dict[str, Callable[[Execution], Any]] = {
+            "settings": lambda _: described(self.run.settings),
+            "transitions": lambda _: tuple(transitions_of(whole, self.run.program)),
+            "arcs": lambda _: self._arcs(),
+            "final": self._final,
+            "verdict": self._verdict,
+        }
+        return Execution.deferred(later, **_about(self.run, stop, seconds, "c"), **arrays)
+
+    def _arcs(self) -> tuple[Arc, ...]:
+        return tuple(arcs_of(self.whole, self.run.program, self.states))
+
+    def _width(self) -> int:
+        """How many states the largest mode has that the run was in."""
+        sizes = {len(mode.states) for mode in self.run.program.modes if mode.states or not mode.final}
+        if sizes == {len(self.states)} == {self.whole["values"].shape[1]}:
+            return len(self.states)
+        return max(len(arc.states) for arc in self._arcs())
+
+    def _final(self, execution: Execution) -> Point:
+        return _final(execution.arcs[-1], self.whole, execution.output_names)
+
+    def _verdict(self, execution: Execution) -> Verdict:
+        return verdict(self.run.settings, execution.transitions, self.run.recorder)
+
+
+def _about(run: Run, stop: Stop, seconds: dict[str, float], engine: str) -> dict[str, Any]:
+    program, method = run.program, run.settings.method
+    return {
+        "model": program.path,
+        "digest": program.digest,
+        "engine": engine,
+        "scheme": run.settings.scheme,
+        "method": method.name if method else "two-step",
+        "stop": stop,
+        "output_function": partial(output_values, run),
+        "output_names": program.outputs,
+        "seconds": seconds,
+        "title": program.title,
+        "digits": run.arithmetic.digits,
+    }
+
+
+def _native(value: Any) -> Number:
+    """Return a column's number as Python's own (NumPy has its own float)."""
+    return float(value) if isinstance(value, np.float64) else value
+
+
+def _final(last: Arc, columns: Mapping[str, Any], outputs: tuple[str, ...]) -> Point:
+    row, width = last.last, len(last.states)
+    return Point(
+        time=_native(columns["times"][row]),
+        mode=last.mode,
+        jump=last.jump,
+        kind=last.kind,
+        state={s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)},
+        outputs={name: _native(v) for name, v in zip(outputs, columns["outputs"][row], strict=True)},
+    )
+
+
+def output_values(run: Run, mode: str, t: Number, x: State) -> State:
+    """Outputs at a state of a run, the input taken on the segment that starts at or holds t."""
+    index = [m.name for m in run.program.modes].index(mode)
+    if len(run.program.modes[index].states) != len(x):
+        return (run.arithmetic.functions["nan"],) * len(run.program.outputs)
+    return run.kernel.bind(index, run.timeline.at(t).data).outputs(t, *x)
+
+
+def described(settings: Settings) -> dict[str, Any]:
+    """Return the settings that governed the run, by the names of the model file."""
+    samples = settings.samples if isinstance(settings.samples, int | None) else list(settings.samples)
+    size = {"step": settings.step} if settings.tolerance is None else {"tolerance": settings.tolerance}
+    return {
+        "until": settings.until,
+        **size,
+        **({"relaxation": settings.relaxation} if settings.method else {}),
+        "max_transitions": settings.max_transitions,
+        **({} if samples is None else {"samples": samples}),
+    }
+
+
+def verdict(settings: Settings, transitions: Sequence[Transition], recorder: Recorder) -> Verdict:
+    """Say what is known of the theorem's hypotheses for this run: what nothing checks yet is said."""
+    if settings.one_stop is not None:
+        return Verdict("unknown", NOTES)
+    if recorder.departures:
+        return Verdict("left", (*recorder.departures, *recorder.doubts))
+    reasons = [*recorder.doubts, "nothing checks yet whether the theorem's hypotheses hold for this run"]
+    at_once = [t for t in transitions if t.entry]
+    if at_once:
+        first = at_once[0]
+        reasons.append(
+            f"{len(at_once)} transition{'s' * (len(at_once) > 1)} fired at once on entry, the first {first.edge} at "
+            f"t = {show(first.time)}: the state entered {first.source} outside its domain"
+        )
+    return Verdict("unknown", tuple(reasons))
