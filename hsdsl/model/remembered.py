@@ -40,7 +40,7 @@ def key_of(*arguments: Any) -> Hashable | None:
 
 
 def _key(value: Any) -> Hashable:
-    kind: type[Any] = type(value)
+    kind = cast("type[Any]", type(value))
     if value is None or kind is str:
         return value
     if kind is float:
