@@ -2,11 +2,11 @@
 
 A step is collocation at the nodes (4 - sqrt 6)/10, (4 + sqrt 6)/10 and 1: the polynomial of degree 3 from the step's
 start that has the flow's slope at these three times. It is L-stable: what decays fast is gone after one step, however
-long. Weights and inner polynomial follow from the nodes, in whatever numbers are computed with.
+long.
 
-The slopes at the nodes solve a system of equations, by simplified Newton iterations that go on to round-off, so that a
-step's end is a smooth function of its length, and crossings can be solved on it. Where they do not settle quickly the
-step is too long, and a shorter one is tried.
+What a step must know is expensive: derivatives of the flow, factors of two matrices, a first guess. So what one step
+leaves is kept for the next: the derivatives as long as the iterations converge fast, the factors as long as the step
+keeps its length too, and the guess is the last polynomial, gone on with.
 
 E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, IV.5 and IV.8
 (doi:10.1007/978-3-642-05221-7).
@@ -14,22 +14,17 @@ E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 19
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from math import log2
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.integrators.linear import Factors, Matrix, Singular, factored
+from hsdsl.integrators.collocation import coefficients
+from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
+from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConvergence
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
 
-SLOW = 0.5  # an iteration that gains less than this factor is one of too long a step, or at round-off
-ROUNDING = 2**10  # units of round-off, relative to 1 + |x|: a correction this small may be all noise
-SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
-
-
-class NoConvergence(ValueError):
-    """The equations of a step are not solved by the iteration: the step is too long."""
+RENEWED = 1e-3  # where an iteration leaves more than this of the one before, derivatives are too old for the next step
 
 
 @dataclass(frozen=True)
@@ -49,164 +44,161 @@ class RadauMethod:
 RADAU = RadauMethod()
 
 
-@dataclass(frozen=True)
-class Coefficients:
-    """Coefficients in one number type.
-
-    Attributes
-    ----------
-    nodes : tuple of Number
-        The three c_i.
-    inner : tuple of tuple of Number
-        Row i has the coefficients of s, s**2, s**3 in the weight b_i(s) of slope i: the state at the share s of a step
-        is x + h sum_i b_i(s) k_i.
-    a : tuple of tuple of Number
-        a_ij = b_j(c_i); the last row is the weights of the step itself.
-    real : Number
-        The real eigenvalue of the inverse of a.
-    estimate : tuple of Number
-        Weights of the slopes in the embedded method's defect, beside the flow at the step's start.
-    share : Number
-        Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
-    values, slope : tuple of Number
-        Weights of the slopes in the polynomial and in its derivative there.
-    """
-
-    nodes: State
-    inner: tuple[State, ...]
-    a: tuple[State, ...]
-    real: Number
-    estimate: State
-    share: Number
-    values: State
-    slope: State
-
-
-@cache
-def coefficients(arithmetic: Arithmetic) -> Coefficients:
-    """Make the coefficients in a number type."""
-    one = arithmetic.zero + 1
-    root = arithmetic.sqrt(6 * one)
-    nodes = ((4 - root) / 10, (4 + root) / 10, one)
-    inner: list[State] = []
-    for i, c in enumerate(nodes):
-        p, q = (other for j, other in enumerate(nodes) if j != i)
-        scale = (c - p) * (c - q)
-        inner.append((p * q / scale, -(p + q) / (2 * scale), one / (3 * scale)))
-    share = (6 - root) / 10
-    *a, values = (tuple(c * (w[0] + c * (w[1] + c * w[2])) for w in inner) for c in (*nodes, share))
-    slope = tuple(w[0] + share * (2 * w[1] + share * 3 * w[2]) for w in inner)
-    cubic = arithmetic.functions["pow"](3 * one, one / 3)
-    increments = ((-13 - 7 * root) / 3, (-13 + 7 * root) / 3, -one / 3)  # of h sum_j a_ij k_j
-    estimate = tuple(sum((e * row[j] for e, row in zip(increments, a, strict=True)), one * 0) for j in range(3))
-    return Coefficients(nodes, tuple(inner), tuple(a), 3 + cubic * cubic - cubic, estimate, share, values, slope)
-
-
 def radau_stepper(jacobian: Routine, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
 
-    The stages of a step are its three slopes and, fourth, the error estimate by h.
+    The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
+    called with: they are for one stretch of flow.
     """
-    known = coefficients(arithmetic)
-    allowed = max(ROUNDING * arithmetic.unit, SHARE * (tolerance or 0))
+    steps = Steps(jacobian, tolerance, arithmetic)
+    return Stepper(RADAU.name, steps.step, steps.piece, lambda h, stages, end: stages[3], landing=steps.landing)
 
-    def step(flow: Flow, t: Number, h: Number, x: State, slope: State) -> tuple[State, Stages]:
+
+class Steps:
+    """Steps along one stretch of flow, and what one leaves for the next.
+
+    Attributes
+    ----------
+    derived, factorings, iterations : int
+        How often derivatives were asked for and matrices were factored, and how many iterations there were.
+    """
+
+    def __init__(self, jacobian: Routine, tolerance: Number | None, arithmetic: Arithmetic) -> None:
+        self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
+        self._convergence = Convergence(tolerance, arithmetic)
+        self._known = coefficients(arithmetic)
+        self._one = arithmetic.zero + 1
+        self._rows: Matrix | None = None
+        self._derived_at: Number = arithmetic.zero
+        self._factored_for: Number = arithmetic.zero
+        self._factors: tuple[Factors, ComplexFactors] | None = None
+        self._last: tuple[Number, Number, Increments] | None = None
+        self.derived = self.factorings = self.iterations = 0
+
+    def step(self, flow: Flow, t: Number, h: Number, x: State, slope: State) -> tuple[State, Stages]:
+        """Try a step, solved as well as its tolerance asks for."""
         if not x:
             return (), ((), (), (), ())
-        flat = jacobian(t, *x)
-        rows = [list(flat[i : i + len(x)]) for i in range(0, len(flat), len(x))]
-        slopes = _solved(flow, t, h, x, rows, known, allowed, arithmetic)
-        inside = flow(t + known.share * h, *_moved(x, h, known.values, slopes))
-        error = _estimate(h, rows, slope, inside, slopes, known)
-        return _moved(x, h, known.a[-1], slopes), (*slopes, error)
+        found = self._solved(flow, t, h, x, exactly=self._tolerance is None)
+        self._last = t, h, found
+        error = self._estimate(flow, t, h, x, slope, found) if self._tolerance is not None else ()
+        return tuple(_sum(x, found[2])), (*map(tuple, found), error)
+
+    def landing(self, flow: Flow, t: Number, h: Number, x: State, slope: State) -> tuple[State, Stages]:
+        """Make a part of the last step, solved to round-off: its end is a smooth function of its length."""
+        if not x:
+            return (), ((), (), (), ())
+        found = self._solved(flow, t, h, x, exactly=True)
+        return tuple(_sum(x, found[2])), (*map(tuple, found), ())
 
     def piece(
-        flow: Flow, t: Number, h: Number, x: State, z: State, stages: Stages, slope: State, end: State
+        self, flow: Flow, t: Number, h: Number, x: State, z: State, stages: Stages, slope: State, end: State
     ) -> Polynomial:
-        zero = tuple(a * 0 for a in x)
-        return tuple(_moved(zero, h, weights, stages[:3]) for weights in zip(*known.inner, strict=True))
+        """The polynomial through the increments."""
+        return tuple(tuple(_weighted(row, stages[:3])) for row in self._known.powers)
 
-    def error(h: Number, stages: Stages, end: State) -> State:
-        return tuple(h * e for e in stages[3])
+    def _solved(self, flow: Flow, t: Number, h: Number, x: State, exactly: bool) -> Increments:
+        """Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do."""
+        if self._rows is None or (self._convergence.rate > RENEWED and self._derived_at != t):
+            self._derive(t, x)
+        settle = self._convergence.to_roundoff if exactly else self._convergence.to_tolerance
+        guess = self._guess(t, h, x)
+        if self._derived_at == t:
+            return settle(x, self._iterations(flow, t, h, x, guess))
+        try:
+            return settle(x, self._iterations(flow, t, h, x, guess))
+        except NoConvergence:
+            self._derive(t, x)
+            return settle(x, self._iterations(flow, t, h, x, guess))
 
-    return Stepper(RADAU.name, step, piece, error)
+    def _derive(self, t: Number, x: State) -> None:
+        flat, n = self._jacobian(t, *x), len(x)
+        self._rows, self._derived_at, self._factors = [list(flat[i : i + n]) for i in range(0, n * n, n)], t, None
+        self.derived += 1
+
+    def _factor(self, h: Number) -> tuple[Factors, ComplexFactors]:
+        """Factor gamma - h J and alpha - i beta - h J, unless that is done."""
+        if self._factors is None or self._factored_for != h:
+            assert self._rows is not None
+            known, zero, n = self._known, self._arithmetic.zero, len(self._rows)
+            real = [[-h * d for d in row] for row in self._rows]
+            shifted = [list(row) for row in real]
+            turned = [[zero] * n for _ in real]
+            for i in range(n):
+                real[i][i] = known.gamma + real[i][i]
+                shifted[i][i] = known.alpha + shifted[i][i]
+                turned[i][i] = -known.beta
+            self._factored_for = h
+            self.factorings += 1
+            try:
+                self._factors = factored(real), factored_complex(shifted, turned)
+            except Singular as problem:
+                self._factors = None
+                raise NoConvergence(str(problem)) from None
+        return self._factors
+
+    def _guess(self, t: Number, h: Number, x: State) -> Increments:
+        """Go on with the last step's polynomial: behind its end, or inside it where it was tried from here."""
+        if self._last is not None:
+            start, length, z = self._last
+            before = t == start + length
+            if before or t == start:
+                c = [_weighted(row, z) for row in self._known.powers]
+                share, one = h / length, self._one if before else self._arithmetic.zero
+                base = z[2] if before else [a * 0 for a in x]
+                at = [one + node * share for node in self._known.nodes]
+                return _three([s * (a + s * (b + s * d)) - e for a, b, d, e in zip(*c, base, strict=True)] for s in at)
+        return _three([a * 0 for a in x] for _ in range(3))
+
+    def _iterations(self, flow: Flow, t: Number, h: Number, x: State, z: Increments) -> Iterator[Iteration]:
+        """Iterate by Newton's method."""
+        known = self._known
+        real, turning = self._factor(h)
+        u, v, w = (_weighted(row, z) for row in known.unmix)
+        while True:
+            self.iterations += 1
+            wanted = [flow(t + c * h, *_sum(x, k)) for c, k in zip(known.nodes, z, strict=True)]
+            f, g, k = (_weighted(row, wanted) for row in known.unmix)
+            du = real.solve([h * a - known.gamma * b for a, b in zip(f, u, strict=True)])
+            dv, dw = turning.solve(
+                [h * a - (known.alpha * b + known.beta * c) for a, b, c in zip(g, v, w, strict=True)],
+                [h * a - (known.alpha * c - known.beta * b) for a, b, c in zip(k, v, w, strict=True)],
+            )
+            u, v, w = _sum(u, du), _sum(v, dv), _sum(w, dw)
+            z = _three(_weighted(row, (u, v, w)) for row in known.mix)
+            largest = [max(abs(a), abs(b), abs(c)) for a, b, c in zip(du, dv, dw, strict=True)]
+            total = largest[0] * 0
+            for a, b, c in zip(du, dv, dw, strict=True):
+                total = total + (abs(a) + abs(b) + abs(c))
+            if not self._arithmetic.isfinite(total):
+                raise NoConvergence("an iteration that grows beyond all numbers")
+            yield largest, z
+
+    def _estimate(self, flow: Flow, t: Number, h: Number, x: State, slope: State, z: Increments) -> State:
+        """Estimate the error of a step's end and of the curve inside it, for each state the larger of the two.
+
+        Both are (gamma - h J)^-1 times a defect. That of Hairer and Wanner (IV.8.19), from the flow at the start, is
+        the embedded method's; over a decay that the step is too long to show it stays as large as what decays. For
+        stiff states that follow a slow motion it is far too small for the curve, so the flow is held against the
+        polynomial at one more point, where the polynomial's slope is farthest off.
+        """
+        known = self._known
+        inside = flow(t + known.share * h, *_sum(x, _weighted(known.values, z)))
+        real, _ = self._factor(h)
+        embedded = real.solve([h * f + e for f, e in zip(slope, _weighted(known.estimate, z), strict=True)])
+        along = real.solve([h * f - e for f, e in zip(inside, _weighted(known.slope, z), strict=True)])
+        return tuple(a if abs(a) >= abs(b) else b for a, b in zip(embedded, along, strict=True))
 
 
-def _moved(x: State, h: Number, weights: State, slopes: Stages) -> State:
-    """Move x along weighted slopes: x + h sum_i w_i k_i."""
-    return tuple(
-        a + h * (weights[0] * k + weights[1] * m + weights[2] * n) for a, k, m, n in zip(x, *slopes, strict=True)
-    )
+def _sum(x: State | Vector, y: State | Vector) -> Vector:
+    return [a + b for a, b in zip(x, y, strict=True)]
 
 
-def _solved(
-    flow: Flow,
-    t: Number,
-    h: Number,
-    x: State,
-    jacobian: Matrix,
-    known: Coefficients,
-    allowed: Number,
-    arithmetic: Arithmetic,
-) -> Stages:
-    """Solve k_i = f(t + c_i h, x + h sum_j a_ij k_j), beginning with k = 0, which is at the step's start."""
-    factors = _factored(_system(h, jacobian, known))
-    unit, n, zero, before = arithmetic.unit, len(x), arithmetic.zero, None
-    slopes: Stages = (tuple(zero for _ in x),) * 3
-    for _ in range(16 - 2 * int(log2(unit))):
-        stages = [_moved(x, h, row, slopes) for row in known.a]
-        wanted = [flow(t + c * h, *stage) for c, stage in zip(known.nodes, stages, strict=True)]
-        off = [f - k for row, ks in zip(wanted, slopes, strict=True) for f, k in zip(row, ks, strict=True)]
-        change = factors.solve(off)
-        slopes = tuple(
-            tuple(k + d for k, d in zip(ks, change[i * n : i * n + n], strict=True)) for i, ks in enumerate(slopes)
-        )
-        largest = [max(abs(change[i * n + s]) for i in range(3)) for s in range(n)]
-        size = max(h * d / (1 + abs(a)) for d, a in zip(largest, x, strict=True))
-        if not arithmetic.isfinite(size):
-            raise NoConvergence("an iteration that grows beyond all numbers")
-        rate = SLOW if not before else size / before
-        reach = [max(abs(stage[s]) for stage in (x, *stages)) for s in range(n)]
-        if size == 0 or (rate < SLOW and all(rate * h * d <= unit * a for d, a in zip(largest, reach, strict=True))):
-            return slopes
-        if before and rate >= SLOW:
-            if size <= allowed:
-                return slopes
-            raise NoConvergence("an iteration that does not settle")
-        before = size
-    return slopes
+def _weighted(weights: State, vectors: Stages | Increments | list[State]) -> Vector:
+    p, q, r = weights
+    return [p * a + q * b + r * c for a, b, c in zip(*vectors, strict=True)]
 
 
-def _system(h: Number, jacobian: Matrix, known: Coefficients) -> Matrix:
-    """The matrix I - h a x J of the iteration, over the slopes at all nodes."""
-    n = len(jacobian)
-    matrix = [[-h * w * d for w in weights for d in row] for weights in known.a for row in jacobian]
-    for i in range(3 * n):
-        matrix[i][i] = 1 + matrix[i][i]
-    return matrix
-
-
-def _estimate(h: Number, jacobian: Matrix, slope: State, inside: State, slopes: Stages, known: Coefficients) -> State:
-    """Estimate the error of a step's end and of the curve inside it, by h, for each state the larger of the two.
-
-    Both are (g - h J)^-1 times a defect of slopes, g the real eigenvalue. That of Hairer and Wanner (IV.8.19), from the
-    flow at the start, is the embedded method's; over a decay that the step is too long to show it stays as large as
-    what decays. For stiff states that follow a slow motion it is far too small for the curve, so the flow is held
-    against the polynomial at one more point, where the polynomial's slope is farthest off.
-    """
-    matrix = [[-h * d for d in row] for row in jacobian]
-    for i, row in enumerate(matrix):
-        row[i] = known.real + row[i]
-    factors, zero, one = _factored(matrix), tuple(0 * f for f in slope), known.real * 0 + 1
-    defects = [
-        [f + e for f, e in zip(slope, _moved(zero, one, known.estimate, slopes), strict=True)],
-        [f - e for f, e in zip(inside, _moved(zero, one, known.slope, slopes), strict=True)],
-    ]
-    return tuple(max(pair, key=abs) for pair in zip(*map(factors.solve, defects), strict=True))
-
-
-def _factored(matrix: Matrix) -> Factors:
-    try:
-        return factored(matrix)
-    except Singular as problem:
-        raise NoConvergence(str(problem)) from None
+def _three(vectors: Iterator[Vector]) -> Increments:
+    a, b, c = vectors
+    return a, b, c

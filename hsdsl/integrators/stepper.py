@@ -37,6 +37,9 @@ class Stepper:
         ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
     gain : float
         By how much a step can enlarge the round-off of its stages: the sum of the absolute weights.
+    landing : callable or None
+        For implicit methods, whose stages are increments of the state: ``step`` for a part of the step just made,
+        solved to round-off.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Stepper:
     piece: Callable[[Flow, Number, Number, State, State, Stages, State, State], Polynomial]
     error: Callable[[Number, Stages, State], State] | None
     gain: float = 1.0
+    landing: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]] | None = None
 
 
 @cache

@@ -13,7 +13,7 @@ from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators.radau import NoConvergence
+from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import enter, left_domain
@@ -66,6 +66,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, (x,))
+    control.begin(x, slope)
     while t < limit:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
         while True:

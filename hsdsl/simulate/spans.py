@@ -12,7 +12,7 @@ from typing import Protocol
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators import TaylorMethod
-from hsdsl.integrators.radau import NoConvergence
+from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
@@ -90,6 +90,8 @@ class TableSteps:
             slope = self.slope if self.slope is not None and self.at_time == t else flow(t, *x)
         except DOMAIN_ERRORS:
             return NOT_FINITE
+        if self.slope is None:
+            control.begin(x, slope)
         h = control.h
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
@@ -131,17 +133,21 @@ class TableSteps:
             return NOT_FINITE
         self.slope, self.at_time = end, t1
 
+        part = method.landing or method.step
+
         def point(s: Number) -> tuple[Number, State]:
-            return (t1, z) if s == 1 else (t + s * h, method.step(flow, t, s * h, x, slope)[0] if s > 0 else x)
+            return (t1, z) if s == 1 else (t + s * h, part(flow, t, s * h, x, slope)[0] if s > 0 else x)
 
         def cut(s: Number) -> Polynomial:
             try:
-                q, shorter = method.step(flow, t, s * h, x, slope)
+                q, shorter = part(flow, t, s * h, x, slope)
                 return method.piece(flow, t, s * h, x, q, shorter, slope, flow(t + s * h, *q))
             except DOMAIN_ERRORS:
                 return shortened(piece, s)
 
         def sizes(s: Number) -> State:
+            if method.landing is not None:
+                return sizes_along(x, piece, s)
             largest = [max(abs(k) for k in column) for column in zip(*stages, strict=True)]
             return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
 
@@ -211,7 +217,7 @@ class SeriesSteps:
             return (t1, z) if s == 1 else (t + s * h, at(x, piece, s) if s > 0 else x)
 
         def sizes(s: Number) -> State:
-            return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
+            return sizes_along(x, piece, s)
 
         return Span(t, h, t1, x, z, piece, curves, ends, point, lambda s: shortened(piece, s), sizes)
 
@@ -252,6 +258,11 @@ class SeriesSteps:
         tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
         tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
         return tail and settles(abs(value(c, end * 0 + 1) - end), tolerance * largest, noise, k)
+
+
+def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
+    """The sums of the absolute terms of an interpolant."""
+    return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
 
 
 def interpolate(

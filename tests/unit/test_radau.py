@@ -14,8 +14,10 @@ from scipy.linalg import expm
 import hsdsl
 from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.backends.python import PythonKernel
-from hsdsl.integrators.linear import Singular, factored
-from hsdsl.integrators.radau import NoConvergence, coefficients, radau_stepper
+from hsdsl.integrators.collocation import coefficients
+from hsdsl.integrators.linear import Singular, factored, factored_complex
+from hsdsl.integrators.newton import NoConvergence
+from hsdsl.integrators.radau import radau_stepper
 
 MANY = multiprecision(50)
 MODELS = Path(__file__).parents[2] / "models"
@@ -56,16 +58,46 @@ def test_quadrature_of_order_five_and_no_more() -> None:
 def test_the_estimate_vanishes_up_to_degree_two_and_no_further() -> None:
     """Flow at the start and weighted slopes: the embedded method has order 3, so the estimate falls as h**4."""
     known = coefficients(MANY)
-    sums = [sum(e * c**k for e, c in zip(known.estimate, known.nodes, strict=True)) + (k == 0) for k in range(4)]
+    sums = [sum(e * c**k for e, c in zip(known.estimate, known.nodes, strict=True)) + (k == 1) for k in range(1, 5)]
     assert max(map(abs, sums[:3])) <= 64 * MANY.unit
     assert abs(sums[3]) > 0.01
-    matrix = [[(i == j) - known.real * w for j, w in enumerate(row)] for i, row in enumerate(known.a)]
-    assert abs(mp.det(mp.matrix([[mp.mpf(str(v)) for v in row] for row in matrix]))) <= 1e-13
+
+
+def test_one_real_and_one_complex_system() -> None:
+    """The similarity takes the inverse of a to its eigenvalues; a times that is the similarity again."""
+    known, zero = coefficients(MANY), MANY.zero
+    middle = [[known.gamma, zero, zero], [zero, known.alpha, known.beta], [zero, -known.beta, known.alpha]]
+
+    def product(p: Any, q: Any) -> list[list[Any]]:
+        return [
+            [sum((a * b for a, b in zip(row, column, strict=True)), zero) for column in zip(*q, strict=True)]
+            for row in p
+        ]
+
+    for found, wanted in (
+        (product(known.a, product(known.mix, middle)), known.mix),
+        (product(known.mix, known.unmix), [[zero + (i == j) for j in range(3)] for i in range(3)]),
+    ):
+        pairs = [(a, b) for row, line in zip(found, wanted, strict=True) for a, b in zip(row, line, strict=True)]
+        assert max(abs(a - b) for a, b in pairs) <= 256 * MANY.unit
+
+
+def test_increments_and_polynomial() -> None:
+    """The polynomial through increments of a cubic is the cubic, and so are its value and slope inside."""
+    known = coefficients(MANY)
+    z = [(c + 2 * c**2 - 3 * c**3,) for c in known.nodes]
+    found = [sum(w * k[0] for w, k in zip(row, z, strict=True)) for row in known.powers]
+    assert max(abs(f - w) for f, w in zip(found, (1, 2, -3), strict=True)) <= 256 * MANY.unit
+    s = known.share
+    assert (
+        abs(sum(w * k[0] for w, k in zip(known.values, z, strict=True)) - (s + 2 * s**2 - 3 * s**3)) <= MANY.unit * 64
+    )
+    assert abs(sum(w * k[0] for w, k in zip(known.slope, z, strict=True)) - (1 + 4 * s - 9 * s**2)) <= MANY.unit * 256
 
 
 def one_step(rate: float, h: float) -> tuple[float, float]:
     """End and error estimate of one step from 1 along x' = rate x."""
-    stepper = radau_stepper(lambda t, x: (rate,), None, FLOAT64)
+    stepper = radau_stepper(lambda t, x: (rate,), 1e-14, FLOAT64)
     z, stages = stepper.step(lambda t, x: (rate * x,), 0.0, h, (1.0,), (rate,))
     assert stepper.error is not None
     return z[0], stepper.error(h, stages, (rate * z[0],))[0]
@@ -179,7 +211,9 @@ def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float], t
     run = model(tmp_path, "{x: -sign(x)}", "x: 1", 2).simulate(scheme=scheme, **size)
     assert run.stop.reason == "step_underflow"
     assert abs(run.final.state["x"]) <= 1e-8
-    assert 1 - 1e-8 <= run.stop.time <= 1 + 1e-4
+    assert (
+        1 - 1e-8 <= run.stop.time <= 1 + 1e-2
+    )  # it gives up after ten thousand rejections, each of a step about as long as the tolerance
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
@@ -218,15 +252,30 @@ def test_a_mode_without_states(tmp_path: Path) -> None:
     assert hsdsl.load(path).simulate().stop.reason == "until"
 
 
-@pytest.mark.parametrize("size", [1, 2, 7])
+@pytest.mark.parametrize("size", [1, 2, 7, 40])
+def test_complex_linear_equations(size: int) -> None:
+    rng = np.random.default_rng(size)
+    real, imaginary = rng.normal(size=(2, size, size))
+    if size > 1:
+        real[0, 0] = imaginary[0, 0] = 0
+    right = np.arange(1.0, size + 1) - 1j
+    found = np.array(
+        factored_complex(real.tolist(), imaginary.tolist()).solve(right.real.tolist(), right.imag.tolist())
+    )
+    assert np.allclose((real + 1j * imaginary) @ (found[0] + 1j * found[1]), right, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 40])
 def test_linear_equations(size: int) -> None:
     matrix = np.random.default_rng(size).normal(size=(size, size))
     matrix[0, 0] = 0 if size > 1 else 1  # a pivot must be looked for
     right = np.arange(1.0, size + 1)
     found = factored(matrix.tolist()).solve(right.tolist())
-    assert np.allclose(matrix @ found, right, rtol=0, atol=1e-12)
+    assert np.allclose(matrix @ found, right, rtol=0, atol=1e-11)
 
 
 def test_a_singular_matrix() -> None:
     with pytest.raises(Singular):
         factored([[1.0, 2.0], [2.0, 4.0]])
+    with pytest.raises(Singular):
+        factored_complex([[1.0, 2.0], [2.0, 4.0]], [[0.0, 0.0], [0.0, 0.0]])

@@ -1,0 +1,112 @@
+"""When the iterations for an implicit step have done enough, and when they will not.
+
+They converge linearly, by a factor that the last two changes tell. What the next ones would still add follows from it.
+
+E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, IV.8
+(doi:10.1007/978-3-642-05221-7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from math import log2
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.integrators.linear import Vector
+from hsdsl.integrators.stepper import State
+
+Increments = tuple[Vector, Vector, Vector]
+Iteration = tuple[Vector, Increments]  # the largest change of each state, and the increments after it
+
+MOST = 7  # iterations of a step that has a tolerance
+LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
+DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
+SLOW = 0.5  # likewise for iterations that go on to round-off
+ROUNDING = 2**10  # units of round-off, relative to 1 + |x|: a correction this small may be all noise
+SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
+
+
+class NoConvergence(ValueError):
+    """The equations of a step are not solved by the iteration: the step is too long."""
+
+
+class Convergence:
+    """How iterations converge, over the steps of one stretch of flow.
+
+    Attributes
+    ----------
+    rate : Number
+        What the last iteration left of the one before it; 1 where that is not known, or they do not converge.
+    left : Number
+        What all that follow would have added to the last of a step, relative to it.
+    """
+
+    def __init__(self, tolerance: Number | None, arithmetic: Arithmetic) -> None:
+        self._tolerance, self._arithmetic = tolerance, arithmetic
+        self.rate = self.left = arithmetic.zero + 1
+
+    def to_tolerance(self, x: State, iterations: Iterator[Iteration]) -> Increments:
+        """Iterate until what is left is a small share of the tolerance.
+
+        Raises
+        ------
+        NoConvergence
+            It will not be, within the iterations that a step may take.
+        """
+        unit, tolerance, one = self._arithmetic.unit, self._tolerance, self._arithmetic.zero + 1
+        assert tolerance is not None
+        noise = ROUNDING * unit / tolerance
+        enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
+        left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
+        for count, (largest, z) in enumerate(iterations, 1):
+            size = _scaled(largest, x) / tolerance
+            if before is not None:
+                rate = size / before
+                if rate >= DIVERGING:
+                    if size <= noise:
+                        return z
+                    break
+                self.rate, left = rate, rate / (1 - rate)
+            ahead = left * size
+            if size == 0 or ahead <= enough:
+                self.left = left
+                return z
+            for _ in range(count, MOST if before is not None else count):
+                ahead = ahead * self.rate
+            if count == MOST or (before is not None and ahead > enough and size > noise):
+                break
+            before = size
+        self.rate = self.left = one
+        raise NoConvergence("an iteration that does not settle")
+
+    def to_roundoff(self, x: State, iterations: Iterator[Iteration]) -> Increments:
+        """Iterate until the next correction would be below the last digit, or they are all noise.
+
+        Raises
+        ------
+        NoConvergence
+            They become no smaller before that.
+        """
+        unit, before, z = self._arithmetic.unit, None, None
+        allowed = max(ROUNDING * unit, SHARE * (self._tolerance or 0))
+        for largest, z in islice(iterations, 16 - 2 * int(log2(unit))):
+            size = _scaled(largest, x)
+            rate = SLOW if not before else size / before
+            reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
+            if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
+                self.rate = rate
+                return z
+            if before and rate >= SLOW:
+                if size <= allowed:
+                    return z
+                self.rate = self._arithmetic.zero + 1
+                raise NoConvergence("an iteration that does not settle")
+            before = size
+        assert z is not None
+        return z
+
+
+def _scaled(largest: Vector, x: State) -> Number:
+    """The largest change relative to 1 + |x|."""
+    return max(d / (1 + abs(a)) for d, a in zip(largest, x, strict=True))
