@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import typer.main
+import click
 import yaml
 
 from hsdsl import cli, errors, integrators, schema
@@ -198,8 +198,9 @@ def callables() -> Iterator[tuple[str, str]]:
 def command_line() -> str:
     """Document every verb and option from the program itself."""
     parts = [COMMAND_LINE]
-    commands: dict[str, Any] = getattr(typer.main.get_command(cli.app), "commands", {})
-    for name, command in commands.items():
+    context = click.Context(cli.app)
+    for name in cli.VERBS:
+        command: Any = cli.app.get_command(context, name)
         parts.append(f"## hsdsl {name}\n\n{(command.help or '').strip()}\n\n")
         parameters = [p for p in command.params if p.name != "help"]
         rows = [(as_typed(p), (getattr(p, "help", None) or "").strip()) for p in parameters]

@@ -9,76 +9,71 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated, Any
+from importlib import import_module
+from typing import Any
 
-import typer
+import click
+from click.exceptions import Exit, NoSuchCommand
 
 from hsdsl import __version__
-from hsdsl.cli.chart import chart
-from hsdsl.cli.console import WRONG_USAGE
-from hsdsl.cli.distance import distance
-from hsdsl.cli.doctor import doctor
-from hsdsl.cli.explain import explain
-from hsdsl.cli.limited import limited
-from hsdsl.cli.lint import lint
-from hsdsl.cli.run import run
-from hsdsl.cli.schema import schema
-from hsdsl.cli.validate import validate
 
-INTERRUPTED = 130
-WrongWords: Any = typer.BadParameter.__mro__[2]  # ClickException, wherever typer has it from
+INTERRUPTED, WRONG_USAGE = 130, 2
+VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "schema", "doctor")
 
-app = typer.Typer(
+
+class _Verbs(click.Group):
+    """The verbs, each in a module of its name that is loaded when the verb is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        return getattr(import_module(f"hsdsl.cli.{cmd_name}"), cmd_name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in VERBS:
+            raise NoSuchCommand(args[0], possibilities=VERBS, ctx=ctx)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(
+    cls=_Verbs,
     name="hsdsl",
-    help="Hybrid systems written as mathematics in YAML: checked, simulated, measured.",
     no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
-READING = (run, validate, lint, distance, chart)  # verbs that read models
-for verb in (run, validate, lint, explain, distance, chart, schema, doctor):
-    app.command()(limited(verb) if verb in READING else verb)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        print(f"hsdsl {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(  # pyright: ignore[reportUnusedFunction]
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    pass
+@click.version_option(__version__, message="%(prog)s %(version)s", prog_name="hsdsl", help="Print the version.")
+def app() -> None:
+    """Hybrid systems written as mathematics in YAML: checked, simulated, measured."""
 
 
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
     _prepare_streams()
+    code = 0
     try:
-        code = app(standalone_mode=False)
+        with app.make_context("hsdsl", sys.argv[1:]) as context:
+            app.invoke(context)
         sys.stdout.flush()  # a full disk shows here rather than when the interpreter ends
-    except WrongWords as error:
+    except Exit as end:
+        code = end.exit_code
+    except click.ClickException as error:
         error.show()
         code = error.exit_code
-    except (typer.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt):
         print("interrupted", file=sys.stderr)
         code = INTERRUPTED
-    except (BrokenPipeError, SystemExit) as error:  # typer makes an exit of a broken pipe
-        if not isinstance(error, BrokenPipeError) and not isinstance(error.__context__, BrokenPipeError):
-            raise
+    except BrokenPipeError:
         _drop_output()  # nobody reads: nothing left to say
-        code = 0
     except OSError as error:
         _drop_output()
         print(f"hsdsl: the answer cannot be written: {error.strerror or error}", file=sys.stderr)
         code = WRONG_USAGE
-    sys.exit(code or 0)
+    sys.exit(code)
 
 
 def _prepare_streams() -> None:

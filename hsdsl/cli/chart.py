@@ -5,46 +5,64 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+import click
 
-from hsdsl.cli.console import errors_reported, say
+from hsdsl.cli.console import FILE, errors_reported, say
+from hsdsl.cli.limited import limited
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
 
 if TYPE_CHECKING:
     from hsdsl.chart import Row
 
-Model = Annotated[list[str], typer.Argument(help="Model files; FILE:1 is the second start of its reference.")]
 
-
+@click.command()
+@click.argument(
+    "models",
+    nargs=-1,
+    required=True,
+    metavar="MODEL...",
+    help="Model files; FILE:1 is the second start of its reference.",
+)
+@click.option("--schemes", metavar="A,B", help="Our schemes; all unless given.")
+@click.option("--methods", metavar="A,B", help="Our methods; all unless given.")
+@click.option("--engines", metavar="A,B", help="Our engines; all unless given.")
+@click.option("--tolerances", metavar="A,B", help="For adaptive methods and peers.")
+@click.option("--steps", metavar="A,B", help="For fixed-step methods.")
+@click.option("--against", metavar="A,B", help="Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all.")
+@click.option("--states", metavar="A,B", help="Take the error of these states only.")
+@click.option("--samples", metavar="N", default=2000, help="How many samples the error is taken at.")
+@click.option("--clearance", metavar="DT", default=1e-4, help="Samples nearer than this to an exact jump do not count.")
+@click.option("--digits", metavar="N", default=8, help="Digits of the reference where no exact execution is known.")
+@click.option("--rounds", metavar="N", default=5, help="Timed turns, after one that warms up.")
+@click.option("--patience", metavar="S", default=10.0, help="Slower tools get no tighter setting.")
+@click.option("--rho/--no-rho", default=True, help="Also compute rho of our runs.")
+@click.option("--out", type=FILE, metavar="FILE", help="Write the table: .csv.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw the chart: .png or .svg.")
+@click.option("--json", is_flag=True, help="Print one JSON object instead of the table.")
+@click.option("--quiet", "-q", is_flag=True, help="Print no table and no progress.")
+@limited
 def chart(
-    models: Model,
-    schemes: Annotated[str | None, typer.Option(metavar="A,B", help="Our schemes; all unless given.")] = None,
-    methods: Annotated[str | None, typer.Option(metavar="A,B", help="Our methods; all unless given.")] = None,
-    engines: Annotated[str | None, typer.Option(metavar="A,B", help="Our engines; all unless given.")] = None,
-    tolerances: Annotated[str | None, typer.Option(metavar="A,B", help="For adaptive methods and peers.")] = None,
-    steps: Annotated[str | None, typer.Option(metavar="A,B", help="For fixed-step methods.")] = None,
-    against: Annotated[
-        str | None,
-        typer.Option(metavar="A,B", help="Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."),
-    ] = None,
-    states: Annotated[str | None, typer.Option(metavar="A,B", help="Take the error of these states only.")] = None,
-    samples: Annotated[int, typer.Option(metavar="N", help="How many samples the error is taken at.")] = 2000,
-    clearance: Annotated[
-        float, typer.Option(metavar="DT", help="Samples nearer than this to an exact jump do not count.")
-    ] = 1e-4,
-    digits: Annotated[
-        int, typer.Option(metavar="N", help="Digits of the reference where no exact execution is known.")
-    ] = 8,
-    rounds: Annotated[int, typer.Option(metavar="N", help="Timed turns, after one that warms up.")] = 5,
-    patience: Annotated[float, typer.Option(metavar="S", help="Slower tools get no tighter setting.")] = 10.0,
-    rho: Annotated[bool, typer.Option("--rho/--no-rho", help="Also compute rho of our runs.")] = True,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table: .csv.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the chart: .png or .svg.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table and no progress.")] = False,
+    models: tuple[str, ...],
+    schemes: str | None,
+    methods: str | None,
+    engines: str | None,
+    tolerances: str | None,
+    steps: str | None,
+    against: str | None,
+    states: str | None,
+    samples: int,
+    clearance: float,
+    digits: int,
+    rounds: int,
+    patience: float,
+    rho: bool,
+    out: Path | None,
+    plot: Path | None,
+    json: bool,
+    quiet: bool,
 ) -> None:
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
     with errors_reported(json):

@@ -6,15 +6,19 @@ import sys
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import typer
+import click
+from click.exceptions import Exit
 
-from hsdsl.diagnose import as_json, render
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
-from hsdsl.report import dumps
-from hsdsl.simulate.recorder import Progress
+
+if TYPE_CHECKING:
+    from hsdsl.simulate.recorder import Progress
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
+FILE = click.Path(path_type=Path)
 FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
 
 
@@ -29,6 +33,9 @@ def errors_reported(json: bool) -> Generator[None]:
     try:
         yield
     except ModelError as error:
+        from hsdsl.diagnose import as_json, render
+        from hsdsl.report import dumps
+
         if json:
             print(dumps(as_json(error.diagnostics)))
         else:
@@ -36,15 +43,17 @@ def errors_reported(json: bool) -> Generator[None]:
             count = len(error.diagnostics)
             say(f"\n{count} error{'s' * (count > 1)}")
         contradiction = all(d.code == STEP_AND_TOLERANCE for d in error.diagnostics)
-        raise typer.Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
+        raise Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
     except UsageError as error:
         report_usage(error, json)
-        raise typer.Exit(WRONG_USAGE) from None
+        raise Exit(WRONG_USAGE) from None
 
 
 def report_usage(error: UsageError, json: bool) -> None:
     """Say what is wrong with a request."""
     if json:
+        from hsdsl.report import dumps
+
         empty = {"code": None, "path": None, "line": None, "column": None}
         print(dumps({"errors": [{**empty, "message": str(error), "hint": error.hint}]}))
     say(f"hsdsl: {error}" + (f"\n  hint: {error.hint}" if error.hint else ""))

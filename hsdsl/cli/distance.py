@@ -2,65 +2,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+import click
 
-from hsdsl.cli.console import errors_reported, say
+from hsdsl.cli.console import FILE, errors_reported, say
 from hsdsl.cli.distance_runs import check_picture, of_runs
+from hsdsl.cli.limited import limited
 from hsdsl.errors import UsageError
 
 
+@click.command()
+@click.argument(
+    "first",
+    type=FILE,
+    metavar="A",
+    help="The model file, or a run: a saved one (.npz), or a model's own experiment.",
+)
+@click.argument("second", type=FILE, metavar="[B]", required=False, help="A second run.")
+@click.option(
+    "--from", "start", metavar="STATE", help='A mode and all its states: "free x=13 v=5"; values are expressions.'
+)
+@click.option("--to", "end", metavar="STATE", help="The other state.")
+@click.option(
+    "--metric",
+    metavar="NAME",
+    help="Between states: quotient or relaxed. Between runs: rho, rho-hat, sup, skorokhod or tau-epsilon.",
+)
+@click.option("--relaxation", metavar="EPS", help="Depth of the strips, for the relaxed metric; else the file's.")
+@click.option("--set", "overrides", multiple=True, metavar="NAME=VALUE", help="Override a parameter. May be repeated.")
+@click.option("--coordinates", metavar="A,B", help="For rho-hat: the states that count as the position.")
+@click.option(
+    "--plot",
+    type=FILE,
+    metavar="FILE",
+    help="Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg.",
+)
+@click.option(
+    "--seconds",
+    metavar="S",
+    default=60.0,
+    help="About how long the search may take; what is then still open stays open.",
+)
+@click.option("--json", is_flag=True, help="Print one JSON object instead of the sentence.")
+@limited
 def distance(
-    first: Annotated[
-        Path,
-        typer.Argument(help="The model file, or a run: a saved one (.npz), or a model's own experiment.", metavar="A"),
-    ],
-    second: Annotated[Path | None, typer.Argument(help="A second run.", metavar="[B]")] = None,
-    from_: Annotated[
-        str | None,
-        typer.Option(
-            "--from", metavar="STATE", help='A mode and all its states: "free x=13 v=5"; values are expressions.'
-        ),
-    ] = None,
-    to: Annotated[str | None, typer.Option(metavar="STATE", help="The other state.")] = None,
-    metric: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Between states: quotient or relaxed. Between runs: rho, rho-hat, sup, skorokhod or tau-epsilon.",
-        ),
-    ] = None,
-    relaxation: Annotated[
-        str | None, typer.Option(metavar="EPS", help="Depth of the strips, for the relaxed metric; else the file's.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Override a parameter. May be repeated."),
-    ] = None,
-    coordinates: Annotated[
-        str | None, typer.Option(metavar="A,B", help="For rho-hat: the states that count as the position.")
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg.",
-        ),
-    ] = None,
-    seconds: Annotated[
-        float,
-        typer.Option(metavar="S", help="About how long the search may take; what is then still open stays open."),
-    ] = 60.0,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the sentence.")] = False,
+    first: Path,
+    second: Path | None,
+    start: str | None,
+    end: str | None,
+    metric: str | None,
+    relaxation: str | None,
+    overrides: tuple[str, ...],
+    coordinates: str | None,
+    plot: Path | None,
+    seconds: float,
+    json: bool,
 ) -> None:
     """Measure how far apart two states, or two runs, are in the hybrid metric."""
     with errors_reported(json):
-        parameters = _parameters(set_ or [])
+        parameters = _parameters(overrides)
         options = {"relaxation": relaxation, "parameters": parameters, "seconds": seconds}
         if second is not None:
-            if from_ is not None or to is not None:
+            if start is not None or end is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
             names = None if coordinates is None else [name.strip() for name in coordinates.split(",")]
             of_runs(first, second, metric, json, options, names, plot)
@@ -69,14 +75,14 @@ def distance(
             raise UsageError(f"{first} is a run: two runs, or a model and two states, are wanted", hint)
         elif coordinates is not None:
             raise UsageError("--coordinates is for two runs")
-        elif from_ is None or to is None:
+        elif start is None or end is None:
             raise UsageError(
                 "two states are wanted, or a second run",
                 f'for example: hsdsl distance {first} --from "free x=13 v=5" --to "free x=13 v=-4"',
             )
         else:
             check_picture(plot)
-            of_points(first, from_, to, metric, json, {**options, "plot": plot})
+            of_points(first, start, end, metric, json, {**options, "plot": plot})
 
 
 def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, options: dict[str, Any]) -> None:
@@ -102,7 +108,7 @@ def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, option
     print(dumps({**bounds, "metric": name, "certified": found.certified, "path": pieces}))
 
 
-def _parameters(pairs: list[str]) -> dict[str, str]:
+def _parameters(pairs: Sequence[str]) -> dict[str, str]:
     from hsdsl.model import split_overrides
 
     parameters, initial, settings = split_overrides(pairs)

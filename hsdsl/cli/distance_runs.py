@@ -7,11 +7,13 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.cli.console import FIRST_SIGN, INTERVAL, say
 from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
+
+if TYPE_CHECKING:
+    from hsdsl.execution import Execution
 
 PICTURES = (".png", ".svg")
 

@@ -5,22 +5,25 @@ from __future__ import annotations
 import platform
 import sys
 from importlib.metadata import PackageNotFoundError, version
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+import click
+from click.exceptions import Exit
 
-NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "typer", "rich", "matplotlib")
+NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "click", "matplotlib")
 OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
 
 
-def doctor(json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+@click.command()
+@click.option("--json", is_flag=True, help="Print one JSON object.")
+def doctor(json: bool) -> None:
     """Say what this installation is made of and what it can do here."""
     from hsdsl.report import dumps
 
     found = _found()
     print(dumps(found) if json else _text(found))
     if any(value is None for value in found["packages"].values()):
-        raise typer.Exit(1)
+        raise Exit(1)
 
 
 def _found() -> dict[str, Any]:

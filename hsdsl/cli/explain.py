@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
+import click
 
 from hsdsl.cli.console import errors_reported
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
 
 
-def explain(
-    code: Annotated[str, typer.Argument(help="A code such as HS111, or the name of a lint rule.", metavar="CODE")],
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+@click.command()
+@click.argument("code", metavar="CODE", help="A code such as HS111, or the name of a lint rule.")
+@click.option("--json", is_flag=True, help="Print one JSON object.")
+def explain(code: str, json: bool) -> None:
     """Say what an error or a finding means, why, and what to write instead."""
     from hsdsl.lint import RULES
     from hsdsl.lint.pages import pages, titles

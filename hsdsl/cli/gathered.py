@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from hsdsl import __version__
 from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, report_usage, say
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
@@ -22,6 +24,10 @@ class Format(StrEnum):
     json = "json"
     sarif = "sarif"
     github = "github"
+
+
+FORMAT = click.Choice(Format)
+FORMATS = "|".join(Format)
 
 
 @dataclass

@@ -3,52 +3,45 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+import click
+from click.exceptions import Exit
 
-from hsdsl.cli.console import WRONG_USAGE, report_usage
+from hsdsl.cli.console import FILE, WRONG_USAGE, report_usage
 from hsdsl.errors import UsageError
 from hsdsl.limits import DEFAULT, NUMBERS, Limits, applied
 from hsdsl.names import did_you_mean
-
-AllowPath = Annotated[
-    list[Path] | None,
-    typer.Option("--allow-path", metavar="FOLDER", help="Let models read data files from here too. May be repeated."),
-]
-Limit = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--limit",
-        metavar="NAME=NUMBER",
-        help=f"Let a model ask for more: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated.",
-    ),
-]
-_OPTIONS = {"allow_path": AllowPath, "limit": Limit}
 
 
 def limited(verb: Callable[..., None]) -> Callable[..., None]:
     """Give a verb the two options, which are in force while it runs."""
 
+    @click.option(
+        "--allow-path",
+        type=FILE,
+        multiple=True,
+        metavar="FOLDER",
+        help="Let models read data files from here too. May be repeated.",
+    )
+    @click.option(
+        "--limit",
+        multiple=True,
+        metavar="NAME=NUMBER",
+        help=f"Let a model ask for more: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated.",
+    )
     @functools.wraps(verb)
-    def with_limits(*, allow_path: list[Path] | None, limit: list[str] | None, **options: Any) -> None:
+    def with_limits(*, allow_path: tuple[Path, ...], limit: tuple[str, ...], **options: Any) -> None:
         try:
-            limits = as_limits(allow_path or [], limit or [])
+            limits = as_limits(allow_path, limit)
         except UsageError as error:
             report_usage(error, bool(options.get("json")))
-            raise typer.Exit(WRONG_USAGE) from None
+            raise Exit(WRONG_USAGE) from None
         with applied(limits):
             verb(**options)
 
-    own = inspect.signature(verb, eval_str=True)
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    added = [inspect.Parameter(name, keyword, default=None, annotation=kind) for name, kind in _OPTIONS.items()]
-    parameters = [*own.parameters.values(), *added]
-    with_limits.__signature__ = own.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
-    with_limits.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return with_limits
 
 

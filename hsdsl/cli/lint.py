@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
+import click
+from click.exceptions import Exit
 
-from hsdsl.cli.gathered import Format, Gathered, counted
+from hsdsl.cli.console import FILE
+from hsdsl.cli.gathered import FORMAT, FORMATS, Format, Gathered, counted
+from hsdsl.cli.limited import limited
 from hsdsl.errors import ModelError, UsageError
 
 if TYPE_CHECKING:
     from hsdsl.lint import Report, Selection
 
 
+@click.command()
+@click.argument("models", nargs=-1, required=True, type=FILE, metavar="MODEL...", help="Model files.")
+@click.option("--format", type=FORMAT, default="text", metavar=FORMATS, help="How to say what is found.")
+@click.option("--json", is_flag=True, help="The same as --format json.")
+@click.option(
+    "--select", metavar="RULE,...", help="Use these rules alone: codes, beginnings of codes, families or names."
+)
+@click.option("--ignore", metavar="RULE,...", help="Do not use these rules.")
+@click.option("--fix", is_flag=True, help="Remedy in the files what can be remedied safely.")
+@click.option("--quiet", "-q", is_flag=True, help="Say only what is found.")
+@limited
 def lint(
-    models: Annotated[list[Path], typer.Argument(help="Model files.", metavar="MODEL...")],
-    format: Annotated[
-        Format, typer.Option(help="How to say what is found.", metavar="text|json|sarif|github")
-    ] = Format.text,
-    json: Annotated[bool, typer.Option("--json", help="The same as --format json.")] = False,
-    select: Annotated[
-        str | None,
-        typer.Option(help="Use these rules alone: codes, beginnings of codes, families or names.", metavar="RULE,..."),
-    ] = None,
-    ignore: Annotated[str | None, typer.Option(help="Do not use these rules.", metavar="RULE,...")] = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Remedy in the files what can be remedied safely.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say only what is found.")] = False,
+    models: tuple[Path, ...],
+    format: Format,
+    json: bool,
+    select: str | None,
+    ignore: str | None,
+    fix: bool,
+    quiet: bool,
 ) -> None:
     """Look for what is legal in a model and still probably not meant."""
     gathered = Gathered()
@@ -42,7 +51,7 @@ def lint(
             if format is Format.text and not quiet:
                 _sum_up(path, report, remedied)
     gathered.say(format, lint=True)
-    raise typer.Exit(gathered.code)
+    raise Exit(gathered.code)
 
 
 def _selection(path: Path, select: str | None, ignore: str | None) -> Selection:

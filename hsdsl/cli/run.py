@@ -2,85 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+import click
+from click.exceptions import Exit
 
-from hsdsl.cli.console import errors_reported, progress, say
+from hsdsl.cli.console import FILE, errors_reported, progress, say
+from hsdsl.cli.limited import limited
 from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
+
+if TYPE_CHECKING:
+    from hsdsl.execution import Execution
 
 STOPPED, INTERRUPTED = 3, 130
 OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".html")
 
 
+@click.command()
+@click.argument("model", type=FILE, metavar="MODEL", help="The model file.")
+@click.option(
+    "--set",
+    "overrides",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
+    " (experiment.step=1e-3). May be repeated; values are expressions of parameters.",
+)
+@click.option("--until", metavar="T", help="End of the run.")
+@click.option("--scheme", metavar="S", help="relaxed, located or paoli-schatzman.")
+@click.option("--method", metavar="M", help="A method's name, such as dopri5 or taylor, or auto.")
+@click.option("--step", metavar="H", help="Fixed step size; excludes --tolerance.")
+@click.option("--tolerance", metavar="TOL", help="Bound on the local error relative to 1 + |x|; adaptive steps.")
+@click.option("--relaxation", metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
+@click.option("--engine", metavar="ENGINE", default="auto", help="auto, c or python.")
+@click.option("--precision", type=int, metavar="DIGITS", help="Compute with this many decimal digits (mpmath).")
+@click.option("--outputs", metavar="A,B", help="Only these states and outputs in files and final outputs.")
+@click.option("--estimate", is_flag=True, help="Run again, finer, and say how far apart the two runs are.")
+@click.option("--out", type=FILE, metavar="FILE", help="Save the execution: .csv, .parquet or .npz.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw it: .png, .svg or .html.")
+@click.option("--json", is_flag=True, help="Print one JSON object instead of the summary.")
+@click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress.")
+@limited
 def run(
-    model: Annotated[Path, typer.Argument(help="The model file.", metavar="MODEL")],
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
-            " (experiment.step=1e-3). May be repeated; values are expressions of parameters.",
-        ),
-    ] = None,
-    until: Annotated[str | None, typer.Option(metavar="T", help="End of the run.")] = None,
-    scheme: Annotated[str | None, typer.Option(metavar="S", help="relaxed or paoli-schatzman.")] = None,
-    method: Annotated[
-        str | None, typer.Option(metavar="M", help="euler, midpoint, heun, ralston, rk4, dopri5 or auto.")
-    ] = None,
-    step: Annotated[str | None, typer.Option(metavar="H", help="Fixed step size; excludes --tolerance.")] = None,
-    tolerance: Annotated[
-        str | None, typer.Option(metavar="TOL", help="Bound on the local error relative to 1 + |x|; adaptive steps.")
-    ] = None,
-    relaxation: Annotated[
-        str | None, typer.Option(metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
-    ] = None,
-    engine: Annotated[str, typer.Option(metavar="ENGINE", help="auto, c or python.")] = "auto",
-    precision: Annotated[
-        int | None, typer.Option(metavar="DIGITS", help="Compute with this many decimal digits (mpmath).")
-    ] = None,
-    outputs: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Only these states and outputs in files and final outputs.")
-    ] = None,
-    estimate: Annotated[
-        bool, typer.Option("--estimate", help="Run again, finer, and say how far apart the two runs are.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Save the execution: .csv, .parquet or .npz.")
-    ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it: .png, .svg or .html.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the summary.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary and no progress.")] = False,
+    model: Path,
+    overrides: tuple[str, ...],
+    engine: str,
+    outputs: str | None,
+    estimate: bool,
+    out: Path | None,
+    plot: Path | None,
+    json: bool,
+    quiet: bool,
+    precision: int | None,
+    **settings: str | None,
 ) -> None:
     """Simulate a model and summarise what happened."""
-    asked: dict[str, Any] = {
-        "until": until,
-        "scheme": scheme,
-        "method": method,
-        "step": step,
-        "tolerance": tolerance,
-        "relaxation": relaxation,
-        "engine": engine,
-        "precision": precision,
-    }
+    asked: dict[str, Any] = {**settings, "engine": engine, "precision": precision}
     with errors_reported(json):
         _check_target(out, "--out", OUT_SUFFIXES)
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         _check_target(plot, "--plot", PLOT_SUFFIXES)
-        execution = _simulate(model, set_ or [], asked, outputs, estimate, out, plot, json, quiet)
+        execution = _simulate(model, overrides, asked, outputs, estimate, out, plot, json, quiet)
     if execution.stop.reason == "interrupted":
-        raise typer.Exit(INTERRUPTED)
+        raise Exit(INTERRUPTED)
     if not execution.stop.complete:
-        raise typer.Exit(STOPPED)
+        raise Exit(STOPPED)
 
 
 def _simulate(
     path: Path,
-    overrides: list[str],
+    overrides: Sequence[str],
     asked: dict[str, Any],
     outputs: str | None,
     estimate: bool,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import click
 
+
+@click.command()
 def schema() -> None:
     """Print the JSON Schema of the language (draft 7)."""
     import json

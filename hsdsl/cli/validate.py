@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+import click
+from click.exceptions import Exit
 
-from hsdsl.cli.gathered import Format, Gathered, counted
+from hsdsl.cli.console import FILE
+from hsdsl.cli.gathered import FORMAT, FORMATS, Format, Gathered, counted
+from hsdsl.cli.limited import limited
 from hsdsl.errors import ModelError, UsageError
 
 
-def validate(
-    models: Annotated[list[Path], typer.Argument(help="Model files.", metavar="MODEL...")],
-    format: Annotated[
-        Format, typer.Option(help="How to say what is wrong.", metavar="text|json|sarif|github")
-    ] = Format.text,
-    json: Annotated[bool, typer.Option("--json", help="The same as --format json.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say only what is wrong.")] = False,
-) -> None:
+@click.command()
+@click.argument("models", nargs=-1, required=True, type=FILE, metavar="MODEL...", help="Model files.")
+@click.option("--format", type=FORMAT, default="text", metavar=FORMATS, help="How to say what is wrong.")
+@click.option("--json", is_flag=True, help="The same as --format json.")
+@click.option("--quiet", "-q", is_flag=True, help="Say only what is wrong.")
+@limited
+def validate(models: tuple[Path, ...], format: Format, json: bool, quiet: bool) -> None:
     """Check model files and say every error in them."""
     gathered = Gathered()
     format = Format.json if json else format
@@ -32,7 +33,7 @@ def validate(
             if format is Format.text and not quiet:
                 print(line)
     gathered.say(format, lint=False)
-    raise typer.Exit(gathered.code)
+    raise Exit(gathered.code)
 
 
 def _checked(path: Path) -> str:

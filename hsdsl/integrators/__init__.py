@@ -1,21 +1,42 @@
 """Integrators: one file a method, most of them tables; METHODS is what models and the command line may name."""
 
-from hsdsl.integrators.dop853 import DOP853
-from hsdsl.integrators.dopri5 import DOPRI5
-from hsdsl.integrators.euler import EULER
-from hsdsl.integrators.heun import HEUN
-from hsdsl.integrators.midpoint import MIDPOINT
-from hsdsl.integrators.radau import RADAU, RadauMethod
-from hsdsl.integrators.ralston import RALSTON
-from hsdsl.integrators.rk4 import RK4
-from hsdsl.integrators.tableau import ButcherTableau
-from hsdsl.integrators.taylor import TAYLOR, TaylorMethod
+from __future__ import annotations
 
-INTEGRATORS: dict[str, ButcherTableau] = {
-    table.name: table for table in (EULER, MIDPOINT, HEUN, RALSTON, RK4, DOPRI5, DOP853)
-}
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import TypeVar
+
+from hsdsl.integrators.radau import RADAU, RadauMethod
+from hsdsl.integrators.tableau import ButcherTableau
+from hsdsl.integrators.taylor import TaylorMethod
+
 Method = ButcherTableau | TaylorMethod | RadauMethod
-METHODS: dict[str, Method] = {**INTEGRATORS, TAYLOR.name: TAYLOR, RADAU.name: RADAU}
-AUTO = DOPRI5.name  # what `method: auto` means while there is no fast engine for the others
+M = TypeVar("M", bound=Method)
+
+
+class _Named(Mapping[str, M]):
+    """Methods by name. A table checks itself when it is loaded, so each is loaded when it is first asked for."""
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+
+    def __getitem__(self, name: str) -> M:
+        if name not in self._names:
+            raise KeyError(name)
+        return getattr(import_module(f"hsdsl.integrators.{name}"), name.upper())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+INTEGRATORS = _Named[ButcherTableau]("euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853")
+METHODS = _Named[Method](*INTEGRATORS, "taylor", "radau")
+AUTO = "dopri5"  # what `method: auto` means while there is no fast engine for the others
 
 __all__ = ["AUTO", "INTEGRATORS", "METHODS", "RADAU", "ButcherTableau", "Method", "RadauMethod", "TaylorMethod"]

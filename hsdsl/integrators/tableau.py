@@ -2,8 +2,8 @@
 
 The order conditions (one for each rooted tree, Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*,
 II.2, doi:10.1007/978-3-540-78862-1) are evaluated in exact arithmetic, for the method, its embedded method and its
-dense output. A wrong digit does not survive import. A table whose coefficients are known as decimals only says to how
-many digits its conditions hold; it is checked to those.
+dense output. A wrong digit does not survive the loading of its file. A table whose coefficients are known as decimals
+only says to how many digits its conditions hold; it is checked to those.
 """
 
 from __future__ import annotations

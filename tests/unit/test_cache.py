@@ -34,7 +34,13 @@ import sys, hsdsl
 hsdsl.load(sys.argv[1]).simulate(engine="c")
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
-HEAVY = ("sympy", "mpmath", "scipy", "pydantic", "yaml", "matplotlib", "rich", "typer")
+LIGHT_COMMAND = """
+import sys
+from hsdsl.cli import app
+app(["run", sys.argv[1], "--json"], standalone_mode=False)
+print([name for name in sys.argv[2:] if name in sys.modules])
+"""
+HEAVY = ("sympy", "mpmath", "scipy", "pydantic", "yaml", "matplotlib", "pint")
 
 
 @pytest.fixture(autouse=True)
@@ -150,7 +156,8 @@ def test_what_is_no_program_is_not_taken(folder: Path) -> None:
 
 
 @needs_compiler
-def test_a_run_of_a_model_seen_before_imports_little() -> None:
-    command = [sys.executable, "-c", LIGHT, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
-    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() for _ in range(2)]
-    assert "sympy" in said[0] and said[1] == "[]"
+@pytest.mark.parametrize("program", [LIGHT, LIGHT_COMMAND], ids=["call", "command"])
+def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
+    command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
+    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
+    assert "sympy" in said[0][-1] and said[1][-1] == "[]"

@@ -23,7 +23,7 @@ from hsdsl.errors import CODES
 
 ROOT = Path(__file__).parent.parent.parent
 SOURCES = sorted((ROOT / "hsdsl").rglob("*.py"))
-HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "typer", "pandas")
+HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "click", "pandas")
 
 
 def reference_pages() -> ModuleType:
