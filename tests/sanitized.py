@@ -5,6 +5,8 @@ Started by `unit/test_sanitizers.py`; a fault ends the process with a message of
 
 from __future__ import annotations
 
+from itertools import product
+
 from conformance.test_agreement import FLOATS, LONG, MODELS, SHORT, STEPS, arguments
 from conformance.test_conformance import CASES, Run, model, read
 from property.random_models import SETTINGS, random_model
@@ -15,6 +17,7 @@ from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import INTEGRATORS
 from hsdsl.model import Model
 from hsdsl.simulate import chunks
+from hsdsl.simulate.compiled import SCHEMES
 
 
 def main() -> None:
@@ -22,21 +25,19 @@ def main() -> None:
     count = 0
     for name in CASES:
         for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():
-            for setting in list(FLOATS.values())[::3]:
-                count += model(name).simulate(**arguments(run, setting), engine="c").engine == "c"
+            for setting, scheme in product(list(FLOATS.values())[::3], SCHEMES):
+                count += model(name).simulate(**arguments(run, setting, scheme), engine="c").engine == "c"
     for name, path in MODELS.items():
         loaded = hsdsl.load(path)
         for method in INTEGRATORS:
-            for setting in ({**s, **SHORT.get(name, {})} for s in STEPS):
-                count += (
-                    loaded.simulate(method=method, max_transitions=40, scheme="relaxed", **setting, engine="c").engine
-                    == "c"
-                )
+            for setting, scheme in product(({**s, **SHORT.get(name, {})} for s in STEPS), SCHEMES):
+                run = loaded.simulate(method=method, max_transitions=40, scheme=scheme, **setting, engine="c")
+                count += run.engine == "c"
     for seed in range(25):
         try:
             drawn = Model(elaborate("random.yaml", text=random_model(seed).encode()))
-            for setting in SETTINGS:
-                count += drawn.simulate(max_transitions=25, **setting, engine="c").engine == "c"
+            for setting, scheme in product(SETTINGS, SCHEMES):
+                count += drawn.simulate(max_transitions=25, scheme=scheme, **setting, engine="c").engine == "c"
         except (ModelError, UsageError):
             continue
     print(f"{count} runs")

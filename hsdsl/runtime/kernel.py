@@ -55,9 +55,10 @@ class CompiledModel:
         self.table = tables.Model.in_dll(self._library, "hs_the_model")
         self._shared: dict[Hashable, Any] = {}
 
-    def workspace(self, method: tables.Method) -> int:
+    def workspace(self, method: tables.Method, scheme: str) -> int:
         """How many numbers a run needs for itself."""
-        return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method))
+        number = tables.SCHEMES.index(scheme)
+        return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""

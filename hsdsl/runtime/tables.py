@@ -22,9 +22,12 @@ TRANSITION = np.dtype(
 METHOD_KINDS = ("table", "taylor", "radau")
 INTERPOLANTS = ("secant", "hermite", "dense")
 KINDS = ("flow", "strip")
+SCHEMES = ("relaxed", "located")
+NOTICES = ("crowded", "at rest", "replaced", "accumulates", "unsettled")
+NOTE = np.dtype([("kind", "i4"), ("mode", "i4"), ("surface", "i8"), ("number", "i8"), ("time", "f8"), ("other", "f8")])
 REASONS = (
     "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
-    "entered outside", "stuck", "interrupted",
+    "entered outside", "stuck", "interrupted", "left", "step not finite", "accumulated",
 )  # fmt: skip
 OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping")
 
@@ -108,6 +111,7 @@ class Method(ctypes.Structure):
         ("error", Row),
         ("coarse", Row),
         ("dense", POINTER(Row)),
+        ("gain", c_double),
     )
 
 
@@ -117,18 +121,30 @@ class Timeline(ctypes.Structure):
     _fields_ = (("segments", c_int64), *((name, c_void_p) for name in ("start", "end", "jump", "data")))
 
 
+class Interpolation(ctypes.Structure):
+    """``hs_interpolation``."""
+
+    _fields_ = (
+        ("degree", c_int),
+        *((name, POINTER(c_double)) for name in ("nodes", "tests", "matrix")),
+        ("share", c_double),
+    )
+
+
 class Settings(ctypes.Structure):
     """``hs_settings``."""
 
     _fields_ = (
         *((name, c_double) for name in ("step", "tolerance", "largest", "relaxation", "until")),
         ("max_transitions", c_int64),
+        ("scheme", c_int64),
     )
 
 
 CHUNK_COLUMNS = (
     "times", "values", "outputs", "depth", "pieces", "arc", "transition", "before", "after", "alternatives",
 )  # fmt: skip
+ROOMS = ("row_room", "rows", "arc_room", "arcs", "transition_room", "transitions", "note_room", "notes")
 
 
 class Chunk(ctypes.Structure):
@@ -140,12 +156,15 @@ class Chunk(ctypes.Structure):
     arcs: int
     transition_room: int
     transitions: int
+    note_room: int
+    notes: int
     alternatives_used: int
 
     _fields_ = (
-        *((name, c_int64) for name in ("row_room", "rows", "arc_room", "arcs", "transition_room", "transitions")),
+        *((name, c_int64) for name in ROOMS),
         *((name, c_void_p) for name in CHUNK_COLUMNS),
         ("alternatives_used", c_int64),
+        ("note", c_void_p),
     )
 
 
@@ -197,6 +216,7 @@ class Task(ctypes.Structure):
     method: Any
     timeline: Any
     settings: Settings
+    interpolation: Any
     mode: int
     dimension: int
     x: Any
@@ -215,6 +235,7 @@ class Task(ctypes.Structure):
         ("method", POINTER(Method)),
         ("timeline", POINTER(Timeline)),
         ("settings", Settings),
+        ("interpolation", POINTER(Interpolation)),
         ("mode", c_int32),
         ("dimension", c_int32),
         ("x", c_void_p),
@@ -230,7 +251,17 @@ class Task(ctypes.Structure):
     )
 
 
-STRUCTURES = (Edge, Mode, Model, Row, Method, Timeline, Settings, Chunk, Visited, Stop, Task)  # as in hs_sizes
+STRUCTURES = (  # as in hs_sizes
+    Edge, Mode, Model, Row, Method, Timeline, Interpolation, Settings, Chunk, Visited, Stop, Task,
+)  # fmt: skip
+
+
+def interpolation_table(
+    nodes: Sequence[float], tests: Sequence[float], matrix: Sequence[Sequence[float]], share: float
+) -> Interpolation:
+    """Write an interpolation as the runtime takes it."""
+    columns = (nodes, tests, [number for line in matrix for number in line])
+    return Interpolation(len(nodes) - 1, *((c_double * len(column))(*column) for column in columns), share)
 
 
 @cache
@@ -265,6 +296,7 @@ def _butcher_table(table: ButcherTableau) -> Method:
         error=_row(_difference(table.b, table.embedded)),
         coarse=_row(_difference(table.b, table.coarse)),
         dense=(Row * max(1, len(dense)))(*map(_row, dense)),
+        gain=float(sum(map(abs, table.b))),
     )
 
 

@@ -15,7 +15,6 @@ from functools import cache
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.simulate.isolate import Coefficients, last_root, rises, total, value
 
-LEAST_DEGREE = 4
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_PIECES = 1000  # of a step, before what is left is taken as it is
 ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
@@ -104,12 +103,8 @@ def interpolated(
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
     their largest value, or ``allowed(k)`` more.
     """
-    degree = max(LEAST_DEGREE, degree)
-    nodes = [arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1)]
-    tests = [arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1)]
-    matrix = _to_powers(degree, arithmetic)
-    zero = arithmetic.zero
-    share = share + arithmetic.unit * total((abs(m) for line in matrix for m in line), zero)
+    by, zero = interpolation(degree, arithmetic), arithmetic.zero
+    nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
     parts: list[tuple[Number, Number, int]] = [(zero, zero + 1, 0)]
     found: list[list[Piece]] = [[] for _ in range(count)]
     while parts and count:
@@ -141,7 +136,30 @@ def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number])
     return max(abs(value(c, s) - w) for s, w in zip(tests, wanted, strict=True))
 
 
+@dataclass(frozen=True)
+class Interpolation:
+    """How a function is interpolated on [0, 1].
+
+    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are held against it at
+    ``tests``. ``rounding`` is what round-off in them can amount to, relative to its largest value.
+    """
+
+    nodes: tuple[Number, ...]
+    tests: tuple[Number, ...]
+    matrix: tuple[tuple[Number, ...], ...]
+    rounding: Number
+
+
 @cache
+def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
+    """Make the interpolation of a degree."""
+    nodes = tuple(arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1))
+    tests = tuple(arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1))
+    matrix = _to_powers(degree, arithmetic)
+    rounding = arithmetic.unit * total((abs(m) for line in matrix for m in line), arithmetic.zero)
+    return Interpolation(nodes, tests, matrix, rounding)
+
+
 def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...], ...]:
     """The matrix from values at i/degree to coefficients of powers, solved in fractions."""
     columns: list[list[Fraction]] = []

@@ -59,7 +59,7 @@ class Chunks:
 
     def _open(self, rows: int) -> None:
         shape = self._shape
-        arcs, transitions = rows // 2 + 8, rows // 4 + 8
+        arcs, transitions, notes = rows // 2 + 8, rows // 4 + 8, rows // 16 + 8
         self._columns: dict[str, Array] = {
             "times": np.empty(rows),
             "values": np.empty((rows, shape.width)),
@@ -71,16 +71,17 @@ class Chunks:
             "before": np.empty((transitions, shape.width)),
             "after": np.empty((transitions, shape.width)),
             "alternatives": np.empty(transitions * shape.edges, np.int32),
+            "note": np.empty(notes, tables.NOTE),
         }
         table, self._rows = self.table, rows
-        table.row_room, table.arc_room, table.transition_room = rows, arcs, transitions
+        table.row_room, table.arc_room, table.transition_room, table.note_room = rows, arcs, transitions, notes
         for name, column in self._columns.items():
             setattr(table, name, column.ctypes.data)
         self._reset()
 
     def _reset(self) -> None:
         table = self.table
-        table.rows = table.arcs = table.transitions = table.alternatives_used = 0
+        table.rows = table.arcs = table.transitions = table.notes = table.alternatives_used = 0
 
     def _written(self) -> dict[str, Array]:
         table = self.table
@@ -89,6 +90,7 @@ class Chunks:
         used |= {name: self._columns[name][:transitions] for name in BY_TRANSITION}
         used["pieces"] = self._columns["pieces"][: rows + 1]
         used["arc"] = self._columns["arc"][: table.arcs]
+        used["note"] = self._columns["note"][: table.notes]
         used["alternatives"] = self._columns["alternatives"][: table.alternatives_used]
         return used
 

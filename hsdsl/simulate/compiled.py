@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,17 +16,21 @@ from hsdsl.execution import Array, Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate import stops
+from hsdsl.simulate import notes, stops
+from hsdsl.simulate.along import interpolation
 from hsdsl.simulate.chunks import Shape
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import left_domain
+from hsdsl.simulate.entry import LEFT, left_domain
 from hsdsl.simulate.interrupt import noted
+from hsdsl.simulate.located import FREE
 from hsdsl.simulate.recorder import OpenArc
 from hsdsl.simulate.relaxed import no_way_on
+from hsdsl.simulate.rest import OVER_TIME
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.spans import along_steps
 from hsdsl.simulate.surfaces import Obstacle, Surfaces
 from hsdsl.simulate.timeline import Timeline
 
@@ -40,7 +45,9 @@ class CompiledPlan:
         method, model = tables.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
         self.compiled = compiled
-        self.desks: Desks = compiled.shared((settings.method.name, shape), lambda: Desks(compiled, method, shape))
+        scheme = settings.scheme
+        key = settings.method, scheme, shape
+        self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))
         control = make_control(settings, FLOAT64)
         self._settings = tables.Settings(
             control.h,
@@ -49,7 +56,9 @@ class CompiledPlan:
             settings.relaxation,
             settings.until,
             min(settings.max_transitions, 2**62),
+            tables.SCHEMES.index(scheme),
         )
+        self._interpolation = _interpolations(settings)
         self._timeline = _Timeline(timeline)
         self._mode, self._x = mode, np.array(x, np.float64)
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
@@ -59,7 +68,15 @@ class CompiledPlan:
         desk.clear(self._rows)
         task = desk.task
         task.timeline, task.settings = self._timeline.pointer, self._settings
+        task.interpolation = self._interpolation
         task.mode, task.dimension, task.x = self._mode, len(self._x), self._x.ctypes.data
+
+
+def _interpolations(settings: Settings) -> Any:
+    """Surfaces along steps, and a push over time."""
+    pair = [(interpolation(degree, FLOAT64), share) for degree, share in (along_steps(settings), OVER_TIME)]
+    tables_of = [tables.interpolation_table(b.nodes, b.tests, b.matrix, share + b.rounding) for b, share in pair]
+    return (tables.Interpolation * 2)(*tables_of)
 
 
 class _Timeline:
@@ -110,7 +127,27 @@ class CompiledRun:
             self.plan.compiled.simulate(desk.task)
         if desk.failed:
             raise desk.failed[0]
-        return self._stop(), desk.chunks.whole()
+        whole = desk.chunks.whole()
+        noted: list[tuple[int, int, int, int, float, float]] = whole["note"].tolist()
+        for note in noted:
+            self._note(*note)
+        return self._stop(), whole
+
+    def _note(self, number: int, index: int, k: int, count: int, time: float, other: float) -> None:
+        """Say what the loop has noted, as the Python loop does."""
+        recorder, mode, kind = self.run.recorder, self.run.program.modes[index], tables.NOTICES[number]
+        if kind == "unsettled":
+            notes.unsettled(recorder, mode.name, k, time)
+        elif kind == "crowded":
+            notes.crowded(recorder, FREE, time)
+        elif kind == "at rest":
+            notes.at_rest(recorder, mode.edges[k].name, time, other)
+        elif kind == "replaced":
+            notes.replaced(recorder, mode.edges[k].name, count, time, other)
+        else:
+            self._accumulated = notes.accumulates(recorder, mode.edges[k].name, time, other)
+
+    _accumulated: Stop | None = None
 
     def _stop(self) -> Stop:
         found, run = self.desk.task.stop, self.run
@@ -123,6 +160,13 @@ class CompiledRun:
             return not_finite(run, self._here(), t, (self._here().x,))
         if reason == "entered outside":
             return left_domain(self._here(), found.surface, t, "was entered outside it")
+        if reason == "left":
+            return left_domain(self._here(), found.surface, t, LEFT)
+        if reason == "step not finite":
+            here = self._here()
+            return not_finite(run, here, t, (here.x, self.desk.slope(found.dimension)))
+        if reason == "accumulated" and self._accumulated is not None:
+            return self._accumulated
         if reason == "stuck":
             run.control.h = found.h
             obstacle = Obstacle(tables.OBSTACLES[found.obstacle], None if found.surface < 0 else found.surface)

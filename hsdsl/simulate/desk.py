@@ -24,13 +24,13 @@ MOST_KEPT = 4  # desks of one model and method
 class Desk:
     """One task with its memory. One run works there at a time."""
 
-    def __init__(self, compiled: CompiledModel, method: tables.Method, shape: Shape) -> None:
+    def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
         model = compiled.table
         self.task = tables.Task()
         self.pressed, self.failed = Event(), list[BaseException]()
         self.chunks = Chunks(self.task.chunk, shape)
         self._width = model.width
-        self._workspace = np.empty(compiled.workspace(method))
+        self._workspace = np.empty(compiled.workspace(method, scheme))
         self._x, self._slope = np.empty(self._width), np.empty(self._width)
         self._visited = [grown(self.task.visited, VISITED, self._width)]  # the last is in use
         self.task.model, self.task.method = ctypes.pointer(model), ctypes.pointer(method)
@@ -76,10 +76,10 @@ class Desk:
 
 
 class Desks:
-    """The free desks of one model and method."""
+    """The free desks of one model, method and scheme."""
 
-    def __init__(self, compiled: CompiledModel, method: tables.Method, shape: Shape) -> None:
-        self._made_of = compiled, method, shape
+    def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
+        self._made_of = compiled, method, scheme, shape
         self._free: list[Desk] = []
 
     def take(self) -> Desk:

@@ -69,6 +69,9 @@ def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tupl
     return chosen, tuple(edges[c.edge].name for c in beyond if c is not chosen)
 
 
+LEFT = "leaves it, and no transition is possible there"
+
+
 def left_domain(here: Here, surface: int, t: Number, how: str) -> Stop:
     """Stop at a wall (the paper's n' = infinity)."""
     wall = here.mode.walls[surface - len(here.mode.edges)]

@@ -15,7 +15,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.simulate import notes
 from hsdsl.simulate.along import Rise, deflated, rises_along
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.isolate import stays_below
 from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
 from hsdsl.simulate.rest import hold, rests
@@ -75,7 +75,7 @@ def first_event(run: Run, here: Here, before: Span | None, span: Span) -> Landin
         standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
         if not standing:
             write(here, span, wall)
-            return left_domain(here, wall.edge, wall.time, "leaves it, and no transition is possible there")
+            return left_domain(here, wall.edge, wall.time, LEFT)
         guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
     if not guards:
         return None

@@ -16,7 +16,7 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import enter, left_domain
+from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset
 from hsdsl.simulate.stops import reached, reached_in_strip, show
@@ -207,7 +207,7 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     """Stop where no step is short enough, and say why."""
     t, x = here.t, here.x
     if obstacle.kind == "wall" and obstacle.surface is not None:
-        return left_domain(here, obstacle.surface, t, "leaves it, and no transition is possible there")
+        return left_domain(here, obstacle.surface, t, LEFT)
     grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
     if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h

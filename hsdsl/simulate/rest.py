@@ -16,7 +16,7 @@ from hsdsl.simulate.run import Here, Run
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 PARALLEL = 1e-6
-DEGREE, SHARE, CORRECTIONS = 6, 1e-12, 8
+OVER_TIME, CORRECTIONS = (6, 1e-12), 8  # degree and residual of the interpolation of a push; of its root
 
 
 def rests(run: Run, here: Here) -> int | None:
@@ -97,10 +97,17 @@ def greatest(x: State) -> Number:
 
 
 def hold(run: Run, here: Here, k: int) -> Here:
-    """Stay at rest until the flow no longer pushes out, or to the end of the inputs' segment."""
-    end, order = here.segment.end, push_order(run, here, k)
-    assert order is not None
-    release = released(run, here, k, order, end)
+    """Stay at rest until the flow no longer pushes out, or to the end of the inputs' segment.
+
+    Where the push has no value later on the state is not held: transitions go on as long as they can.
+    """
+    end = here.segment.end
+    try:
+        order = push_order(run, here, k)
+        assert order is not None
+        release = released(run, here, k, order, end)
+    except DOMAIN_ERRORS:
+        return here
     edge, until = here.mode.edges[k].name, end if release is None else release
     here.arc.append(until, here.x, (tuple(run.arithmetic.zero for _ in here.x),))
     notes.at_rest(run.recorder, edge, here.t, until)
@@ -117,7 +124,8 @@ def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | 
     def inward(s: Number) -> State:
         return (-push(run, here, k, order, t + s * span),)
 
-    pieces = interpolated(inward, 1, DEGREE, lambda _: run.arithmetic.zero, SHARE, run.arithmetic)[0]
+    degree, share = OVER_TIME
+    pieces = interpolated(inward, 1, degree, lambda _: run.arithmetic.zero, share, run.arithmetic)[0]
     rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
     if rise is None:
         return None

@@ -21,12 +21,16 @@ from hsdsl.simulate.isolate import value
 from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
 RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
 UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
-DEGREE = 6  # of the interpolation of a surface along a Taylor step
+LEAST_DEGREE, SERIES_DEGREE = (
+    4,
+    6,
+)  # of interpolation along a step: not below that of its dense output; of Taylor's method
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ class TableSteps:
                 if not self._ratio <= 1:
                     return TOO_WRONG
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
-            curves = interpolate(self.run, self.here, t, h, x, z, piece, max(4, len(piece)))
+            curves = interpolate(self.run, self.here, t, h, x, z, piece)
             ends = self.here.kernel.surfaces(t1, *z)
         except NoConvergence:
             return UNSOLVED
@@ -248,7 +252,7 @@ class SeriesSteps:
                 scaled.append(c * power)
                 power = power * h
             if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k):
-                return interpolate(run, here, t, h, x, z, piece, DEGREE)
+                return interpolate(run, here, t, h, x, z, piece)
             curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
         return curves
 
@@ -265,9 +269,7 @@ def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
     return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
 
 
-def interpolate(
-    run: Run, here: Here, t: Number, h: Number, x: State, z: State, piece: Polynomial, degree: int
-) -> list[list[Piece]]:
+def interpolate(run: Run, here: Here, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> list[list[Piece]]:
     """Interpolate all surfaces along a step's interpolant."""
     surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
 
@@ -277,13 +279,17 @@ def interpolate(
     def allowed(k: int) -> Number:
         return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
 
-    return interpolated(values, count, degree, allowed, share(run), run.arithmetic)
+    degree, share = along_steps(run.settings)
+    return interpolated(values, count, degree, allowed, share, run.arithmetic)
 
 
-def share(run: Run) -> Number:
-    """How far a surface may be off its polynomial, relative to its own size along a step."""
-    tolerance = run.control.tolerance
-    return max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
+def along_steps(settings: Settings) -> tuple[int, Number]:
+    """Of which degree surfaces are interpolated along a step, and how far they may be off, relative to their size."""
+    tolerance, method = settings.tolerance, settings.method
+    share = max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
+    return SERIES_DEGREE if method is None or isinstance(method, TaylorMethod) else max(
+        LEAST_DEGREE, method.degree
+    ), share
 
 
 def most_halvings(run: Run) -> int:

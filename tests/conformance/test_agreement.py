@@ -15,6 +15,7 @@ from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
 from hsdsl.integrators import INTEGRATORS
+from hsdsl.simulate.compiled import SCHEMES
 
 pytestmark = needs_compiler
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
@@ -30,22 +31,24 @@ OVER_BOTH = ("midpoint", "adaptive")
 STEPS: list[dict[str, Any]] = [{"step": 0.017, "relaxation": 3e-4}, {"step": "1/16", "relaxation": "1/1024"}]
 
 
-def arguments(run: Run, setting: dict[str, str]) -> dict[str, Any]:
-    asked = {**setting, **run.arguments, "scheme": "relaxed"}
+def arguments(run: Run, setting: dict[str, str], scheme: str) -> dict[str, Any]:
+    asked = {**setting, **run.arguments, "scheme": scheme}
     return asked | ({"max_transitions": int(asked["max_transitions"])} if "max_transitions" in asked else {})
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in CASES])
-def test_every_case_in_every_setting(name: str) -> None:
+def test_every_case_in_every_setting(name: str, scheme: str) -> None:
     for run in map(Run.of, read(CASES[name])["runs"]):
-        if "relaxed" in run.scheme:
+        if scheme in run.scheme:
             for key, setting in FLOATS.items():
-                assert_engines_agree(model(name), kernel=key in OVER_BOTH, **arguments(run, setting))
+                assert_engines_agree(model(name), kernel=key in OVER_BOTH, **arguments(run, setting, scheme))
 
 
 @pytest.mark.parametrize("method", INTEGRATORS)
 @pytest.mark.parametrize("name", MODELS)
-def test_every_model_by_every_method(name: str, method: str) -> None:
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_every_model_by_every_method(scheme: str, name: str, method: str) -> None:
     loaded = hsdsl.load(MODELS[name])
     settings = [*STEPS, *([{"tolerance": 1e-7, "relaxation": 1e-6}] if INTEGRATORS[method].adaptive else [])]
     for number, setting in enumerate(settings):
@@ -54,7 +57,7 @@ def test_every_model_by_every_method(name: str, method: str) -> None:
             kernel=number == 0,
             method=method,
             max_transitions=40,
-            scheme="relaxed",
+            scheme=scheme,
             **setting,
             **SHORT.get(name, {}),
         )

@@ -12,6 +12,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.execution import Execution
 from hsdsl.model import Model
+from hsdsl.simulate.compiled import SCHEMES
 
 pytestmark = needs_compiler
 
@@ -20,7 +21,11 @@ def runs_of(seed: int) -> list[Execution]:
     """Every setting's run of one random model, after the engines were found to agree; none where it is refused."""
     try:
         model = Model(elaborate("random.yaml", text=random_model(seed).encode()))
-        return [assert_engines_agree(model, max_transitions=25, **settings) for settings in SETTINGS]
+        return [
+            assert_engines_agree(model, max_transitions=25, scheme=scheme, **settings)
+            for scheme in SCHEMES
+            for settings in SETTINGS
+        ]
     except (ModelError, UsageError):  # no value anywhere, such as log(-1)
         return []
 

@@ -23,8 +23,9 @@ static void choose_entry(hs_run *run, const int *beyond, double t) {
   run->chosen.piece.degree = 0;
 }
 
-/* Enter a mode at (t, run->x), sizes in run->scale, and make the transitions that fire at once. */
-static int enter(hs_run *run, int mode, int dimension, double t, int from_here) {
+/* Enter a mode at (t, run->x), sizes in run->scale, and make the transitions that fire at once.
+   A surface that the flow passes within the time `since` counts as stood on: tied transitions share one point. */
+static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since) {
   hs_here before = run->here;
   forget(&run->task->visited);
   for (;; from_here = 1) {
@@ -34,7 +35,7 @@ static int enter(hs_run *run, int mode, int dimension, double t, int from_here) 
     if (table->final) return stopped(run, HS_FINAL, t);
     if (make_room(run)) return stopped(run, HS_INTERRUPTED, t);
     if (visit(&run->task->visited, run->width, mode, run->x, dimension)) return stopped(run, HS_ZENO, t);
-    if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, run->ahead, run->beyond))
+    if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, run->ahead, since, run->beyond))
       return stopped(run, HS_HERE_NOT_FINITE, t);
     if (!all_finite(run->ahead, table->surfaces)) return stopped(run, HS_HERE_NOT_FINITE, t);
     int fires = 0;

@@ -18,6 +18,12 @@
 #include "visited.c"
 #include "entry.c"
 #include "relaxed.c"
+#include "isolate.c"
+#include "along.c"
+#include "spans.c"
+#include "rest.c"
+#include "tails.c"
+#include "located.c"
 
 /* What is left of the caller's memory. Counted without memory first, then given out. */
 typedef struct {
@@ -67,34 +73,84 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->alternatives = take(store, e, sizeof(int));
   run->trial.piece = polynomial(store, run);
   run->cubic = polynomial(store, run);
-  run->crossings = take(store, e, sizeof(hs_crossing));
-  for (int i = 0; i < e; i++) {
+  run->crossings = take(store, m, sizeof(hs_crossing));
+  for (int i = 0; i < m; i++) {
     double *state = numbers(store, w);
     const hs_polynomial piece = polynomial(store, run);
     if (store->numbers) run->crossings[i].state = state, run->crossings[i].piece = piece;
   }
 }
 
-static hs_run make_run(const hs_model *model, const hs_method *method, hs_store *store) {
+/* Degrees of polynomials that surfaces are along steps. */
+static int most_degree(const hs_method *method) {
+  const int own = method->degree > method->order ? method->degree : method->order;
+  return own > LEAST_MOST_DEGREE ? own : LEAST_MOST_DEGREE;
+}
+
+static hs_span lay_out_span(const hs_run *run, hs_store *store) {
+  hs_span span = {0, 0, 0, 0, 0, {0, 0}};
+  span.x = numbers(store, run->width);
+  span.largest = numbers(store, run->width);
+  span.piece = polynomial(store, run);
+  return span;
+}
+
+/* The same for what the located scheme needs besides. */
+static void lay_out_located(hs_run *run, hs_store *store) {
+  const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
+  const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
+  run->span = lay_out_span(run, store);
+  run->before = lay_out_span(run, store);
+  double **states[] = {&run->q, &run->other_end, 0};
+  for (double ***state = states; *state; state++) **state = numbers(store, w);
+  run->other_k = take(store, all, sizeof(double *));
+  for (int i = 1; i < all; i++) {
+    double *stage = numbers(store, w);
+    if (store->numbers) run->other_k[i] = stage;
+  }
+  run->ends = numbers(store, m);
+  run->starts = numbers(store, m);
+  run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
+  run->second = numbers(store, 4 * (int64_t)run->model->lines);
+  run->left = numbers(store, most + 1);
+  run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
+  if (store->numbers) fill_binomials(run->binomials, most);
+  run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));
+  for (int i = 0; i < MOST_CUTS; i++) {
+    double *b = numbers(store, most + 1);
+    if (store->numbers) run->cuts[i].b = b;
+  }
+  run->doubted = take(store, (int64_t)run->model->modes * m, sizeof(int));
+  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->doubted[i] = 0;
+  run->curves.room = most + 1;
+  run->curves.start = numbers(store, MOST_PARTS);
+  run->curves.width = numbers(store, MOST_PARTS);
+  run->curves.c = numbers(store, (int64_t)MOST_PARTS * m * run->curves.room);
+  run->curves.degree = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
+  run->curves.certain = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
+}
+
+static hs_run make_run(const hs_model *model, const hs_method *method, hs_scheme scheme, hs_store *store) {
   static const hs_run empty;
   hs_run run = empty;
   run.model = model;
   run.method = method;
   run.width = model->width;
   lay_out(&run, store);
+  if (scheme == HS_LOCATED) lay_out_located(&run, store);
   return run;
 }
 
 /* How many numbers a run's workspace needs. */
-int64_t hs_workspace(const hs_model *model, const hs_method *method) {
+int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme) {
   hs_store store = {0, 0};
-  make_run(model, method, &store);
+  make_run(model, method, scheme, &store);
   return store.used;
 }
 
 void hs_simulate(hs_task *task) {
   hs_store store = {task->workspace, 0};
-  hs_run run = make_run(task->model, task->method, &store);
+  hs_run run = make_run(task->model, task->method, (hs_scheme)task->settings.scheme, &store);
   run.task = task;
   run.epsilon = task->settings.relaxation;
   run.until = task->settings.until;
@@ -106,10 +162,14 @@ void hs_simulate(hs_task *task) {
   run.polled = clock();
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
-  relaxed(&run, enter(&run, task->mode, task->dimension, 0.0, 0));
+  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0);
+  if (task->settings.scheme == HS_LOCATED)
+    located(&run, entered);
+  else
+    relaxed(&run, entered);
 }
 
 /* Sizes of the structures a caller fills, so that it can check its own idea of them. */
 HS_EXPORT const int64_t hs_sizes[] = {
     sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_method), sizeof(hs_timeline),
-    sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task)};
+    sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task)};

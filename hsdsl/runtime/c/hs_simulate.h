@@ -36,6 +36,7 @@ typedef struct {
   hs_row error;  /* weights less those of the embedded method */
   hs_row coarse; /* and less those of a second one; no terms where there is none */
   const hs_row *dense;
+  double gain; /* by how much a step can enlarge the round-off of its stages */
 } hs_method;
 
 /* Time cut at the samples of inputs; segment i has the numbers data[i*model->data ...] to bind routines to. */
@@ -47,6 +48,20 @@ typedef struct {
   const double *data;
 } hs_timeline;
 
+enum { HS_TESTS = 3 };
+
+/* How functions are interpolated: values at the nodes times the matrix are coefficients of powers, held against the
+   functions at the tests. */
+typedef struct {
+  int degree;
+  const double *nodes, *tests, *matrix;
+  double share; /* how far a function may be off, relative to its largest value */
+} hs_interpolation;
+
+enum { HS_ALONG_STEPS, HS_OVER_TIME };
+
+typedef enum { HS_RELAXED, HS_LOCATED } hs_scheme;
+
 typedef struct {
   double step;      /* the first one, of an adaptive method */
   double tolerance; /* 0 for a fixed step */
@@ -54,6 +69,7 @@ typedef struct {
   double relaxation;
   double until;
   int64_t max_transitions;
+  int64_t scheme;
 } hs_settings;
 
 enum { HS_FLOW, HS_STRIP };
@@ -74,10 +90,23 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
+typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED } hs_notice;
+
+/* What a run says besides: see hsdsl/simulate/notes.py. `surface` is an edge where there is no doubt about a surface. */
+typedef struct {
+  int32_t kind;
+  int32_t mode;
+  int64_t surface;
+  int64_t number;
+  double time;
+  double other;
+} hs_note;
+
 typedef struct {
   int64_t row_room, rows;
   int64_t arc_room, arcs;
   int64_t transition_room, transitions;
+  int64_t note_room, notes;
   double *times;   /* (row) */
   double *values;  /* (row, width) */
   double *outputs; /* (row, outputs) */
@@ -88,6 +117,7 @@ typedef struct {
   double *before, *after;  /* (transition, width) */
   int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's behind the other's */
   int64_t alternatives_used;
+  hs_note *note;
 } hs_chunk;
 
 /* States that one chain of transitions at an instant has been in. */
@@ -109,12 +139,16 @@ typedef enum {
   HS_HERE_NOT_FINITE,
   HS_ENTERED_OUTSIDE,
   HS_STUCK,
-  HS_INTERRUPTED
+  HS_INTERRUPTED,
+  HS_LEFT,
+  HS_STEP_NOT_FINITE,
+  HS_ACCUMULATED
 } hs_reason;
 
 typedef enum { HS_CLEAR, HS_WALL, HS_DEEP, HS_FLAT, HS_INWARD, HS_NOT_FINITE, HS_ERROR, HS_CREEPING } hs_obstacle;
 
-/* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size. */
+/* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
+   `slope` is the end of a step along which something has no value. */
 typedef struct {
   int32_t reason;
   int32_t mode;
@@ -135,6 +169,7 @@ struct hs_task {
   const hs_method *method;
   const hs_timeline *timeline;
   hs_settings settings;
+  const hs_interpolation *interpolation; /* two of them, for the located scheme */
   int32_t mode, dimension; /* the start */
   const double *x;
   double *workspace; /* hs_workspace() numbers */
@@ -149,7 +184,7 @@ struct hs_task {
 };
 
 extern HS_EXPORT const int64_t hs_sizes[];
-HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method);
+HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
 
 #endif

@@ -12,7 +12,7 @@ static int make_chunk(hs_run *run) {
 HS_INLINE int room(hs_run *run) {
   const hs_chunk *chunk = &run->task->chunk;
   return (chunk->rows < chunk->row_room && chunk->arcs < chunk->arc_room &&
-          chunk->transitions < chunk->transition_room) ||
+          chunk->transitions < chunk->transition_room && chunk->notes < chunk->note_room) ||
          make_chunk(run);
 }
 
@@ -76,6 +76,9 @@ static void strip(hs_run *run, int rows, double (*row)[2], const double *q) {
 static void record(hs_run *run, const hs_crossing *crossing, double resumed, const double *after, int entry) {
   hs_chunk *chunk = &run->task->chunk;
   const int w = run->width;
+  const hs_edge *edge = &run->here.table->edge[crossing->edge];
+  const hs_made made = {crossing->time, resumed, run->here.mode, crossing->edge, edge->target, entry};
+  run->made[run->jump % FREE] = made;
   run->jump++;
   run->task->made = run->jump;
   if (!room(run)) return;
@@ -90,5 +93,23 @@ static void record(hs_run *run, const hs_crossing *crossing, double resumed, con
   for (int a = 0; a < run->alternatives_count; a++)
     chunk->alternatives[chunk->alternatives_used++] = run->alternatives[a];
   copy(chunk->before + i * w, crossing->state, run->here.dimension);
-  if (after) copy(chunk->after + i * w, after, run->here.table->edge[crossing->edge].target_dimension);
+  if (after) copy(chunk->after + i * w, after, edge->target_dimension);
+}
+
+static void note(hs_run *run, hs_notice kind, int surface, int64_t number, double time, double other) {
+  if (!room(run)) return;
+  hs_note *note = &run->task->chunk.note[run->task->chunk.notes++];
+  note->kind = kind;
+  note->mode = run->here.mode;
+  note->surface = surface;
+  note->number = number;
+  note->time = time;
+  note->other = other;
+}
+
+/* Note that surface k would not settle on a polynomial: once for each. */
+static void doubt(hs_run *run, int k, double time) {
+  int *const doubted = &run->doubted[run->here.mode * run->model->surfaces + k];
+  if (!*doubted) note(run, HS_UNSETTLED, k, 0, time, time);
+  *doubted = 1;
 }

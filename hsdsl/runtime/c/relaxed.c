@@ -189,20 +189,24 @@ static int through_strip(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  return enter(run, edge->target, edge->target_dimension, resumed, 1);
+  return enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0);
+}
+
+/* Enter the next segment of the inputs: anew where one of them jumps. */
+static int go_on(hs_run *run) {
+  const double t = run->here.t;
+  const int standing_before = run->here.standing;
+  const int64_t segment = segment_at(run->task->timeline, t);
+  if (run->task->timeline->jump[segment]) return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0);
+  place(run, run->here.mode, run->here.dimension, t, 0);
+  run->here.standing = standing_before;
+  return GOES_ON;
 }
 
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int at_boundary(hs_run *run) {
   const double t = run->here.t;
-  const int standing_before = run->here.standing;
-  if (t < run->until) {
-    const int64_t segment = segment_at(run->task->timeline, t);
-    if (run->task->timeline->jump[segment]) return enter(run, run->here.mode, run->here.dimension, t, 0);
-    place(run, run->here.mode, run->here.dimension, t, 0);
-    run->here.standing = standing_before;
-    return GOES_ON;
-  }
+  if (t < run->until) return go_on(run);
   const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);

@@ -35,6 +35,13 @@ static void place(hs_run *run, int mode, int dimension, double t, const hs_here 
   copy(run->entered, run->x, dimension);
 }
 
+/* Be in the same mode later, standing on the surface of edge k alone. */
+static void stand(hs_run *run, double t, int k) {
+  place(run, run->here.mode, run->here.dimension, t, 0);
+  for (int i = 0; i < run->here.table->surfaces; i++) run->stood_on[i] = i == k;
+  run->here.standing = 1;
+}
+
 static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }
 
 /* Whether edge `a` goes before edge `b` of those tied: the higher priority, then the file's order. */

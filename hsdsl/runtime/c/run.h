@@ -16,6 +16,7 @@
 
 #define HS_UNIT 0x1p-53
 #define HS_TIE 1e-12
+#define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
 
 /* A step's interpolant: x + c_1 s + c_2 s**2 + ..., power m at c[m*width]. */
 typedef struct {
@@ -68,6 +69,31 @@ typedef struct {
   int idle, creeping;
 } hs_patience;
 
+/* What is remembered of a transition. */
+typedef struct {
+  double time, resumed;
+  int mode, edge, target, entry;
+} hs_made;
+
+/* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
+typedef struct {
+  double low, high, *b;
+} hs_cut;
+
+/* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
+typedef struct {
+  int parts, count, room; /* room: numbers for each polynomial */
+  double *start, *width, *c;
+  int *degree, *certain; /* for each part and surface */
+} hs_curves;
+
+/* One step of the located scheme. */
+typedef struct {
+  double t, h, t1;
+  double *x, *largest; /* where it began; of a table, the largest of its stages */
+  hs_polynomial piece;
+} hs_span;
+
 typedef struct {
   hs_task *task;
   const hs_model *model;
@@ -97,6 +123,17 @@ typedef struct {
   int interrupted, full;
   long steps_to_poll, poll_steps;
   clock_t polled;
+  /* of the located scheme */
+  hs_span span, before;
+  int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
+  double ratio;                     /* of the last error estimate */
+  hs_curves curves;
+  hs_cut *cuts;
+  double *binomials, *left, *rows, *second; /* second: series of order 2 */
+  double *q, *ends, *starts, *other_end, **other_k;
+  int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
+  int *doubted, noted_crowded;      /* doubted: for each mode and surface */
+  hs_made made[FREE];
 } hs_run;
 
 static inline double tie(double t) { return HS_TIE * hs_max(1.0, fabs(t)); }

@@ -58,12 +58,17 @@ static int noise_of(hs_run *run, int k, double t, const double *x, int entry, do
   return 0;
 }
 
-/* Look at the surfaces on entry: mark in `beyond` those the state is beyond, and note those it stands on. */
-static int enter_surfaces(hs_run *run, double t, const double *values, int *beyond) {
+/* Look at the surfaces on entry: mark in `beyond` those the state is beyond, and note those it stands on.
+   A surface that the flow passes within the time `since` counts as stood on. */
+static int enter_surfaces(hs_run *run, double t, const double *values, double since, int *beyond) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
-    double noise;
+    double noise, rate;
     run->stood_on[k] = beyond[k] = 0;
     if (noise_of(run, k, t, run->x, 1, &noise)) return RAISED;
+    if (since != 0 && fabs(values[k]) > noise) {
+      if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
+      noise = hs_max(noise, fabs(rate) * since);
+    }
     if (values[k] > noise)
       beyond[k] = 1;
     else if (values[k] >= -noise)
@@ -176,14 +181,22 @@ static hs_found excursion(hs_run *run, hs_trial *trial) {
   return CLEAR;
 }
 
-/* Close a bracket f(a) <= 0 < f(b) of surface k on an interpolant (Illinois). */
-static int close_bracket(hs_run *run, const hs_polynomial *piece, int k, double a, double fa, double b, double fb,
-                         double small, double *theta) {
+/* Surface k at the share s of a step. */
+typedef int hs_value(hs_run *run, const hs_polynomial *piece, int k, double s, double *r);
+
+static int on_piece(hs_run *run, const hs_polynomial *piece, int k, double s, double *r) {
+  at(run, piece, s, run->at);
+  return surface(run, k, run->trial.t + s * run->trial.h, run->at, r);
+}
+
+/* Close a bracket value(a) = fa <= 0 < value(b) = fb (Illinois), to where it is below `small` or a few `unit`. */
+HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *piece, int k, double a, double fa,
+                            double b, double fb, double small, double unit, double *theta) {
   double weight_a = fa, weight_b = fb;
   int side = 0;
   *theta = a;
   for (int i = 0; i < ROOT_ITERATIONS; i++) {
-    if (-fa <= small || b - a <= 4 * HS_UNIT) break;
+    if (-fa <= small || b - a <= 4 * unit) break;
     if (fb <= small) {
       *theta = b;
       break;
@@ -191,8 +204,7 @@ static int close_bracket(hs_run *run, const hs_polynomial *piece, int k, double 
     if (weight_b - weight_a == 0) return RAISED;
     double s = a - weight_a * (b - a) / (weight_b - weight_a), f;
     if (!(a < s && s < b)) s = (a + b) / 2;
-    at(run, piece, s, run->at);
-    if (surface(run, k, run->trial.t + s * run->trial.h, run->at, &f)) return RAISED;
+    if (value(run, piece, k, s, &f)) return RAISED;
     if (f <= 0) {
       if (side < 0) weight_b = weight_b / 2;
       a = s, fa = f, weight_a = f, side = -1;
@@ -209,13 +221,11 @@ static int close_bracket(hs_run *run, const hs_polynomial *piece, int k, double 
    not-a-number if it never does. */
 static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, double small, double *theta) {
   double a, fa, b = 1.0, fb;
-  at(run, piece, b, run->at);
-  if (surface(run, k, run->trial.t + b * run->trial.h, run->at, &fb)) return RAISED;
+  if (on_piece(run, piece, k, b, &fb)) return RAISED;
   for (int i = SCAN - 1; i >= 0; i--) {
     a = 1.0 * i / SCAN;
-    at(run, piece, a, run->at);
-    if (surface(run, k, run->trial.t + a * run->trial.h, run->at, &fa)) return RAISED;
-    if (fa <= 0) return close_bracket(run, piece, k, a, fa, b, fb, small, theta);
+    if (on_piece(run, piece, k, a, &fa)) return RAISED;
+    if (fa <= 0) return close_bracket(run, on_piece, piece, k, a, fa, b, fb, small, HS_UNIT, theta);
     b = a, fb = fa;
   }
   *theta = NAN;

@@ -1,0 +1,161 @@
+/* Surfaces along one step, as polynomials of the share s of the step. See hsdsl/simulate/along.py. */
+
+#define MOST_SPLITS 30 /* MOST_HALVINGS there */
+#define MOST_PIECES 1000
+#define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
+#define ROUNDING 8
+#define LEAST_MOST_DEGREE 6 /* of interpolation where a method asks for less */
+
+typedef int hs_functions(hs_run *run, double s, double *values);
+typedef int hs_allowed(hs_run *run, int k, double *allowed);
+
+/* Where a surface rises above its level: the root before it, its slope there, by the share of the step. */
+typedef struct {
+  double share, slope;
+  int certain;
+} hs_rise;
+
+/* A walk along surface k; `risen` says that it is above round-off at the end of the step. */
+typedef struct {
+  int k, risen, outside, part;
+  double level, at;
+} hs_walk;
+
+static double *coefficients_of(const hs_curves *curves, int part, int k) {
+  return curves->c + ((int64_t)part * curves->count + k) * curves->room;
+}
+
+static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
+
+static hs_walk begin_walk(const hs_curves *curves, int k, double level, int risen) {
+  const hs_walk walk = {k, risen, coefficients_of(curves, 0, k)[0] > level, 0, level, 0.0};
+  return walk;
+}
+
+/* The last root before `end`; a series that begins with zero has it taken out, so that tiny roots stay exact. */
+static double root_of(hs_run *run, const double *c, int n, double start, double end) {
+  const int reduced = start == 0 && c[0] == 0 && n > 0;
+  double root;
+  return last_root(run, c + reduced, n - reduced, start, end, &root) ? root : start;
+}
+
+static double slope_of(const double *c, int n, double s) {
+  double slope = s * 0;
+  for (int k = n; k > 0; k--) slope = k * c[k] + s * slope;
+  return slope;
+}
+
+/* Give the next point where the surface rises through zero and goes on above its level: 1; 0 where there is none. */
+static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
+  const hs_curves *curves = &run->curves;
+  for (; walk->part < curves->parts; walk->part++, walk->at = 0.0) {
+    const double *c = coefficients_of(curves, walk->part, walk->k);
+    const int n = *degree_of(curves, walk->part, walk->k);
+    double sizes = 0.0, high;
+    for (int i = 0; i <= n; i++) sizes = sizes + fabs(c[i]);
+    const double above = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
+    if (walk->outside) {
+      if (!rises(run, c, n, -1.0, 0.0, walk->at, &walk->at)) continue;
+      walk->outside = 0;
+    }
+    if (!rises(run, c, n, 1.0, above, walk->at, &high)) {
+      if (!(walk->part == curves->parts - 1 && walk->risen && walk->at < 1)) continue;
+      high = 1.0;
+    }
+    const double root = root_of(run, c, n, walk->at, high), width = curves->width[walk->part];
+    rise->share = curves->start[walk->part] + root * width;
+    rise->slope = slope_of(c, n, root) / width;
+    rise->certain = curves->certain[walk->part * curves->count + walk->k];
+    walk->at = high;
+    walk->outside = 1;
+    return 1;
+  }
+  return 0;
+}
+
+/* How far a polynomial is off the values it should have at some points. */
+static double residual(const double *c, const hs_interpolation *by, const double *wanted, int every) {
+  double worst = fabs(value_of(c, by->degree, by->tests[0]) - wanted[0]);
+  for (int i = 1; i < HS_TESTS; i++)
+    worst = hs_max(worst, fabs(value_of(c, by->degree, by->tests[i]) - wanted[i * every]));
+  return worst;
+}
+
+/* Whether a residual of function k is small enough; what is allowed beyond that is asked where it matters. */
+static int settles(hs_run *run, double off, double enough, hs_allowed *allowed, int k, int *answer) {
+  double more;
+  *answer = off <= enough;
+  if (*answer) return 0;
+  if (allowed(run, k, &more)) return RAISED;
+  *answer = off <= more + enough;
+  return 0;
+}
+
+/* Interpolate functions on one part of a step; `settled` says whether all of them are close enough. */
+static int interpolate_part(hs_run *run, hs_functions *functions, const hs_interpolation *by, hs_allowed *allowed,
+                            int *settled) {
+  hs_curves *const curves = &run->curves;
+  const int part = curves->parts, count = curves->count, nodes = by->degree + 1;
+  const double start = curves->start[part], width = curves->width[part];
+  double *const rows = run->rows, *const checks = rows + nodes * count;
+  for (int i = 0; i < nodes; i++)
+    if (functions(run, start + width * by->nodes[i], rows + i * count)) return RAISED;
+  for (int i = 0; i < HS_TESTS; i++)
+    if (functions(run, start + width * by->tests[i], checks + i * count)) return RAISED;
+  *settled = 1;
+  for (int k = 0; k < count; k++) {
+    double *const c = coefficients_of(curves, part, k), largest = fabs(rows[k]);
+    for (int j = 0; j < nodes; j++) {
+      c[j] = 0.0;
+      for (int i = 0; i < nodes; i++) c[j] = c[j] + by->matrix[j * nodes + i] * rows[i * count + k];
+    }
+    for (int i = 1; i < nodes; i++) largest = hs_max(largest, fabs(rows[i * count + k]));
+    int *const certain = &curves->certain[part * count + k];
+    if (settles(run, residual(c, by, checks + k, count), by->share * largest, allowed, k, certain)) return RAISED;
+    *settled &= *certain;
+    *degree_of(curves, part, k) = by->degree;
+  }
+  return 0;
+}
+
+/* Take functions that would not settle on the part as straight lines. */
+static void straighten(hs_run *run, int degree) {
+  const hs_curves *curves = &run->curves;
+  const int part = curves->parts, count = curves->count;
+  for (int k = 0; k < count; k++) {
+    if (curves->certain[part * count + k]) continue;
+    double *const c = coefficients_of(curves, part, k);
+    c[0] = run->rows[k];
+    c[1] = run->rows[degree * count + k] - run->rows[k];
+    *degree_of(curves, part, k) = 1;
+  }
+}
+
+/* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
+   `allowed` more: to run->curves. */
+static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
+                        hs_allowed *allowed) {
+  struct {
+    double start, width;
+    int halvings;
+  } parts[MOST_SPLITS + 2] = {{0.0, 1.0, 0}};
+  hs_curves *const curves = &run->curves;
+  int open = count > 0, settled;
+  curves->parts = 0;
+  curves->count = count;
+  while (open) {
+    const double start = parts[--open].start, width = parts[open].width;
+    const int halvings = parts[open].halvings;
+    curves->start[curves->parts] = start, curves->width[curves->parts] = width;
+    if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
+    if (!settled && halvings < MOST_SPLITS && curves->parts < MOST_PIECES) {
+      const double half = width / 2;
+      parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;
+      parts[open].start = start, parts[open].width = half, parts[open++].halvings = halvings + 1;
+      continue;
+    }
+    if (!settled) straighten(run, by->degree);
+    curves->parts++;
+  }
+  return 0;
+}

@@ -1,0 +1,149 @@
+/* Where polynomials change sign on [0, 1], with the Bernstein form as the certificate. See hsdsl/simulate/isolate.py.
+   A polynomial of degree n is c[0] + c[1] s + ... + c[n] s**n. */
+
+#define MOST_REFINEMENTS 300
+#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
+
+/* C(n, 0) to C(n, n). */
+static const double *binomials(const hs_run *run, int n) { return run->binomials + n * (n + 1) / 2; }
+
+static void fill_binomials(double *row, int most) {
+  for (int n = 0; n <= most; n++, row += n)
+    for (int k = 0; k <= n; k++) row[k] = k == 0 || k == n ? 1.0 : (row - n)[k - 1] + (row - n)[k];
+}
+
+/* Bernstein coefficients on [0, 1] of `sign` times a polynomial, less `level`. */
+HS_INLINE void bernstein(const hs_run *run, const double *c, int n, double sign, double level, double *b) {
+  const double *choose = binomials(run, n);
+  for (int k = 0; k <= n; k++) b[k] = sign * c[k] / choose[k];
+  for (int k = 1; k <= n; k++)
+    for (int i = n; i >= k; i--) b[i] = b[i] + b[i - 1];
+  for (int i = 0; i <= n; i++) b[i] = b[i] - level;
+}
+
+HS_INLINE double largest_of(const double *b, int n) {
+  double most = b[0];
+  for (int i = 1; i <= n; i++) most = hs_max(most, b[i]);
+  return most;
+}
+
+/* Whether the polynomial is nowhere above 0 on [0, 1], by bounds that may not see it. */
+static int stays_below(hs_run *run, const double *c, int n) {
+  double bound = c[0];
+  for (int k = 1; k <= n; k++)
+    if (c[k] > 0) bound = bound + c[k];
+  if (bound <= 0.0) return 1;
+  bernstein(run, c, n, 1.0, 0.0, run->cuts[0].b);
+  return largest_of(run->cuts[0].b, n) <= 0.0;
+}
+
+/* Cut an interval at the share s: `left` gets the coefficients before it, `b` those behind it (de Casteljau). */
+static void split(double *b, int n, double s, double *left) {
+  const double rest = 1 - s;
+  left[0] = b[0];
+  for (int j = 1; j <= n; j++) {
+    for (int i = 0; i <= n - j; i++) b[i] = rest * b[i] + s * b[i + 1];
+    left[j] = b[0];
+  }
+}
+
+static double value_of(const double *c, int n, double s) {
+  double total = c[n];
+  for (int k = n - 1; k >= 0; k--) total = c[k] + s * total;
+  return total;
+}
+
+/* Changes of sign, zeros left out. */
+static int changes(const double *b, int n) {
+  int count = 0, before = -1;
+  for (int i = 0; i <= n; i++) {
+    if (b[i] == 0) continue;
+    const int sign = b[i] > 0;
+    count += before >= 0 && sign != before;
+    before = sign;
+  }
+  return count;
+}
+
+/* Find a point from `start` on where `sign` times the polynomial is above `level`, not having come back down before
+   it: 1; 0 where it is nowhere above, up to intervals shorter than a unit of round-off. */
+static int rises(hs_run *run, const double *c, int n, double sign, double level, double start, double *point) {
+  hs_cut *const cuts = run->cuts;
+  int open = 1;
+  bernstein(run, c, n, sign, level, cuts[0].b);
+  if (start > 0) split(cuts[0].b, n, start, run->left);
+  cuts[0].low = start, cuts[0].high = 1.0;
+  while (open) {
+    hs_cut *const cut = &cuts[--open];
+    double *const b = cut->b;
+    const double low = cut->low, high = cut->high;
+    if (largest_of(b, n) <= 0) continue;
+    if (b[0] > 0) return *point = low, 1;
+    if (b[n] > 0 && (changes(b, n) == 1 || high - low <= HS_UNIT)) return *point = high, 1;
+    if (high - low > HS_UNIT) {
+      const double middle = (low + high) / 2;
+      split(b, n, 0.5, cuts[open + 1].b);
+      cut->low = middle, cut->high = high;
+      cuts[open + 1].low = low, cuts[open + 1].high = middle;
+      open += 2;
+    }
+  }
+  return 0;
+}
+
+/* Close a bracket P(a) <= 0 < P(b) of one root to the last bits (Illinois; bisection where that creeps). */
+static double refined(const double *c, int n, double a, double b) {
+  const double fa = value_of(c, n, a), fb = value_of(c, n, b);
+  if (!(fa < 0)) return a;
+  if (!(fb > 0)) return b;
+  double weight_a = fa, weight_b = fb;
+  int side = 0;
+  for (int count = 0; count < MOST_REFINEMENTS; count++) {
+    double s = a - weight_a * (b - a) / (weight_b - weight_a);
+    if (!(a < s && s < b) || count % 8 == 7) {
+      s = (a + b) / 2;
+      if (!(a < s && s < b)) break;
+    }
+    const double f = value_of(c, n, s);
+    if (f == 0) return s;
+    if (f < 0) {
+      if (side < 0) weight_b = weight_b / 2;
+      a = s, weight_a = f, side = -1;
+    } else {
+      if (side > 0) weight_a = weight_a / 2;
+      b = s, weight_b = f, side = 1;
+    }
+  }
+  return a;
+}
+
+/* Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at `end`: 1;
+   0 where it is positive all the way. */
+static int last_root(hs_run *run, const double *c, int n, double start, double end, double *root) {
+  hs_cut *const cuts = run->cuts;
+  int open = 1;
+  bernstein(run, c, n, 1.0, 0.0, cuts[0].b);
+  if (end < 1) {
+    split(cuts[0].b, n, end, run->left);
+    copy(cuts[0].b, run->left, n + 1);
+  }
+  if (start > 0) split(cuts[0].b, n, start / end, run->left);
+  cuts[0].low = start, cuts[0].high = end;
+  while (open) {
+    hs_cut *const cut = &cuts[--open];
+    double *const b = cut->b;
+    const double low = cut->low, high = cut->high;
+    double least = b[0];
+    for (int i = 1; i <= n; i++) least = hs_min(least, b[i]);
+    if (least > 0) continue;
+    if (b[0] <= 0 && 0 < b[n] && changes(b, n) <= 1) return *root = refined(c, n, low, high), 1;
+    if (high - low <= HS_UNIT) return *root = low, 1;
+    const double middle = (low + high) / 2;
+    copy(cuts[open + 1].b, b, n + 1);
+    split(cuts[open + 1].b, n, 0.5, cut->b);
+    cut->low = low, cut->high = middle;
+    cuts[open + 1].low = middle, cuts[open + 1].high = high;
+    open += 2;
+  }
+  return 0;
+}

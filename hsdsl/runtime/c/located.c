@@ -1,0 +1,284 @@
+/* The located scheme: Burden et al. 2013, Fig. 8. See hsdsl/simulate/located.py. */
+
+#define MOST_CORRECTIONS 8
+
+enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON, LANDED and reasons to stop */
+
+/* Whether the polynomials of surface k say that it is not crossed. */
+static int is_passed_by(hs_run *run, int k) {
+  const hs_curves *curves = &run->curves;
+  if (run->stood_on[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
+  if (!(run->ends[k] <= 0)) return 0;
+  for (int i = 0; i < curves->parts; i++)
+    if (!stays_below(run, coefficients_of(curves, i, k), *degree_of(curves, i, k))) return 0;
+  return 1;
+}
+
+/* Surface k at the share s of the step; the state there is run->q. */
+static int residual_of(hs_run *run, const hs_polynomial *piece, int k, double s, double *r) {
+  double time;
+  (void)piece;
+  return span_point(run, s, &time, &run->q) || surface(run, k, time, run->q, r) ? RAISED : 0;
+}
+
+/* Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there. */
+static int bracketed(hs_run *run, int k, double *s) {
+  double width = 8 * HS_UNIT * hs_max(*s, HS_UNIT), below, above;
+  while (width < 1) {
+    const double low = hs_max(*s * 0, *s - width), high = hs_min(1.0, *s + width);
+    if (residual_of(run, 0, k, low, &below) || residual_of(run, 0, k, high, &above)) return RAISED;
+    if (below < 0 && above == 0) return *s = high, 0;
+    if (below <= 0 && 0 < above)
+      return close_bracket(run, residual_of, 0, k, low, below, high, above, *s * 0, HS_UNIT * *s, s);
+    width = width * 16;
+  }
+  return 0;
+}
+
+/* Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket. */
+static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossing) {
+  double s = rise->share, best = s, least = NAN, r, noise;
+  for (int i = 0; i < MOST_CORRECTIONS; i++) {
+    if (span_point(run, s, &crossing->time, &crossing->state) || surface(run, k, crossing->time, crossing->state, &r))
+      return RAISED;
+    if (i && !(fabs(r) < least)) break;
+    least = fabs(r), best = s;
+    crossing->theta = s;
+    if (rise->slope == 0) return 0;
+    if (noise_of(run, k, crossing->time, crossing->state, run->stood_on[k], &noise)) return RAISED;
+    if (fabs(r) <= noise) return 0;
+    s = hs_min(1.0, hs_max(s * 0, s - r / rise->slope));
+  }
+  if (bracketed(run, k, &best)) return RAISED;
+  crossing->theta = best;
+  return span_point(run, best, &crossing->time, &crossing->state);
+}
+
+/* Find the first point of the step where surface k is crossed and its condition holds: 1, or 0. */
+static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
+  const hs_span *span = &run->span;
+  double first, last;
+  if (is_passed_by(run, k)) return 0;
+  if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t1, run->z, 0, &last)) return RAISED;
+  hs_walk walk = begin_walk(&run->curves, k, hs_max(first, last), run->ends[k] > last);
+  hs_rise rise;
+  while (next_rise(run, &walk, &rise)) {
+    if (settled(run, k, &rise, crossing)) return RAISED;
+    const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
+    if (holds == RAISED) return RAISED;
+    if (!holds) continue;
+    if (!rise.certain) doubt(run, k, crossing->time);
+    crossing->edge = k;
+    crossing->depth = 0.0;
+    return 1;
+  }
+  return 0;
+}
+
+/* The sizes of the numbers behind the chosen crossing's state, to run->landed: the terms of its step and of the one
+   before. */
+static void largest(hs_run *run) {
+  const hs_crossing *crossing = &run->chosen;
+  sizes(run, run->x, crossing->state);
+  for (int s = 0; s < run->here.dimension; s++) {
+    double *const found = &run->landed[s];
+    *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
+    if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
+    if (run->stood_on[crossing->edge]) *found = hs_max(*found, run->scale[s]);
+  }
+}
+
+/* Record the part of the step that leads to a crossing. */
+static void write_crossing(hs_run *run, const hs_crossing *crossing) {
+  if (!(crossing->theta > 0)) return;
+  if (run->method->degree > 0) span_cut(run, crossing->theta, &run->cubic);
+  append(run, crossing->time, crossing->state, &run->cubic);
+}
+
+static int walked_out(hs_run *run, const hs_crossing *wall) {
+  write_crossing(run, wall);
+  run->task->stop.surface = wall->edge;
+  return stopped(run, HS_LEFT, wall->time);
+}
+
+/* A wall is reached before any guard: take the guards that it is reached together with, how many there are. */
+static int guards_at(hs_run *run, const hs_crossing *wall) {
+  const double time = wall->time, theta = wall->theta, depth = wall->depth;
+  int count = 0;
+  copy(run->q, wall->state, run->here.dimension);
+  standing(run, time, run->q, tie(time), run->tied);
+  for (int k = 0; k < run->here.table->edges; k++) {
+    if (!run->tied[k]) continue;
+    hs_crossing *const crossing = &run->crossings[count++];
+    crossing->edge = k;
+    crossing->theta = theta, crossing->time = time, crossing->depth = depth;
+    copy(crossing->state, run->q, run->here.dimension);
+  }
+  return count;
+}
+
+/* Say what happens first along the step: a guard, a wall with no guard on it, or nothing (GOES_ON). */
+static int first_event(hs_run *run) {
+  const hs_mode *mode = run->here.table;
+  int guards = 0, tied = 0;
+  hs_crossing *wall = 0;
+  for (int k = 0; k < mode->surfaces; k++) {
+    hs_crossing *const crossing = &run->crossings[k < mode->edges ? guards : k];
+    const int found = first_crossing(run, k, crossing);
+    if (found == RAISED) return WITHOUT_VALUE;
+    if (!found) continue;
+    if (k < mode->edges)
+      guards++;
+    else if (!wall || crossing->time < wall->time)
+      wall = crossing;
+  }
+  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);
+  if (wall && !tied && !(guards = guards_at(run, wall))) return walked_out(run, wall);
+  if (!guards) return GOES_ON;
+  choose(run, guards);
+  write_crossing(run, &run->chosen);
+  largest(run);
+  return LANDED;
+}
+
+/* No step is short enough: take a guard that the state stands on, or stop and say why. */
+static int located_stuck(hs_run *run, hs_obstacle kind) {
+  const int count = kind == HS_NOT_FINITE ? standing_on(run) : 0;
+  if (count) {
+    choose(run, count);
+    sizes(run, run->x, run->x);
+    return LANDED;
+  }
+  if (run->here.table->flow(run->here.p, run->here.t, run->x, run->task->stop.slope))
+    return stopped(run, HS_HERE_NOT_FINITE, run->here.t);
+  run->task->stop.obstacle = kind;
+  run->task->stop.surface = -1;
+  return stopped(run, HS_STUCK, run->here.t);
+}
+
+static int step_not_finite(hs_run *run) {
+  copy(run->task->stop.slope, run->z, run->here.dimension);
+  return stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+}
+
+/* Go on at the end of the step. */
+HS_INLINE void go_to_end(hs_run *run) {
+  const hs_span before = run->before;
+  run->before = run->span;
+  run->span = before;
+  run->has_before = 1;
+  run->here.t = run->before.t1;
+  swap(&run->x, &run->z);
+  swap(&run->slope, &run->end);
+  run->k[0] = run->slope;
+  run->k[run->method->stages] = run->end;
+}
+
+/* Step until a surface is crossed, or to the segment's end. */
+HS_INLINE int located_flow_in(hs_run *run, const int n) {
+  hs_here *const here = &run->here;
+  const double limit = run->task->timeline->end[here->segment];
+  run->sloped = run->creeping = run->has_before = 0;
+  run->ratio = 1;
+  forget_steps(run);
+  while (here->t < limit) {
+    if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
+    const hs_obstacle obstacle = next_span(run, n, limit);
+    if (obstacle != HS_CLEAR) return located_stuck(run, obstacle);
+    const int event = first_event(run);
+    if (event == WITHOUT_VALUE) return step_not_finite(run);
+    if (event != GOES_ON) return event;
+    if (here->standing) leave(run, run->span.t1, run->z);
+    append(run, run->span.t1, run->z, &run->span.piece);
+    go_to_end(run);
+  }
+  return AT_BOUNDARY;
+}
+
+static int located_flow(hs_run *run) {
+  switch (run->here.dimension) {
+    case 1: return located_flow_in(run, 1);
+    case 2: return located_flow_in(run, 2);
+    default: return located_flow_in(run, run->here.dimension);
+  }
+}
+
+/* Whether the transition before this one was made at the same instant. */
+static int same_instant(const hs_run *run, double t) {
+  if (!run->jump) return 0;
+  const double resumed = made_before(run, 0)->resumed;
+  return resumed == resumed && t - resumed <= tie(t);
+}
+
+/* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit. */
+static int crowded(const hs_run *run, double t) {
+  double flight, ratio;
+  if (run->jump < FREE || contraction(run, &flight, &ratio)) return 0;
+  double flown = t - made_before(run, FREE - 1)->time;
+  for (int i = FREE - 1; i >= 0; i--) {
+    const hs_made *made = made_before(run, i);
+    flown = flown - (made->resumed == made->resumed ? made->resumed - made->time : 0);
+  }
+  return flown <= run->epsilon;
+}
+
+/* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */
+static int jump(hs_run *run) {
+  const hs_crossing *crossing = &run->chosen;
+  const double t = crossing->time, until = run->until;
+  const int k = crossing->edge;
+  const hs_edge *edge = &run->here.table->edge[k];
+  double resumed = t;
+  if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
+  const int without_value = reset(run, run->landed);
+  if (crowded(run, t)) {
+    if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
+    run->noted_crowded = 1;
+    resumed = t + run->epsilon;
+    if (resumed > until + tie(until)) {
+      double rows[2][2] = {{t, 0.0}, {until, until - t}};
+      strip(run, 2, rows, crossing->state);
+      record(run, crossing, NAN, 0, 0);
+      return in_strip(run, HS_UNTIL_IN_STRIP, until);
+    }
+    resumed = hs_min(resumed, until);
+  }
+  if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);
+  if (resumed > t) {
+    double rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
+    strip(run, 2, rows, crossing->state);
+  }
+  const double since = run->alternatives_count || same_instant(run, t) ? tie(t) : 0.0;
+  record(run, crossing, resumed, run->after, 0);
+  copy(run->x, run->after, edge->target_dimension);
+  copy(run->scale, run->both, edge->target_dimension);
+  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since);
+  return entered == GOES_ON ? close_tail(run, k) : entered;
+}
+
+/* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
+static int located_at_boundary(hs_run *run) {
+  const double t = run->here.t;
+  if (t < run->until) return go_on(run);
+  const int count = rests(run) >= 0 ? 0 : standing_on(run);
+  if (!count) return stopped(run, HS_UNTIL, t);
+  choose(run, count);
+  sizes(run, run->x, run->x);
+  return jump(run);
+}
+
+/* Follow the execution from where the run stands until it stops. */
+static void located(hs_run *run, int outcome) {
+  while (outcome == GOES_ON) {
+    const int edge = run->here.t < run->until ? rests(run) : -1;
+    if (edge >= 0) hold(run, edge);
+    if (interrupted(run))
+      outcome = stopped(run, HS_INTERRUPTED, run->here.t);
+    else
+      outcome = run->here.t < run->task->timeline->end[run->here.segment] ? located_flow(run) : AT_BOUNDARY;
+    if (outcome == LANDED)
+      outcome = jump(run);
+    else if (outcome == AT_BOUNDARY)
+      outcome = located_at_boundary(run);
+  }
+}

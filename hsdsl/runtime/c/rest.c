@@ -1,0 +1,147 @@
+/* Rest on a guard: a state that its own reset keeps in place while the flow pushes it out (M11).
+   See hsdsl/simulate/rest.py. Functions answer 1 or 0, or RAISED where a routine has no value. */
+
+#define SAME_UNITS 4
+#define ZERO_UNITS 16
+#define PARALLEL 1e-6
+#define CORRECTIONS 8
+
+/* The largest absolute value. */
+static double greatest(const double *x, int n) {
+  double most = fabs(x[0]);
+  for (int s = 1; s < n; s++) most = hs_max(most, fabs(x[s]));
+  return most;
+}
+
+/* Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move. */
+static int stays(hs_run *run, double t, const double *x, int k) {
+  const hs_here *here = &run->here;
+  int still = 1;
+  if (here->table->edge[k].reset(here->p, t, x, run->after)) return RAISED;
+  for (int s = 0; s < here->dimension; s++)
+    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * (1 + fabs(x[s]));
+  if (!still) return 0;
+  if (here->table->gradients[k](here->p, t, x, run->gradient)) return RAISED;
+  return run->gradient[0] == 0 ? condition(run, k, t, x) : 0;
+}
+
+/* Which derivative of the surface along the flow decides: 1 or 2; 0 where the first one points inwards. */
+static int push_order(hs_run *run, double t, const double *x, int k) {
+  const hs_here *here = &run->here;
+  double rate, size = 0.0;
+  if (here->table->flow(here->p, t, x, run->end) || here->table->gradients[k](here->p, t, x, run->gradient) ||
+      here->table->rates[k](here->p, t, x, &rate))
+    return RAISED;
+  for (int s = 0; s < here->dimension; s++) size = size + fabs(run->gradient[s + 1]) * (1 + fabs(run->end[s]));
+  if (fabs(rate) <= ZERO_UNITS * HS_UNIT * size) return 2;
+  return rate > 0;
+}
+
+/* The first or second derivative of surface k along the flow through x, at time t. */
+static int push(hs_run *run, double t, const double *x, int k, int order, double *value) {
+  const hs_here *here = &run->here;
+  const hs_mode *mode = here->table;
+  double ahead;
+  if (order == 1) return mode->rates[k](here->p, t, x, value);
+  if (mode->series) {
+    if (mode->series(here->p, 2, t, x, run->second) || mode->surface_series(here->p, 2, run->second)) return RAISED;
+    if (mode->surface_line[k] >= 0) return *value = 2 * run->second[4 * mode->surface_line[k] + 2], 0;
+  }
+  if (mode->flow(here->p, t, x, run->end)) return RAISED;
+  const double small = sqrt(HS_UNIT) / (1 + greatest(run->end, here->dimension));
+  for (int s = 0; s < here->dimension; s++) run->at[s] = x[s] + small * run->end[s];
+  if (mode->rates[k](here->p, t + small, run->at, &ahead) || mode->rates[k](here->p, t, x, value)) return RAISED;
+  *value = (ahead - *value) / small;
+  return 0;
+}
+
+/* Whether the flow leaves the domain through surface k: by its rate, or where that is zero by the next one. */
+static int is_pushed(hs_run *run, double t, const double *x, int k) {
+  const int order = push_order(run, t, x, k);
+  double value;
+  if (order <= 0) return order;
+  return push(run, t, x, k, order, &value) ? RAISED : value > 0;
+}
+
+/* Whether the flow moves the state only in the direction that the reset takes back. */
+static int moves_alone(hs_run *run, double t, const double *x, int k) {
+  const hs_here *here = &run->here;
+  const int n = here->dimension;
+  double *const slope = run->end, *const ahead = run->at, *const back = run->after;
+  if (here->table->flow(here->p, t, x, slope)) return RAISED;
+  const double largest = greatest(slope, n);
+  if (!(largest > 0)) return 0;
+  const double small = sqrt(HS_UNIT) * (1 + greatest(x, n)) / largest;
+  for (int s = 0; s < n; s++) ahead[s] = x[s] + small * slope[s];
+  if (here->table->edge[k].reset(here->p, t, ahead, back)) return RAISED;
+  int along = 0;
+  for (int s = 0; s < n; s++) {
+    back[s] = back[s] - ahead[s];
+    if (fabs(slope[s]) > fabs(slope[along])) along = s;
+  }
+  const double share = back[along] / slope[along];
+  if (!(share < 0)) return 0;
+  for (int s = 0; s < n; s++)
+    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * largest)) return 0;
+  return 1;
+}
+
+/* The edge on whose guard the state rests; -1 where it moves. */
+static int rests(hs_run *run) {
+  const hs_here *here = &run->here;
+  if (!here->standing || here->dimension != here->table->dimension || !here->dimension) return -1;
+  for (int k = 0; k < here->table->edges; k++)
+    if (run->stood_on[k] && here->table->edge[k].target == here->mode && stays(run, here->t, run->x, k) == 1 &&
+        is_pushed(run, here->t, run->x, k) == 1 && moves_alone(run, here->t, run->x, k) == 1)
+      return k;
+  return -1;
+}
+
+/* The push of the edge that holds the state, inwards, at the share s of the time that is left. */
+static int inward(hs_run *run, double s, double *value) {
+  const hs_here *here = &run->here;
+  const double span = run->task->timeline->end[here->segment] - here->t;
+  if (push(run, here->t + s * span, run->x, run->held, run->held_order, value)) return RAISED;
+  *value = -*value;
+  return 0;
+}
+
+static int nothing_more(hs_run *run, int k, double *allowed) {
+  (void)run, (void)k;
+  *allowed = 0.0;
+  return 0;
+}
+
+/* When the push falls through zero, isolated on an interpolant over time, then solved on the push itself: 1, or 0. */
+static int released(hs_run *run, double *release) {
+  const double t = run->here.t, span = run->task->timeline->end[run->here.segment] - t;
+  if (interpolated(run, inward, 1, &run->task->interpolation[HS_OVER_TIME], nothing_more)) return RAISED;
+  hs_walk walk = begin_walk(&run->curves, 0, 0.0, 0);
+  hs_rise rise;
+  if (!next_rise(run, &walk, &rise)) return 0;
+  double s = rise.share, value;
+  for (int i = 0; i < CORRECTIONS && rise.slope != 0; i++) {
+    if (inward(run, s, &value)) return RAISED;
+    s = hs_min(1.0, hs_max(0.0, s - value / rise.slope));
+  }
+  *release = t + s * span;
+  return 1;
+}
+
+/* Stay at rest on the guard of edge k until the flow no longer pushes out, or to the end of the inputs' segment. */
+static void hold(hs_run *run, int k) {
+  hs_here *const here = &run->here;
+  const double end = run->task->timeline->end[here->segment];
+  double release;
+  run->held = k;
+  run->held_order = push_order(run, here->t, run->x, k);
+  const int found = run->held_order > 0 ? released(run, &release) : RAISED;
+  if (found == RAISED) return;
+  const double until = found ? release : end;
+  append(run, until, run->x, 0);
+  note(run, HS_AT_REST, k, 0, here->t, until);
+  if (found)
+    stand(run, until, k);
+  else
+    here->t = end;
+}

@@ -1,0 +1,252 @@
+/* One accepted step of the located scheme, with what happens along it. See hsdsl/simulate/spans.py.
+   run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
+
+#define UNKNOWN_TOLERANCE 1e-10
+#define LAST_TERM 4
+#define TERM_BEFORE 32
+
+/* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter one beside the one made. */
+static void aside(hs_run *run, double **end) {
+  double **const kept = run->k;
+  run->k = run->other_k;
+  run->other_k = kept;
+  swap(&run->end, &run->other_end);
+  swap(&run->z, end);
+  run->k[0] = run->slope;
+  run->k[run->method->stages] = run->end;
+}
+
+/* Time and state at the share s of the step: of a table those of a step that ends there. */
+static int span_point(hs_run *run, double s, double *time, double **state) {
+  const hs_span *span = &run->span;
+  const int n = run->here.dimension;
+  *time = s == 1 ? span->t1 : span->t + s * span->h;
+  if (s == 1) return copy(*state, run->z, n), 0;
+  if (!(s > 0)) return copy(*state, run->x, n), 0;
+  if (run->method->kind == HS_TAYLOR) return at(run, &span->piece, s, *state), 0;
+  aside(run, state);
+  const int status = step(run, n, span->t, s * span->h);
+  aside(run, state);
+  return status ? RAISED : 0;
+}
+
+static int shorter_piece(hs_run *run, double s, hs_polynomial *piece) {
+  const hs_span *span = &run->span;
+  const double h = s * span->h;
+  return step(run, run->here.dimension, span->t, h) ||
+         run->here.table->flow(run->here.p, span->t + h, run->z, run->end) || method_piece(run, span->t, h, piece);
+}
+
+/* The interpolant of the states up to the share s of the step, over [0, 1]. */
+static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
+  int status = 1;
+  if (run->method->kind != HS_TAYLOR) {
+    aside(run, &run->q);
+    status = shorter_piece(run, s, piece);
+    aside(run, &run->q);
+  }
+  if (status) shortened(run, &run->span.piece, s, piece);
+}
+
+/* The sums of the absolute terms that the state at the share s of a step is computed from. */
+static double span_size(const hs_run *run, const hs_span *span, double s, int state) {
+  if (run->method->kind != HS_TAYLOR)
+    return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
+  const int w = run->width, last = span->piece.degree - 1;
+  double v = fabs(span->piece.c[last * w + state]) * s;
+  for (int m = last - 1; m >= 0; m--) v = (fabs(span->piece.c[m * w + state]) + v) * s;
+  return fabs(span->x[state]) + v;
+}
+
+/* The surfaces at the share s of the step, by its interpolant. */
+static int surfaces_along(hs_run *run, double s, double *values) {
+  at(run, &run->span.piece, s, run->at);
+  return run->here.table->values(run->here.p, run->span.t + s * run->span.h, run->at, values);
+}
+
+static int noise_at_ends(hs_run *run, int k, double *allowed) {
+  const hs_span *span = &run->span;
+  double first, last;
+  if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t + span->h, run->z, 0, &last))
+    return RAISED;
+  *allowed = hs_max(first, last);
+  return 0;
+}
+
+/* Interpolate all surfaces along the step's interpolant. */
+static int interpolate(hs_run *run) {
+  const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
+  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends);
+}
+
+static void begin_span(hs_run *run, double h, double t1) {
+  hs_span *const span = &run->span;
+  span->t = run->here.t;
+  span->h = h;
+  span->t1 = t1;
+  copy(span->x, run->x, run->here.dimension);
+}
+
+/* Try a step of a table, or say what is in its way. */
+HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
+  hs_span *const span = &run->span;
+  const hs_mode *mode = run->here.table;
+  const double *p = run->here.p;
+  begin_span(run, h, t1);
+  if (step(run, n, span->t, h) || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
+  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (run->control.tolerance > 0) {
+    local_error(run, h);
+    run->ratio = error_ratio(run);
+    if (!(run->ratio <= 1)) return HS_ERROR;
+  }
+  for (int s = 0; s < n; s++) {
+    span->largest[s] = fabs(run->k[0][s]);
+    for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
+  }
+  if (method_piece(run, span->t, h, &span->piece) || interpolate(run)) return HS_NOT_FINITE;
+  return mode->values(p, t1, run->z, run->ends) ? HS_NOT_FINITE : HS_CLEAR;
+}
+
+/* Make one step of a table: rejected by the error estimate, halved where something has no value. */
+HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
+  hs_control *const control = &run->control;
+  const double t = run->here.t;
+  int halvings = 0;
+  if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
+  run->sloped = 1;
+  double h = control->h, t1;
+  for (;;) {
+    if (h < (limit - t) * ALMOST)
+      t1 = t + h;
+    else
+      h = limit - t, t1 = limit;
+    const hs_obstacle tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
+    if (tried == HS_CLEAR) {
+      if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
+      run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
+      return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
+    }
+    if (tried == HS_ERROR && halvings == 0) {
+      reject(control, h, run->ratio);
+      h = control->h;
+    } else {
+      h = h / 2, halvings++;
+    }
+    if (halvings > MOST_HALVINGS || !(t + h > t) || struggles(control)) return tried;
+  }
+}
+
+/* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
+   See hsdsl/integrators/taylor.py. */
+static double proposed_step(const hs_run *run, int n, double tolerance) {
+  const int order = run->method->order;
+  double least = NAN;
+  for (int m = order; m <= order + 1; m++) {
+    double largest = 0.0;
+    for (int s = 0; s < n; s++)
+      largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * (1 + fabs(run->x[s]))));
+    if (largest > 0) {
+      const double h = pow(1 / largest, 1.0 / m);
+      least = least != least ? h : hs_min(h, least);
+    }
+  }
+  return least;
+}
+
+static double longest(const hs_run *run, int n) {
+  const hs_control *control = &run->control;
+  if (!(control->tolerance > 0)) return control->h;
+  const double proposed = proposed_step(run, n, hs_max(control->tolerance, HS_UNIT));
+  return proposed != proposed ? control->largest : hs_min(control->largest, proposed);
+}
+
+static int noise_at_end(hs_run *run, int k, double *allowed) {
+  double noise;
+  if (noise_of(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
+  *allowed = 4 * noise;
+  return 0;
+}
+
+/* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step. */
+static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
+  const double given = run->control.tolerance, end = run->ends[k];
+  const double tolerance = given > 0 ? hs_max(given, HS_UNIT) : UNKNOWN_TOLERANCE;
+  double most = fabs(c[0]);
+  for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
+  *answer = fabs(c[n]) <= LAST_TERM * tolerance * most && fabs(c[n - 1]) <= TERM_BEFORE * tolerance * most;
+  if (!*answer) return 0;
+  return settles(run, fabs(value_of(c, n, 1.0) - end), tolerance * most, noise_at_end, k, answer);
+}
+
+/* The surfaces' series where they meet the surfaces at the step's end, interpolation for all where one does not. */
+static int curves(hs_run *run) {
+  const hs_mode *mode = run->here.table;
+  const int order = run->method->order, length = series_length(run->method);
+  hs_curves *const found = &run->curves;
+  const double h = run->span.h, *p = run->here.p;
+  int known;
+  if (mode->values(p, run->span.t, run->x, run->values)) return RAISED;
+  if (!mode->surfaces) return 0;
+  copy(run->starts, run->values, mode->surfaces);
+  known = !mode->surface_series(p, order, run->lines);
+  found->parts = 1;
+  found->count = mode->surfaces;
+  found->start[0] = 0.0, found->width[0] = 1.0;
+  for (int k = 0; k < mode->surfaces; k++) {
+    double *const c = coefficients_of(found, 0, k), power = 1.0;
+    if (!known || mode->surface_line[k] < 0) return interpolate(run);
+    const double *line = run->lines + mode->surface_line[k] * length;
+    for (int m = 0; m <= order; m++) {
+      c[m] = line[m] * power;
+      power = power * h;
+    }
+    int met;
+    if (converges(run, c, order, k, &met)) return RAISED;
+    if (!met) return interpolate(run);
+    c[0] = run->starts[k];
+    *degree_of(found, 0, k) = order;
+    found->certain[k] = 1;
+  }
+  return 0;
+}
+
+/* Try a step of Taylor's method, or say what is in its way. */
+HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) {
+  const hs_mode *mode = run->here.table;
+  const double *p = run->here.p, tolerance = run->control.tolerance;
+  const hs_polynomial *piece = &run->span.piece;
+  begin_span(run, h, t1);
+  taylor_piece(run, h, &run->span.piece);
+  at(run, piece, 1.0, run->z);
+  if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
+  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (tolerance > 0) {
+    taylor_error(run, h);
+    if (error_ratio(run) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
+  }
+  return mode->values(p, t1, run->z, run->ends) || curves(run) ? HS_NOT_FINITE : HS_CLEAR;
+}
+
+/* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
+   equation. */
+HS_INLINE hs_obstacle next_series(hs_run *run, const int n, double limit) {
+  const double t = run->here.t;
+  if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
+  double h = longest(run, n), t1;
+  for (int i = 0; i < MOST_HALVINGS; i++) {
+    if (h < (limit - t) * ALMOST)
+      t1 = t + h;
+    else
+      h = limit - t, t1 = limit;
+    if (!(t1 > t)) break;
+    if (try_series(run, n, h, t1) == HS_CLEAR) return HS_CLEAR;
+    h = h / 2;
+  }
+  return HS_NOT_FINITE;
+}
+
+/* Make one step that the error allows, not beyond `limit`; or say what stands in the way. */
+HS_INLINE hs_obstacle next_span(hs_run *run, const int n, double limit) {
+  return run->method->kind == HS_TAYLOR ? next_series(run, n, limit) : next_table(run, n, limit);
+}

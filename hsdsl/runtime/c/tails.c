@@ -1,0 +1,74 @@
+/* Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
+   See hsdsl/simulate/tails.py. */
+
+#define LEAST_FLIGHTS 3
+#define MOST_ROUNDS 60
+
+/* Transition `back` before the last one. */
+static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
+
+/* Whether the flights of one edge shrink: the last one, and the largest ratio of the last few. */
+static int contraction(const hs_run *run, double *flight, double *ratio) {
+  double flights[LEAST_FLIGHTS];
+  if (run->jump <= LEAST_FLIGHTS) return 0;
+  const hs_made *first = made_before(run, LEAST_FLIGHTS);
+  for (int i = 0; i <= LEAST_FLIGHTS; i++) {
+    const hs_made *made = made_before(run, i);
+    if (made->edge != first->edge || made->mode != first->mode || made->mode != made->target || made->entry) return 0;
+    if (i > 0) flights[LEAST_FLIGHTS - i] = made_before(run, i - 1)->time - made->time;
+  }
+  *flight = flights[LEAST_FLIGHTS - 1];
+  if (!(*flight > 0)) return 0;
+  for (int i = 1; i < LEAST_FLIGHTS; i++) {
+    if (!(flights[i - 1] > 0)) return 0;
+    const double shrunk = flights[i] / flights[i - 1];
+    *ratio = i > 1 ? hs_max(*ratio, shrunk) : shrunk;
+  }
+  return *ratio < 1;
+}
+
+static double accelerated(double a, double b, double c) {
+  const double bend = c - 2 * b + a;
+  return bend != 0 ? a - (b - a) * (b - a) / bend : c;
+}
+
+/* The point on the guard of edge k that repeated resets run to, to run->z: 1, or 0. */
+static int fixed_point(hs_run *run, int k, double t) {
+  const hs_here *here = &run->here;
+  const hs_edge *edge = &here->table->edge[k];
+  const int n = here->dimension;
+  double *const x = run->z, *const one = run->after, *const two = run->at, r, noise;
+  copy(x, run->x, n);
+  for (int i = 0; i < MOST_ROUNDS; i++) {
+    if (edge->reset(here->p, t, x, one)) return RAISED;
+    if (same_state(one, x, n)) break;
+    if (edge->reset(here->p, t, one, two)) return RAISED;
+    for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
+  }
+  if (surface(run, k, t, x, &r) || noise_of(run, k, t, x, 1, &noise)) return RAISED;
+  return !(fabs(r) > noise);
+}
+
+/* Go to the limit of a tail of edge k that is nearly over; stop at one where more than the impacts goes on. */
+static int close_tail(hs_run *run, int k) {
+  hs_here *const here = &run->here;
+  double flight, ratio;
+  if (!contraction(run, &flight, &ratio) || here->dimension != here->table->dimension || !here->dimension)
+    return GOES_ON;
+  const double left = flight * ratio / (1 - ratio), end = here->t + left;
+  if (left > run->epsilon || end > run->task->timeline->end[here->segment]) return GOES_ON;
+  double *const q = run->z;
+  if (fixed_point(run, k, end) != 1 || is_pushed(run, end, q, k) != 1 || stays(run, end, q, k) != 1) return GOES_ON;
+  const int alone = moves_alone(run, end, q, k);
+  if (alone == RAISED) return GOES_ON;
+  if (!alone) {
+    note(run, HS_ACCUMULATES, k, 0, end, here->t);
+    return stopped(run, HS_ACCUMULATED, here->t);
+  }
+  note(run, HS_REPLACED, k, run->jump - 1, end, left);
+  secant(run, &run->cubic);
+  append(run, end, q, &run->cubic);
+  swap(&run->x, &run->z);
+  stand(run, end, k);
+  return GOES_ON;
+}
