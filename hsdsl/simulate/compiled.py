@@ -128,8 +128,8 @@ class CompiledRun:
         if desk.failed:
             raise desk.failed[0]
         whole = desk.chunks.whole()
-        noted: list[tuple[int, int, int, int, float, float]] = whole["note"].tolist()
-        for note in noted:
+        said: list[tuple[int, int, int, int, float, float]] = whole["note"].tolist()
+        for note in said:
             self._note(*note)
         return self._stop(), whole
 
