@@ -60,6 +60,16 @@ class Execution(Deferred):
     output_function: OutputFunction | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        self.check()
+
+    def check(self) -> None:
+        """Check that columns and arcs belong together.
+
+        Raises
+        ------
+        ValueError
+            They do not.
+        """
         n = len(self.times)
         if not (len(self.values) == len(self.outputs) == len(self.depth) == len(self.coefficients) == n):
             raise ValueError("columns differ in length")

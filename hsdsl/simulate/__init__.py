@@ -20,6 +20,7 @@
 `compiled`          the same loop in C: what it is given and what it says
 `desk`, `chunks`    where the compiled loop works, and what it writes to
 `interrupt`         Ctrl-C while it runs
+`verdict`           do the theorem's hypotheses hold for a run?
 ==================  ===========================================================================================
 """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,27 +10,28 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import Number
-from hsdsl.execution import Arc, Array, Execution, Point, Stop, Transition, Verdict
+from hsdsl.execution import Arc, Array, Execution, Point, Stop, Verdict
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.chunks import arcs_of, transitions_of
 from hsdsl.simulate.paoli_schatzman import NOTES
-from hsdsl.simulate.recorder import Recorder
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict import Looking, assess
 
 
 def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     """Make the execution of what the Python loop has recorded."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
-    return Execution(
+    execution = Execution.deferred(
+        {"verdict": partial(_verdict, run)},
         **_about(run, stop, seconds, "python"),
         settings=described(run.settings),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs),
-        verdict=verdict(run.settings, transitions, run.recorder),
         **columns,
     )
+    execution.check()
+    return execution
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Written:
             "transitions": lambda _: tuple(transitions_of(whole, self.run.program)),
             "arcs": lambda _: self._arcs(),
             "final": self._final,
-            "verdict": self._verdict,
+            "verdict": partial(_verdict, self.run),
         }
         return Execution.deferred(later, **_about(self.run, stop, seconds, "c"), **arrays)
 
@@ -72,9 +73,6 @@ class Written:
 
     def _final(self, execution: Execution) -> Point:
         return _final(execution.arcs[-1], self.whole, execution.output_names)
-
-    def _verdict(self, execution: Execution) -> Verdict:
-        return verdict(self.run.settings, execution.transitions, self.run.recorder)
 
 
 def _about(run: Run, stop: Stop, seconds: dict[str, float], engine: str) -> dict[str, Any]:
@@ -132,18 +130,7 @@ def described(settings: Settings) -> dict[str, Any]:
     }
 
 
-def verdict(settings: Settings, transitions: Sequence[Transition], recorder: Recorder) -> Verdict:
-    """Say what is known of the theorem's hypotheses for this run: what nothing checks yet is said."""
-    if settings.one_stop is not None:
+def _verdict(run: Run, execution: Execution) -> Verdict:
+    if run.settings.one_stop is not None:
         return Verdict("unknown", NOTES)
-    if recorder.departures:
-        return Verdict("left", (*recorder.departures, *recorder.doubts))
-    reasons = [*recorder.doubts, "nothing checks yet whether the theorem's hypotheses hold for this run"]
-    at_once = [t for t in transitions if t.entry]
-    if at_once:
-        first = at_once[0]
-        reasons.append(
-            f"{len(at_once)} transition{'s' * (len(at_once) > 1)} fired at once on entry, the first {first.edge} at "
-            f"t = {show(first.time)}: the state entered {first.source} outside its domain"
-        )
-    return Verdict("unknown", tuple(reasons))
+    return assess(Looking(run, execution), run.recorder.departures, run.recorder.doubts)

@@ -36,7 +36,7 @@ def test_json_is_the_contract(command, model):
     assert run["engine"] in ("c", "python") and run["scheme"] == "relaxed" and run["method"] == "dopri5"
     assert set(run["stop"]) == {"reason", "time", "message"} and run["stop"]["reason"] == "until"
     assert set(run["final"]) == {"time", "mode", "state", "outputs"}
-    assert run["verdict"]["theorem"] == "unknown" and run["verdict"]["reasons"]
+    assert run["verdict"]["theorem"] == "holds" and run["verdict"]["reasons"]
     assert set(run["seconds"]) == {"load", "compile", "simulate"}
     first = run["transitions"][0]
     assert (first["index"], first["edge"], first["from"], first["to"]) == (0, "bounce", "fall", "fall")
@@ -48,7 +48,7 @@ def test_json_is_the_contract(command, model):
 def test_the_summary_is_for_people(command, model):
     answer = command("run", model(BALL))
     assert answer.code == 0
-    for word in ("bounce", "reached t = 1.5", "unknown", "energy"):
+    for word in ("bounce", "reached t = 1.5", "holds", "energy"):
         assert word in answer.out
 
 

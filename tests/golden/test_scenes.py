@@ -29,11 +29,23 @@ def default(name: str) -> Any:
     return model(name).simulate()
 
 
+VERDICTS = {
+    "bouncing-ball": "holds",
+    "constrained-pendulum": "holds",
+    "digital-control": "holds",
+    "oscillator-with-stop-1": "unknown",  # its step is fixed
+    "oscillator-with-stop-2": "left",
+    "pronking-runner": "holds",
+    "stiff-switch": "unknown",  # the last switch is too close to the end
+    "thermostat": "holds",
+}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_models_own_experiment_gets_to_its_end(name: str) -> None:
     run = default(name)
     assert run.stop.complete, run.stop.message
-    assert run.verdict.theorem == "unknown"
+    assert run.verdict.theorem == VERDICTS[name]
     assert run.verdict.reasons
 
 

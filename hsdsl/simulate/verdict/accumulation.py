@@ -1,0 +1,31 @@
+"""Zeno points and rest: where a relaxed run goes through more transitions than the theorem is about.
+
+The relaxed scheme goes on behind a Zeno point and creeps along a guard where the execution rests or slides. Either way
+many transitions follow each other with hardly any flow between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import accumulate, pairwise
+
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.looking import Looking
+
+CROWD = 16  # transitions within the relaxation of flow
+
+
+def accumulations(run: Looking) -> Iterator[str]:
+    """Say where transitions first crowd together, and where they are last seen to."""
+    relaxation, made = run.run.settings.relaxation, run.transitions
+    if len(made) <= CROWD:
+        return
+    flights = [b.time - (a.resumed if a.resumed is not None else a.time) for a, b in pairwise(made)]
+    flown = [run.arithmetic.zero, *accumulate(flights)]
+    crowded = [k for k in range(CROWD, len(made)) if flown[k] - flown[k - CROWD] <= relaxation]
+    if crowded:
+        first = made[crowded[0] - CROWD]
+        yield (
+            f"more than {CROWD} transitions within the relaxation of flow from t = {show(first.time)} on "
+            f"({first.edge}): a Zeno point, rest or sliding, which the theorem is not about"
+        )

@@ -1,0 +1,91 @@
+"""Do transitions that are reached together commute?
+
+Each of them is taken first in turn, then whatever fires at the same instant; where all orders lead to the same point
+the choice does not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.looking import Looking, Place
+
+SAME = 1e-9  # relative to 1 + abs(x): one point
+LONGEST = 64  # transitions at one instant
+
+Landed = tuple[str, State]
+
+
+def choices(run: Looking) -> tuple[list[Finding], list[str]]:
+    """Look at every transition that others were passed over for."""
+    found: list[Finding] = []
+    commuting: list[Number] = []
+    for made in run.transitions:
+        if not made.alternatives:
+            continue
+        place = run.place(made.source, made.time, tuple(made.before.values()))
+        names = [edge.name for edge in place.mode.edges]
+        tied = [names.index(name) for name in (made.edge, *made.alternatives)]
+        if commute(run, place, tied):
+            commuting.append(made.time)
+            continue
+        others = " or ".join(made.alternatives)
+        found.append(
+            Finding(
+                "choice",
+                "left",
+                f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters: "
+                "they lead to different points",
+            )
+        )
+    if not commuting:
+        return found, []
+    instants = list(dict.fromkeys(map(show, commuting)))
+    listed = ", ".join(instants[:3]) + (f" and {len(instants) - 3} more" if len(instants) > 3 else "")
+    return found, [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
+
+
+def commute(run: Looking, place: Place, tied: Sequence[int], since: Number = 0) -> bool:
+    """Whether each of the tied edges of a place, taken first, leads to the same point.
+
+    Surfaces that are reached within the time ``since`` count as reached together.
+    """
+    since = max(since, run.tie(place.t))
+    try:
+        landed = [settle(run, place, k, since) for k in tied]
+    except DOMAIN_ERRORS:
+        return False
+    return None not in landed and all(_same(landed[0], other) for other in landed[1:])
+
+
+def _same(one: Landed | None, other: Landed | None) -> bool:
+    if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
+        return False
+    return all(abs(a - b) <= SAME * (1 + abs(a)) for a, b in zip(one[1], other[1], strict=True))
+
+
+def settle(run: Looking, place: Place, k: int, since: Number) -> Landed | None:
+    """Take edge k, then what fires at the same instant; None where that has no end."""
+    for _ in range(LONGEST):
+        edge = place.mode.edges[k]
+        place = run.place(edge.target, place.t, place.kernel.resets[k](place.t, *place.x))
+        if place.mode.final:
+            return place.mode.name, place.x
+        following = _next(place, since)
+        if following is None:
+            return place.mode.name, place.x
+        k = following
+    return None
+
+
+def _next(place: Place, since: Number) -> int | None:
+    """The edge that goes at once from where a state stands."""
+    surfaces, edges = place.surfaces, place.mode.edges
+    beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), since)
+    ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
+    ready = ready or surfaces.standing(place.t, place.x, since)
+    return min(ready, key=lambda k: (-edges[k].priority, k), default=None)

@@ -1,0 +1,86 @@
+"""Is each transition transversal, and could an error have made its condition another?
+
+Where a surface rises at the rate a and bends by b, an error that moves it by d leaves it crossed while d is below
+a**2 / (2 abs(b)): that depth is the margin.
+"""
+
+from __future__ import annotations
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Arc, Transition
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.finding import SAFE, Finding, times
+from hsdsl.simulate.verdict.looking import Looking, Place
+
+TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
+
+
+def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
+    """Look at every transition that the flow made."""
+    found: list[Finding] = []
+    slowest: Number | None = None
+    least: Number | None = None
+    ends = {arc.jump: arc for arc in run.flows}
+    made = [t for t in run.transitions if not t.entry]
+    for transition in made:
+        place = run.place(transition.source, transition.time, tuple(transition.before.values()))
+        k = [edge.name for edge in place.mode.edges].index(transition.edge)
+        try:
+            rate = place.rate(k)
+            slowest = rate if slowest is None else min(slowest, rate)
+            margin = _margin(run, place, k, ends.get(transition.index), transition)
+            found += _findings(run, place, k, rate, margin, transition)
+        except DOMAIN_ERRORS:
+            found.append(
+                Finding("no value", "unknown", f"{transition.edge} has no rate at t = {show(transition.time)}")
+            )
+            continue
+        if margin is not None:
+            least = margin if least is None else min(least, margin)
+    if slowest is None:
+        return found, ["no transition"] if not run.transitions else []
+    each = (
+        f"{len(made)} transition{'s' * (len(made) > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
+    )
+    return found, [each + (f", {times(least)} what the error allowed could undo" if least is not None else "")]
+
+
+def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
+    """How often the allowed error fits into what keeps the crossing; None where nothing tells."""
+    shift = run.shift(place, k, run.row_at(made.time))
+    if shift is None:
+        return None
+    rate, bend = place.rate(k), run.arithmetic.zero
+    if arc is not None:
+        before = run.between(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
+        bend = abs(rate - before.rate(k)) / (place.t - before.t) if place.t > before.t else bend
+    depth = rate * rate / (2 * bend) if bend > 0 else run.arithmetic.zero + float("inf")
+    return depth / shift if shift > 0 else run.arithmetic.zero + float("inf")
+
+
+def _findings(
+    run: Looking, place: Place, k: int, rate: Number, margin: Number | None, made: Transition
+) -> list[Finding]:
+    found: list[Finding] = []
+    where = f"{made.edge} at t = {show(made.time)}"
+    gradient, slope = place.kernel.gradients[k](place.t, *place.x), place.kernel.flow(place.t, *place.x)
+    size = abs(gradient[0]) + sum((abs(g * f) for g, f in zip(gradient[1:], slope, strict=True)), rate * 0)
+    if not any(gradient):
+        return [Finding("flat", "unknown", f"the surface of {where} has no slope there")]
+    if not rate > TANGENT_UNITS * run.arithmetic.unit * size:
+        return [Finding("tangency", "left", f"the flow is tangent to the surface of {where}")]
+    if margin is not None and margin < SAFE:
+        found.append(
+            Finding(
+                "tangency",
+                "unknown",
+                f"the crossing of {where}, at a rate of {float(rate):.3g}, would be undone by {times(margin)} "
+                "the error allowed",
+            )
+        )
+    error = run.error(place, run.row_at(made.time))
+    if error is not None and place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
+        found.append(
+            Finding("condition", "unknown", f"whether the condition of {where} holds is within the error allowed")
+        )
+    return found

@@ -1,0 +1,37 @@
+"""What was found about one hypothesis at one place of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from hsdsl.arithmetic import Number
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that keeps the theorem from holding, or from being known to hold.
+
+    Attributes
+    ----------
+    kind : str
+        Findings of one kind are named together.
+    theorem : {"left", "unknown"}
+        What it makes of the verdict.
+    sentence : str
+        For a person.
+    """
+
+    kind: str
+    theorem: Literal["left", "unknown"]
+    sentence: str
+
+
+SAFE = 10  # times the allowed error: margins below are named
+
+
+def times(margin: Number) -> str:
+    """Write a margin as so many times something."""
+    if not margin < 1e15:
+        return "any number of times"
+    return f"{float(margin):.2g} times"
