@@ -6,7 +6,8 @@ python tests/fuzz/campaign.py --kind bytes --replay 4711
 
 Input number N of a kind and a seed is always the same one, as long as the files it is made from stay the same. Exit
 code 1 where anything was found: an exception that is not a refusal, a hang, too much memory, or a payload that did
-something.
+something. A hang is 5 seconds of processor time; the longest of any input is said in processor time and on the wall's
+clock, with how many took over 5 s of the latter only because the machine had other work.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import traceback
 from collections import Counter
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -78,20 +80,52 @@ def work(kind: str, seed: int, share: float, jobs: Any, answers: Any, now: Any) 
         while (begin := jobs.get()) is not None:
             found: list[dict[str, Any]] = []
             ways: Counter[str] = Counter()
+            times = Times()
             for index in range(begin, begin + BLOCK):
                 now[0], now[1] = index, time.process_time()
-                way, fault = one(kind, seed, index, share, guard, inside)
+                with times.of_one():
+                    way, fault = one(kind, seed, index, share, guard, inside)
                 ways[way] += 1
                 if fault:
                     found.append({"kind": kind, "seed": seed, "index": index, **fault})
             now[0] = -1
-            answers.put((ways, found, _status("VmHWM")))
+            answers.put((ways, found, times, _status("VmHWM")))
+
+
+@dataclass
+class Times:
+    """What inputs took: the longest in processor time and in wall clock, and how many waited for a busy machine."""
+
+    processor: float = 0.0
+    wall: float = 0.0
+    waited: int = 0
+
+    @contextmanager
+    def of_one(self) -> Generator[None]:
+        """Count one input."""
+        processor, wall = time.process_time(), time.monotonic()
+        yield
+        processor, wall = time.process_time() - processor, time.monotonic() - wall
+        self.add(Times(processor, wall, int(processor <= SECONDS < wall)))
+
+    def add(self, other: Times) -> None:
+        """Take others in."""
+        self.processor, self.wall = max(self.processor, other.processor), max(self.wall, other.wall)
+        self.waited += other.waited
+
+    def plain(self) -> dict[str, Any]:
+        """As numbers to be printed."""
+        return {
+            "longest_processor_seconds": round(self.processor, 2),
+            "longest_wall_seconds": round(self.wall, 2),
+            "over_5_wall_seconds_only": self.waited,
+        }
 
 
 def one(kind: str, seed: int, index: int, share: float, guard: Any, folder: Path) -> tuple[str, dict[str, Any] | None]:
     """One input under its limits: how far it got, and what went wrong."""
     data, rng = of_index(kind, seed, index)
-    began = os.times().user
+    began, clock = os.times().user, time.monotonic()
     fault, way = None, "broken"
     try:
         with limited_time(), guard.watch():
@@ -105,7 +139,7 @@ def one(kind: str, seed: int, index: int, share: float, guard: Any, folder: Path
         fault = {"what": "slow", "trace": [way]}
     if fault is not None:
         text = data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
-        fault |= {"seconds": round(took, 2), "input": text[:3000]}
+        fault |= {"seconds": round(took, 2), "wall": round(time.monotonic() - clock, 2), "input": text[:3000]}
     return way, fault
 
 
@@ -170,6 +204,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     began = time.monotonic()
     crew = Crew(options)
     ways: Counter[str] = Counter()
+    times = Times()
     faults: list[dict[str, Any]] = []
     given, peak, next_index = 0, 0, options.start
     waiting = 0
@@ -182,13 +217,14 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         if spent and not waiting:
             break
         try:
-            counted, found, high = crew.answers.get(timeout=2)
+            counted, found, took, high = crew.answers.get(timeout=2)
         except Exception:
             lost = crew.inspect()
             faults += lost
             waiting -= len(lost)  # the rest of a block is lost with its worker
             continue
         ways.update(counted)
+        times.add(took)
         faults += found
         peak, waiting = max(peak, high), waiting - 1
         for fault in found:
@@ -200,7 +236,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         crew.jobs.put(None)
     return {
         "kind": options.kind, "seed": options.seed, "inputs": sum(ways.values()), "first": options.start,
-        "seconds": round(time.monotonic() - began), "ways": dict(ways), "peak_bytes": peak, "faults": faults,
+        "seconds": round(time.monotonic() - began), "ways": dict(ways), **times.plain(), "peak_bytes": peak,
+        "faults": faults,
     }  # fmt: skip
 
 
