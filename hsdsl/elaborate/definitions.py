@@ -35,9 +35,9 @@ def define_parameters(world: World) -> tuple[Parameter, ...]:
     return tuple(found)
 
 
-def parameter_scope(world: World, sentence: str) -> Scope:
+def parameter_scope(world: World, sentence: str, hint: str | None = None) -> Scope:
     """A scope with the parameters alone."""
-    return world.scope(("parameters",), sentence)
+    return world.scope(("parameters",), sentence, hint=hint)
 
 
 def _extra(world: World, entry: ParameterEntry, scope: Scope) -> dict:

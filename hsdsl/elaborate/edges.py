@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 from hsdsl.elaborate.reader import Reader, all_of
 from hsdsl.elaborate.world import World
 from hsdsl.expression.scope import Scope, symbol
@@ -11,6 +13,8 @@ from hsdsl.schema import Mode as ModeDocument
 from hsdsl.schema import Transition
 from hsdsl.source import ABSENT, Key, Place, Scalar
 from hsdsl.system import Edge, Surface
+
+_GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 
 def surface(reader: Reader, scalar: Scalar, scope: Scope, key: str) -> Surface | None:
@@ -92,7 +96,11 @@ def known_mode(world: World, label: Scalar) -> str | None:
     if label.value in world.document.modes:
         return label.value
     message = f"there is no mode '{shown(label.value)}'"
-    world.reader.add(label.place, "HS303", message, did_you_mean(label.value, world.document.modes))
+    guarded = _GUARDED.fullmatch(label.value)
+    hint = did_you_mean(label.value, world.document.modes)
+    if guarded and guarded.group(1) in world.document.modes:
+        hint = f"write {guarded.group(1)} alone, and if: {shown(guarded.group(2))}"
+    world.reader.add(label.place, "HS303", message, hint)
     return None
 
 
@@ -107,7 +115,9 @@ def _check_reset(world: World, source: str, target: str, states: tuple[str, ...]
         return False  # that mode is reported, and its states are not known
     complete = True
     for key in transition.reset:
-        if key not in states:
+        if key not in states and key in world.undeclared:
+            complete = False  # reported under `initial`
+        elif key not in states:
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             name, equals, value = (part.strip() for part in key.partition("="))
             written = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)

@@ -20,7 +20,8 @@ _POSITIVE = ("step", "tolerance", "relaxation")
 def elaborate_initial(world: World) -> Initial:
     """The initial mode and the values of its states."""
     document = world.document.initial
-    scope = parameter_scope(world, "an initial value is an expression of parameters")
+    hint = "name the value under `parameters`, and write that name for both"
+    scope = parameter_scope(world, "an initial value is an expression of parameters", hint)
     given: dict[Key, Scalar] = document.__pydantic_extra__
     values = {str(key): world.reader.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
     mode = known_mode(world, document.mode)
@@ -37,7 +38,8 @@ def _check_states(world: World, mode: str, given: dict[Key, Scalar]) -> None:
     for key in given:
         if key not in states:
             message = f"the mode '{mode}' has no state '{shown(key)}'"
-            world.reader.add(key.place, "HS308", message, did_you_mean(key, [s for s in states if s not in given]))
+            near = did_you_mean(key, [s for s in states if s not in given])
+            world.reader.add(key.place, "HS308", message, near or _without_flow(mode, key))
     lacking = [f"'{s}'" for s in states if s not in given]
     if lacking:
         noun = "state" if len(lacking) == 1 else "states"
@@ -48,15 +50,21 @@ def _check_states(world: World, mode: str, given: dict[Key, Scalar]) -> None:
         world.reader.add(world.document.initial.mode.place, "HS308", message, hint)
 
 
+def _without_flow(mode: str, key: str) -> str:
+    return f"under `flow` of '{mode}' write {shown(key)}: and its derivative, or remove it here"
+
+
 def elaborate_experiment(world: World) -> Experiment:
     """The settings of the file, as expressions of parameters."""
     document = world.document.experiment
-    scope = parameter_scope(world, "a setting is an expression of parameters")
+    sentence = "a setting is an expression of parameters"
+    scope = parameter_scope(world, sentence)
     if document.step is not None and document.tolerance is not None:
         message = "a run has either a `step` or a `tolerance`, not both"
         last = max((document.step, document.tolerance), key=lambda scalar: scalar.place.start)
         world.reader.add(last.place, STEP_AND_TOLERANCE, message, "keep the one that the method works with")
-    until = _setting(world, scope, "until", document.until)
+    end = parameter_scope(world, sentence, "to end with an event, let a transition lead to a mode with final: true")
+    until = _setting(world, end, "until", document.until)
     numbers = {key: _setting(world, scope, key, getattr(document, key)) for key in (*_POSITIVE, "max_transitions")}
     return Experiment(
         until=until,

@@ -11,7 +11,7 @@ from hsdsl.errors import Findings
 from hsdsl.expression import ExpressionError, Wanted, numeric, parse, symbolic
 from hsdsl.expression.inequality import Inequality, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
-from hsdsl.expression.syntax import Tree
+from hsdsl.expression.syntax import Call, Tree
 from hsdsl.expression.timebox import Box
 from hsdsl.names import shown
 from hsdsl.source import ABSENT, Place, Scalar
@@ -99,11 +99,11 @@ class Reader:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, wanted, scope)
-        if wanted == "inequality":
-            the_comparison(tree, key, text)
         faults = scope.faults(tree)
         for fault in faults:
             self._report(scalar, fault)
+        if wanted == "inequality" and not (faults and isinstance(tree, Call)):
+            the_comparison(tree, key, text)
         return None if faults or scope.broken(tree) else tree
 
     def _report(self, scalar: Scalar, error: ExpressionError) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hsdsl.elaborate.reader import Reader
 from hsdsl.expression.scope import Refusal, Scope, Value, state
+from hsdsl.names import closest
 from hsdsl.schema import Mode, Model
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import TIME
@@ -29,6 +30,8 @@ class World:
         What each of those names that is defined so far means; ``t`` is there from the start.
     states : dict
         The states of each mode in file order; empty for a final mode without a flow.
+    undeclared : frozenset of str
+        The names that only `initial` knows: states of its mode that lack a flow. They are reported there alone.
     scopes : dict
         What names mean in each mode, once it is elaborated.
     files : dict
@@ -42,6 +45,7 @@ class World:
     names: dict[str, str] = field(default_factory=dict)
     values: Values = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    undeclared: frozenset[str] = frozenset()
     scopes: dict[str, Scope] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
 
@@ -63,7 +67,17 @@ class World:
         for name, kind in world.names.items():
             if kind == "states":
                 world.values[name] = state(name)
+        world.undeclared = frozenset(world._undeclared())
+        world.values.update(dict.fromkeys(world.undeclared))
         return world
+
+    def _undeclared(self) -> list[str]:
+        start = self.document.initial
+        mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
+        if mode is None or mode.flow is None:
+            return []
+        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names]
+        return [key for key in given if closest(key, map(str, mode.flow)) is None]
 
     def _claim(self, key: Key, kind: str) -> None:
         taken = self.names.setdefault(key, kind)
@@ -82,7 +96,7 @@ class World:
                     found[name] = self.values[name]
             else:
                 found[name] = _refused(name, KINDS[kind], sentence, hint)
-        return Scope({**found, **(values or {})})
+        return Scope({**dict.fromkeys(self.undeclared), **found, **(values or {})})
 
     def text(self, scalar: Scalar | None) -> str | None:
         """The text of a scalar that may be missing."""

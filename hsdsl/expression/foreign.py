@@ -9,6 +9,86 @@ from hsdsl.functions import FUNCTIONS
 CASES = "write a mode for each case, or use min, max, abs or sign"
 _DEGREES = "angles are in radians: write 30*pi/180 for 30 degrees"
 _SAMPLES = "give it as samples, under `inputs`"
+_UNITS = frozenset(
+    (
+        "s",
+        "ms",
+        "us",
+        "ns",
+        "min",
+        "h",
+        "hr",
+        "hz",
+        "khz",
+        "mhz",
+        "ghz",
+        "m",
+        "mm",
+        "cm",
+        "km",
+        "um",
+        "kg",
+        "g",
+        "mg",
+        "n",
+        "kn",
+        "nm",
+        "j",
+        "kj",
+        "w",
+        "kw",
+        "mw",
+        "v",
+        "mv",
+        "kv",
+        "a",
+        "ma",
+        "ohm",
+        "mh",
+        "uf",
+        "nf",
+        "deg",
+        "degc",
+        "degf",
+        "c",
+        "k",
+        "pa",
+        "kpa",
+        "mpa",
+        "bar",
+        "psi",
+        "l",
+        "ml",
+        "rpm",
+        "mol",
+        "ev",
+        "sec",
+        "secs",
+        "second",
+        "seconds",
+        "minute",
+        "minutes",
+        "hour",
+        "hours",
+        "day",
+        "days",
+        "meter",
+        "meters",
+        "metre",
+        "metres",
+        "volt",
+        "volts",
+        "amp",
+        "amps",
+        "watt",
+        "watts",
+        "newton",
+        "newtons",
+        "kelvin",
+        "celsius",
+    )
+)
+_QUANTITY = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*((?:[^\W\d]+\s*[*/·]\s*)*)([^\W\d]+)\s*")
 _DERIVATIVE = "a derivative is what `flow` gives a state: write that, or name it under `let`"
 _MEMORY = "nothing is remembered but states; a reset sees the values before the jump"
 
@@ -22,10 +102,8 @@ NAMES = {
     "tau": "the time is t",
     "inf": "every number is finite here",
     "nan": "every number is finite here",
-    "on": "write true",
-    "yes": "write true",
-    "off": "write false",
-    "no": "write false",
+    **dict.fromkeys(("on", "yes"), "write true for a condition, 1 for a number"),
+    **dict.fromkeys(("off", "no"), "write false for a condition, 0 for a number"),
     "deg": _DEGREES,
     "degrees": _DEGREES,
     "rad": "angles are in radians: leave the unit out",
@@ -73,6 +151,7 @@ NAMES = {
     "pre": _MEMORY,
     "delay": _MEMORY,
     "edge": _MEMORY,
+    "after": "write t >= 5 for a time; for the time since a mode was entered, a state with the flow 1 that resets to 0",
     "reinit": "a state is set by `reset` in a transition",
     "interp": _SAMPLES,
     "interp1": _SAMPLES,
@@ -118,7 +197,12 @@ SIGNS: tuple[tuple[str, str, str, str], ...] = (
     ("≠", "HS101", "`≠` is not an operator of the language", "write `!=`"),
     ("²", "HS101", "`²` is not an operator of the language", "write `**2`"),
     ("³", "HS101", "`³` is not an operator of the language", "write `**3`"),
-    ("°", "HS101", "angles are in radians", "write 30*pi/180 for 30 degrees"),
+    (
+        "°",
+        "HS101",
+        "a degree sign has no meaning in an expression",
+        "angles are in radians: write 30*pi/180 for 30 degrees",
+    ),
     ("\\", "HS101", "a backslash has no meaning in an expression", "write the name alone: omega"),
     ("$", "HS101", "a dollar sign has no meaning in an expression", "write the name alone"),
     ("“", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
@@ -132,16 +216,29 @@ SIGNS: tuple[tuple[str, str, str, str], ...] = (
     ("√", "HS101", "`√` is not a function of the language", "write `sqrt(x)`"),
 )
 
+_FAR = 100  # characters before a sign that are looked at
 _WORD_BEFORE = re.compile(r"([^\W\d]\w*)\s*$")
+_NUMBER_BEFORE = re.compile(r"([0-9]+\.?[0-9]*)\s*$")
 _INDEX = re.compile(r"\[\s*([0-9]{1,4})\s*\]")
 
 
 def better(sign: str, text: str, at: int) -> str | None:
     """The right form of what stands around a sign, where that is known."""
-    word = _WORD_BEFORE.search(text, 0, at)
+    word = _WORD_BEFORE.search(text, max(0, at - _FAR), at)
     name = word.group(1) if word else ""
     if sign == "'" and name:
         return f"write {name}: a reset sees the values before the jump, and derivatives are what `flow` gives"
+    if (
+        sign == "^"
+        and at < _FAR
+        and (quantity := _QUANTITY.fullmatch(text[:at]))
+        and quantity.group(3).lower() in _UNITS
+    ):
+        return f"write {quantity.group(1)} alone: units stand under `units`"
+    if sign == "%" and not text[at + 1 :].strip() and (number := _NUMBER_BEFORE.search(text, max(0, at - _FAR), at)):
+        return f"write {number.group(1)}/100"
+    if sign == "°" and text[at + 1 : at + 2] in ("C", "F"):
+        return "leave the unit out: units stand under `units`"
     if sign in ("^", ".^") and name == "e":
         return "write exp(x) for a power of e"
     if sign in ("^", ".^") and name in FUNCTIONS:
@@ -157,6 +254,26 @@ def better(sign: str, text: str, at: int) -> str | None:
 def power_of(function: str) -> str:
     """The hint for ``sin**2(x)``."""
     return f"write {function}(...)**2 for a power of a function"
+
+
+def side_by_side(number: str, name: str) -> str | None:
+    """The hint for a number and a name without an operator between, where the name is a unit or an exponent."""
+    if name in ("deg", "degrees", "rad"):
+        return NAMES[name]
+    if re.fullmatch("[dD][0-9]{1,4}", name):
+        return f"write {number}e{name[1:]}"
+    if name.lower() in _UNITS and len(name) == 1:
+        return f"write {number}*{name} for a product; units stand under `units`"
+    if name.lower() in _UNITS:
+        return f"write {number} alone, for units stand under `units`; or {number}*{name} for a product"
+    return None
+
+
+def compared(left: str, word: str) -> str | None:
+    """The hint for a comparison in words."""
+    if word in ("crosses", "exceeds", "reaches", "above", "over"):
+        return f"write {left} >= and the value"
+    return f"write {left} <= and the value" if word in ("below", "under") else None
 
 
 def derivative_of(name: str, known: object) -> str | None:

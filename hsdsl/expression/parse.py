@@ -6,7 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
-from hsdsl.expression.foreign import CASES, NAMES, power_of
+from hsdsl.expression.foreign import CASES, compared, power_of, side_by_side
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import (
     Call,
@@ -55,12 +55,13 @@ def parse(text: str, wanted: Wanted = "number") -> Tree:
     if tokens[0].kind == "end":
         raise ExpressionError("HS121", "an expression is missing", 0, 1, "write a number or an expression")
     with deep_stack():
-        return _Parser(text, tokens).whole()
+        return _Parser(text, tokens, wanted).whole()
 
 
 class _Parser:
-    def __init__(self, text: str, tokens: list[Token]) -> None:
+    def __init__(self, text: str, tokens: list[Token], wanted: Wanted) -> None:
         self.text = text
+        self.wanted = wanted
         self.tokens = tokens
         self.at = 0
         self.depth = 0
@@ -186,7 +187,7 @@ class _Parser:
             return ExpressionError("HS102", "there is nothing between the parentheses", before.start, token.end)
         hint = "write `**` for a power" if before.text == "**" and token.text == "*" else None
         if before.text == "/" and token.text == "/":
-            hint = "write floor(x/y) for a whole quotient"
+            hint = "write floor(x/y) for a whole quotient, and `#` before a comment"
         hint = hint or f"write what follows `{before.text}`, or remove it"
         return ExpressionError("HS102", f"an operand is missing after `{before.text}`", before.start, before.end, hint)
 
@@ -198,7 +199,10 @@ class _Parser:
         if token.text == ",":
             after = self.tokens[self.at + 1]
             decimal = before.kind == after.kind == "number"
-            hint = _decimal(before.text, after.text) if decimal else "parentheses hold one expression"
+            hint = "parentheses hold one expression" if self.depth else "write one expression here"
+            hint = _decimal(before.text, after.text) if decimal else hint
+            if self.wanted == "inequality" and not self.depth:
+                hint = "write one inequality here: the rest of a `when` under `if`, of a `domain` as further items"
             return ExpressionError(
                 "HS102", "a comma stands only between the arguments of a function", token.start, token.end, hint
             )
@@ -235,11 +239,8 @@ class _Parser:
 def _joined(before: Token, token: Token, left: str, right: str) -> str:
     if before.kind == token.kind == "number":
         return "a number has one decimal point, and no blanks"
-    if before.kind == "number" and token.text in ("deg", "degrees", "rad"):
-        return NAMES[token.text]
-    blank = before.kind == "number" and token.kind == "name" and before.end < token.start
-    unit = "; units stand under `units`" if blank else ""
-    return f"write {left}*{right} for a product{unit}"
+    known = side_by_side(left, right) if (before.kind, token.kind) == ("number", "name") else compared(left, right)
+    return known or f"write {left}*{right} for a product"
 
 
 def _decimal(left: str, right: str) -> str:

@@ -145,6 +145,8 @@ def _product_or_value(node: Call) -> str:
     match node.arguments:
         case (Name("t"),):
             return f"write {node.function}: every name has its value at the present time"
+        case (argument,) if any(isinstance(part, Name) and part.name == "t" for part in walk(argument)):
+            return "a name has its value at the present time: there are no delays"
         case _:
             return f"write {node.function}*(...)"
 

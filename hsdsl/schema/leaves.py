@@ -5,7 +5,6 @@ A leaf keeps its `Scalar`, and so its place. Every refusal is a `PydanticCustomE
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, LiteralString, TypeVar, cast
 
@@ -14,11 +13,10 @@ from pydantic_core import PydanticCustomError
 
 from hsdsl.expression.scope import RESERVED
 from hsdsl.names import WORDS, did_you_mean, is_identifier, shown
+from hsdsl.schema.forms import as_list, as_mapping, as_name, assigned, in_brackets
 from hsdsl.source import ABSENT, Key, Scalar
 
 T = TypeVar("T")
-_ASSIGNMENT = re.compile(r"\s*([^\W\d]\w*)\s*:?=\s*([^=].*)")
-_DERIVATIVE = re.compile(r"([^\W\d]\w*)(?:'|\(t\)|\.)|d([^\W\d]\w*)/dt|(?:der|diff|d)\(([^\W\d]\w*)(?:, *t)?\)(?:/dt)?")
 
 
 def refuse(code: str, message: str, hint: str | None = None) -> PydanticCustomError:
@@ -39,13 +37,14 @@ def described(value: Any) -> str:
 
 def _single(value: Any, wanted: str) -> Scalar:
     if not isinstance(value, Scalar):
-        raise refuse("HS203", f"{wanted} is wanted here, not {described(value)}")
+        hint = in_brackets(value) if isinstance(value, list) else None
+        raise refuse("HS203", f"{wanted} is wanted here, not {described(value)}", hint)
     return value
 
 
 def _expression(value: Any) -> Scalar:
     if isinstance(value, (dict, list)):
-        hint = _in_brackets(value) or "write every component as a name of its own"
+        hint = in_brackets(value) or "write every component as a name of its own"
         raise refuse("HS203", f"an expression is wanted here, not {described(value)}", hint)
     return _single(value, "an expression")
 
@@ -53,29 +52,16 @@ def _expression(value: Any) -> Scalar:
 def _condition(value: Any) -> Scalar:
     if isinstance(value, list):
         parts = [part.value for part in value if isinstance(part, Scalar)]  # pyright: ignore[reportUnknownVariableType]
-        hint = _in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}"
+        hint = in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}"
         raise refuse("HS203", "a condition is wanted here, not a list", hint)
     return _expression(value)
 
 
 def _inequality(value: Any) -> Scalar:
     if isinstance(value, list):
-        hint = _in_brackets(value) or "under `when`, put the rest under `if`; under `domain`, make each an item"
+        hint = in_brackets(value) or "under `when`, put the rest under `if`; under `domain`, make each an item"
         raise refuse("HS203", "one inequality is wanted here, not a list", hint)
     return _expression(value)
-
-
-def _in_brackets(value: Any) -> str | None:
-    """The hint for one expression in braces or brackets that YAML took for its own."""
-    match value:
-        case [Scalar() as only]:
-            return f"write it without brackets: {shown(only.value)}"
-        case {**entries} if len(entries) == 1 and all(_empty(inner) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
-            return f"write it without braces: {shown(next(iter(entries)))}"
-        case dict():
-            return "quote the expression, if it is one"
-        case _:
-            return None
 
 
 def _text(value: Any) -> Scalar | None:
@@ -139,29 +125,12 @@ def _version(value: Any) -> Scalar:
 def _name(key: Any) -> Key:
     if not is_identifier(key):
         message = f"'{shown(key)}' cannot be a name"
-        raise refuse("HS205", message, _as_name(key))
+        raise refuse("HS205", message, as_name(key))
     if key in RESERVED:
         kind = "a word of the language" if key in WORDS else "a function"
         kind = {"t": "the time", "pi": "a constant"}.get(key, kind)
         raise refuse("HS205", f"'{key}' is {kind} and cannot be a name", "choose another name")
     return key
-
-
-def _as_name(key: str) -> str:
-    """The hint for a key that cannot be a name."""
-    state = undifferentiated(key)
-    if state:
-        return f"write {state}: what stands under a state's name is its derivative"
-    if ":" in key:
-        return "write a space after the colon"
-    words = re.sub(r"[-. ]", "_", key)
-    return f"write {words}" if is_identifier(words) else "names have letters, digits and _, no digit first"
-
-
-def undifferentiated(key: str) -> str | None:
-    """The state that ``x'``, ``dx/dt`` or ``der(x)`` is the derivative of."""
-    found = _DERIVATIVE.fullmatch(key)
-    return next(part for part in found.groups() if part) if found else None
 
 
 def _state_name(key: Any) -> Key:
@@ -177,6 +146,8 @@ def _mode_name(key: Any) -> Key:
 
 
 def _any_key(key: Any) -> Key:
+    if assigned(key):
+        raise refuse("HS205", f"'{shown(key)}' is not a name", as_name(key))
     return key
 
 
@@ -189,23 +160,8 @@ def shaped_as_mapping(value: Any) -> Any:
     if _empty(value):
         return {}
     if not isinstance(value, dict):
-        raise refuse("HS203", f"a mapping (name: value) is wanted here, not {described(value)}", _as_mapping(value))
+        raise refuse("HS203", f"a mapping (name: value) is wanted here, not {described(value)}", as_mapping(value))
     return value  # pyright: ignore[reportUnknownVariableType]
-
-
-def _as_mapping(value: Any) -> str:
-    """The hint for what should have been names with values."""
-    match value:
-        case Scalar(value=text) if found := _ASSIGNMENT.fullmatch(text):
-            return f"write {{{found.group(1)}: {shown(found.group(2))}}}"
-        case Scalar(value=text) if ":" in text:
-            return "a key is followed by a colon and a space"
-        case [{"name": Scalar(value=name)}, *_]:
-            return f"write names as keys, without dashes: `{shown(name)}:`"
-        case list():
-            return "leave the dashes out: `name: value`, one on each line"
-        case _:
-            return "write {name: value}"
 
 
 def shaped_as_list(value: Any) -> Any:
@@ -213,8 +169,7 @@ def shaped_as_list(value: Any) -> Any:
     if _empty(value):
         return []
     if not isinstance(value, list):
-        hint = "begin each item with a dash and a blank: `- `" if isinstance(value, dict) else "write it as [..., ...]"
-        raise refuse("HS203", f"a list is wanted here, not {described(value)}", hint)
+        raise refuse("HS203", f"a list is wanted here, not {described(value)}", as_list(value))
     return value  # pyright: ignore[reportUnknownVariableType]
 
 

@@ -8,58 +8,16 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from hsdsl.errors import Diagnostic, Findings, Span
-from hsdsl.names import closest, shown
+from hsdsl.names import shown
 from hsdsl.schema.documents import SHAPES, Model
-from hsdsl.schema.leaves import described, undifferentiated
-from hsdsl.schema.repair import repair
+from hsdsl.schema.forms import assigned, undifferentiated
+from hsdsl.schema.habits import reread
+from hsdsl.schema.leaves import described
+from hsdsl.schema.meant import Location, advice, key_meant, moves_to, to_add, torn
+from hsdsl.schema.repair import descend, repair
 from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
 
-_Location = tuple[int | str, ...]
 _MOST_REPAIRS = 8
-_MEANT = {
-    "guard": "when",
-    "trigger": "when",
-    "target": "to",
-    "goto": "to",
-    "jump": "reset",
-    "assign": "reset",
-    "update": "reset",
-    "invariant": "domain",
-    "walls": "domain",
-    "ode": "flow",
-    "dynamics": "flow",
-    "edges": "transitions",
-    "jumps": "transitions",
-    "locations": "modes",
-    "where": "let",
-    "constants": "parameters",
-    "horizon": "until",
-    "end": "until",
-    "dt": "step",
-    "h": "step",
-    "epsilon": "relaxation",
-    "eps": "relaxation",
-    "tol": "tolerance",
-    "integrator": "method",
-    "simulation": "experiment",
-    "name": "title",
-    "description": "about",
-}
-_ADD = {
-    "hsdsl": "begin the file with hsdsl: 1",
-    "modes": "write modes: and under it each mode's name with its flow",
-    "flow": "write flow: and under it each state with its derivative",
-    "initial": "write initial: {mode: ..., x: ...}, a value for each state of that mode",
-    "experiment": "write experiment: {until: 10}, the time at which a run ends",
-    "until": "write until: and the time at which a run ends",
-    "when": "write when: and the inequality at which the transition fires, such as x >= 1",
-    "to": "write to: and the mode that is entered",
-    "value": "write value: and the parameter's number or expression",
-    "times": "write times: [0, 1, 2], or file: and the name of a CSV file",
-    "values": "write values: and one value for each of the times",
-    "file": "write file: and the name of a CSV file",
-    "time": "write time: and when that is",
-}
 _PLACE: dict[tuple[str, ...], str] = {
     (): "a model",
     ("parameters", "*"): "a parameter",
@@ -85,16 +43,23 @@ def read(root: Node, findings: Findings) -> Model:
     ModelError
         When too little is left to be called a model.
     """
+    reread(root, findings)
     for _ in range(_MOST_REPAIRS):
         try:
             return Model.model_validate(_plain(root))
         except ValidationError as error:
             details = error.errors(include_url=False)
-        misspelt = {(*fault["loc"][:-1], _meant(fault)) for fault in details}
-        diagnostics = [_diagnostic(root, f) for f in details if f["type"] != "missing" or f["loc"] not in misspelt]
-        for diagnostic in diagnostics:
-            findings.add(diagnostic)
-        repaired = [repair(root, _names(fault["loc"]), fault["type"], _meant(fault)) for fault in reversed(details)]
+        meant = [_meant(root, fault) for fault in details]
+        taken = [_taken_for(root, fault, key) for fault, key in zip(details, meant, strict=True)]
+        filled = set(taken)
+        for fault in details:
+            if not (fault["type"] == "missing" and (fault["loc"] in filled or _said(root, fault))):
+                findings.add(_diagnostic(root, fault))
+        faults = reversed(list(zip(details, meant, taken, strict=True)))
+        repaired = [
+            repair(root, _names(fault["loc"]), fault["type"], key, place if key is None else ())
+            for fault, key, place in faults
+        ]
         if not all(repaired):
             break
     findings.raise_if_any()
@@ -127,40 +92,58 @@ def _diagnostic(root: Node, details: ErrorDetails) -> Diagnostic:
             return _find(root, location).diagnostic("HS204", "this value is not possible here")
 
 
-def _fields(location: _Location) -> list[str]:
+def _fields(location: Location) -> list[str]:
     shape = SHAPES[_pattern(location[:-1])]
     return [field.alias or name for name, field in shape.model_fields.items()]
 
 
-def _meant(fault: ErrorDetails) -> str | None:
+def _meant(root: Node, fault: ErrorDetails) -> str | None:
     """The key that an unknown one was probably meant to be."""
     location = fault["loc"]
     if fault["type"] == "HS205" and location[-1] == "[key]":
-        return undifferentiated(str(location[-2]))
+        key = str(location[-2])
+        equation = assigned(key)
+        return equation[0] if equation else undifferentiated(key)
     if fault["type"] != "extra_forbidden":
         return None
+    parent = descend(root, _names(location[:-1]))
+    return key_meant(str(location[-1]), _fields(location), parent)
+
+
+def _taken_for(root: Node, fault: ErrorDetails, meant: str | None) -> Location:
+    """Where a fault's key is taken to stand: under another name, or in another place."""
+    location = fault["loc"]
+    if fault["type"] != "extra_forbidden" or meant is not None:
+        return (*location[:-1], meant or "")
+    return moves_to(root, str(location[-1]), descend(root, _names(location))) or ()
+
+
+def _said(root: Node, fault: ErrorDetails) -> bool:
+    """Whether a missing key is said already: a dash too many makes two transitions of one."""
+    match fault["loc"]:
+        case ("modes", mode, "transitions", int(index), key) if fault["type"] == "missing":
+            above = descend(root, ("modes", mode, "transitions"))
+            part = torn(above, index)
+            return part == 0 or (part > 0 and key == "to" and not _has(above, index, "when"))
+        case _:
+            return False
+
+
+def _has(sequence: Node | None, index: int, key: str) -> bool:
+    item = sequence.items[index] if isinstance(sequence, Sequence) else None
+    return isinstance(item, Mapping) and key in item.entries
+
+
+def _unknown(root: Node, location: Location) -> Diagnostic:
     key, fields = str(location[-1]), _fields(location)
-    meant = _MEANT.get(key)
-    return meant if meant in fields else closest(key, fields)
-
-
-def _unknown(root: Node, location: _Location) -> Diagnostic:
-    pattern, key, fields = _pattern(location[:-1]), str(location[-1]), _fields(location)
-    meant = _MEANT.get(key)
-    if ":" in key:
-        hint = "write a space after the colon"
-    elif key == "<<":
-        hint = "mappings are not merged in YAML 1.2"
-    elif meant in fields:
-        hint = f"did you mean '{meant}'?"
-    else:
-        best = closest(key, fields)
-        hint = f"did you mean '{best}'?" if best else "keys here: " + ", ".join(fields)
-    message = f"unknown key '{shown(key)}' in {_PLACE[_trimmed(pattern)]}"
+    parent = descend(root, _names(location[:-1]))
+    meant = key_meant(key, fields, parent)
+    message = f"unknown key '{shown(key)}' in {_PLACE[_trimmed(_pattern(location[:-1]))]}"
+    hint = advice(key, meant, fields, descend(root, _names(location)))
     return _find(root, location, key=True).diagnostic("HS201", message, hint)
 
 
-def _missing(root: Node, location: _Location) -> Diagnostic:
+def _missing(root: Node, location: Location) -> Diagnostic:
     place = _find(root, location[:-1], key=True)
     where = _PLACE[_trimmed(_pattern(location[:-1]))]
     message = f"the key '{location[-1]}' is missing in {where}"
@@ -169,20 +152,18 @@ def _missing(root: Node, location: _Location) -> Diagnostic:
         span = Span(span.path, 1, 1)
     elif place.start[1] != place.end[1] or isinstance(_names(location[:-1])[-1], int):
         span = Span(span.path, span.line, span.column)
-    return place.text.diagnostic("HS202", message, span, _to_add(root, location))
+    parent = descend(root, _names(location[:-1]))
+    hint = to_add(root, str(location[-1]), parent)
+    match location:
+        case ("modes", mode, "transitions", int(index), _):
+            part = torn(descend(root, ("modes", mode, "transitions")), index)
+            hint = "remove the dash here, which begins another transition" if part > 0 else hint
+        case _:
+            pass
+    return place.text.diagnostic("HS202", message, span, hint)
 
 
-def _to_add(root: Node, location: _Location) -> str:
-    """What to write where a key is missing."""
-    key = str(location[-1])
-    if key != "mode":
-        return _ADD[key]
-    modes = root.entries["modes"][1] if isinstance(root, Mapping) and "modes" in root.entries else root
-    names = [str(name) for name, _ in modes] if isinstance(modes, Mapping) else []
-    return f"write mode: {names[0]}" if len(names) == 1 else "write mode: and the mode that a run starts in"
-
-
-def _names(location: _Location) -> _Location:
+def _names(location: Location) -> Location:
     return tuple(step for step in location if isinstance(step, int) or not step.startswith(("<", "function-")))
 
 
@@ -190,7 +171,7 @@ def _trimmed(pattern: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(step for step in pattern if not step.startswith("<"))
 
 
-def _pattern(location: _Location) -> tuple[str, ...]:
+def _pattern(location: Location) -> tuple[str, ...]:
     """The kind of place: the key of :data:`SHAPES`."""
     for pattern in SHAPES:
         if _fits(pattern, location):
@@ -198,16 +179,16 @@ def _pattern(location: _Location) -> tuple[str, ...]:
     return _trimmed_match(location)
 
 
-def _trimmed_match(location: _Location) -> tuple[str, ...]:
+def _trimmed_match(location: Location) -> tuple[str, ...]:
     names = _names(location)
     return next((pattern for pattern in SHAPES if _fits(_trimmed(pattern), names)), ())
 
 
-def _fits(pattern: tuple[str, ...], location: _Location) -> bool:
+def _fits(pattern: tuple[str, ...], location: Location) -> bool:
     return len(pattern) == len(location) and all(p in ("*", step) for p, step in zip(pattern, location, strict=True))
 
 
-def _find(root: Node, location: _Location, key: bool = False) -> Place:
+def _find(root: Node, location: Location, key: bool = False) -> Place:
     """The place of a value, or of its key; of the nearest thing above it that exists."""
     node, place = root, root.place
     for number, step in enumerate(location):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from hsdsl.schema.forms import assigned
+from hsdsl.schema.meant import Location
 from hsdsl.source import Key, Mapping, Node, Place, Scalar, Sequence, absent
 
-_Location = tuple[int | str, ...]
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",))
 _WITH_ITS_ENTRY = ("times", "values", "file")
 _NOT_WITHOUT = ("modes", "initial", "experiment")
 
 
-def repair(root: Node, location: _Location, fault: str, meant: str | None) -> bool:
+def repair(root: Node, location: Location, fault: str, meant: str | None, belongs: Location = ()) -> bool:
     """Take one fault out of the nodes, in place; False where nothing sensible would be left.
 
     Parameters
@@ -23,18 +24,22 @@ def repair(root: Node, location: _Location, fault: str, meant: str | None) -> bo
         pydantic's own type of error, or the code of one of ours.
     meant : str or None
         For an unknown key, the one to take it for.
+    belongs : tuple
+        For a key in the wrong place, where to take it to stand; empty where that is not known.
     """
     if not location:
         return False
     if location[-1] == "[key]":
-        above = _descend(root, location[:-2])
-        return _renamed(above, str(location[-2]), meant) or _drop(root, location[:-1])
-    parent = _descend(root, location[:-1])
+        above = descend(root, location[:-2])
+        key = str(location[-2])
+        return _equated(above, key) or _renamed(above, key, meant) or _drop(root, location[:-1])
+    parent = descend(root, location[:-1])
     match fault:
         case "extra_forbidden":
-            return _renamed(parent, str(location[-1]), meant) or _drop(root, location)
+            key = str(location[-1])
+            return _renamed(parent, key, meant) or _moved(root, parent, key, belongs) or _drop(root, location)
         case "missing" if location[-1] in _WITH_ITS_ENTRY:
-            return _replaced(_descend(root, location[:-2]), location[-2], None)
+            return _replaced(descend(root, location[:-2]), location[-2], None)
         case "missing":
             return _filled(parent, str(location[-1]))
         case "HS206":
@@ -49,13 +54,14 @@ def repair(root: Node, location: _Location, fault: str, meant: str | None) -> bo
             return False
 
 
-def _holds_more(location: _Location) -> bool:
+def _holds_more(location: Location) -> bool:
     """Whether a mapping or a list belongs there, whose names others may use."""
     containers = ("parameters", "inputs", "let", "modes", "outputs", "flow", "initial", "experiment")
     return location[-1] in containers or location[-2:-1] == ("modes",)
 
 
-def _descend(root: Node, location: _Location) -> Node | None:
+def descend(root: Node, location: Location) -> Node | None:
+    """What stands at the end of a way of keys and indices, if anything."""
     node: Node | None = root
     for step in location:
         if isinstance(node, Mapping) and step in node.entries:
@@ -75,8 +81,43 @@ def _renamed(parent: Node | None, key: str, meant: str | None) -> bool:
     return True
 
 
-def _drop(root: Node, location: _Location) -> bool:
-    parent = _descend(root, location[:-1])
+def _equated(parent: Node | None, key: str) -> bool:
+    """Take the key ``x = 1``, which has no value, for the key x with the value 1."""
+    equation = assigned(key)
+    if equation is None or not isinstance(parent, Mapping) or equation[0] in parent.entries:
+        return False
+    found, value = parent.entries.pop(key)
+    name, text = equation
+    if isinstance(value, Scalar) and value.kind == "null":
+        value = _behind(found.place, key, text) if text else absent(found.place)
+    parent.entries[name] = (Key.at(name, found.place), value)
+    return True
+
+
+def _behind(place: Place, key: str, text: str) -> Scalar:
+    """The last part of a key that stands in the file as it is read, as a value with its place."""
+    first, line, column = place.start
+    at = key.rfind(text)
+    begin = (first + at, line, column + at)
+    written = place.text.content[begin[0] : begin[0] + len(text)] == text
+    return Scalar(text, True, Place(place.text, begin, (begin[0] + len(text), line, begin[2] + len(text)))
+                  if written else place)  # fmt: skip
+
+
+def _moved(root: Node, parent: Node | None, key: str, belongs: Location) -> bool:
+    above = descend(root, belongs[:-1]) if belongs else None
+    if isinstance(above, Scalar) and above.kind == "null" and isinstance(root, Mapping):
+        name = str(belongs[0])
+        above = Mapping({}, above.place)
+        root.entries[name] = (root.entries[name][0], above)
+    if not (isinstance(above, Mapping) and isinstance(parent, Mapping)) or key in above.entries:
+        return False
+    above.entries[key] = parent.entries.pop(key)
+    return True
+
+
+def _drop(root: Node, location: Location) -> bool:
+    parent = descend(root, location[:-1])
     if isinstance(parent, Mapping):
         return parent.entries.pop(str(location[-1]), None) is not None
     return False

@@ -31,13 +31,35 @@ def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> li
         key, value = entries[at]
         pieces: list[Node] = [value]
         for name, rest in entries[at + 1 : at + _MOST_PIECES]:
-            if not (isinstance(rest, Scalar) and rest.plain and rest.value == ""):
+            if not _nothing(rest):
                 break
             pieces.append(name)
-        run = _run(pieces)
-        joined.append((key, _one(run, findings)))
+        if _nothing(value):  # a call where a name is wanted, such as `reinit(v, -c*v)`
+            run = _run([key, *pieces[1:]])
+            joined.append((_joined(run), value))
+        else:
+            run = pieces[:2] if _decimal(pieces) else _run(pieces)
+            joined.append((key, _one(run, findings)))
         at += len(run)
     return joined
+
+
+def _nothing(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.plain and node.value == ""
+
+
+def _decimal(pieces: list[Node]) -> bool:
+    """Whether a value and what follows its comma are ``9,81``."""
+    match pieces:
+        case [Scalar(value=whole), Scalar(value=part) as rest, *_]:
+            return whole.isdecimal() and part.isdecimal() and _before(rest) == ","
+        case _:
+            return False
+
+
+def _before(node: Node) -> str:
+    index = node.place.start[0]
+    return node.place.text.content[index - 1 : index]
 
 
 def spaced_entries(entries: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
@@ -70,15 +92,25 @@ def _run(nodes: list[Node]) -> list[Scalar] | list[Node]:
 
 
 def _one(run: list[Scalar] | list[Node], findings: Findings) -> Node:
+    whole = _joined(run)
+    if whole is run[0] or not isinstance(whole, Scalar):
+        return run[0]
+    message, hint = (
+        "inside braces or brackets YAML ends a value at its comma",
+        f'quote this expression: "{whole.value}"',
+    )
+    if _decimal(list(run)):
+        whole = Scalar(whole.value.replace(",", "."), True, whole.place)
+        hint = f"write {whole.value}"
+    findings.add(whole.place.diagnostic("HS007", message, hint))
+    return whole
+
+
+def _joined(run: list[Scalar] | list[Node]) -> Node:
+    """The pieces as one, with what stands between them."""
     first, last = run[0], run[-1]
     if first is last:
         return first
     text = first.place.text
     place = Place(text, first.place.start, last.place.end)
-    value = " ".join(text.content[place.start[0] : place.end[0]].split())
-    findings.add(
-        place.diagnostic(
-            "HS007", "inside braces or brackets YAML ends a value at its comma", f'quote this expression: "{value}"'
-        )
-    )
-    return Scalar(value, True, place)
+    return Scalar(" ".join(text.content[place.start[0] : place.end[0]].split()), True, place)

@@ -35,6 +35,10 @@ _QUOTE = "quote this expression"
 _NO_SPACE = re.compile(r"\s*(?:- +)?([^\W\d]\w*):(\S.*)")
 _EQUATION = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?:'|\(t\))?\s*=\s*([^=].*)|\s*(?:der|diff)\((\w+)\)\s*=\s*([^=].*)")
 _DASH = re.compile(r"(\s*)-([^\W\d].*:.*)")
+_LAST_WORD = re.compile(r"([^\W\d]\w*)\s*$")
+_FAR = 100  # characters before a fault that are looked at
+_COMMENT = re.compile(r"//|/\*|%")
+_TEXTS = ("title", "source", "about")
 _COLON = "a key is followed by a colon and a space"
 
 
@@ -96,9 +100,20 @@ def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> 
     if column > len(content) or (line != opened[0] and _character(text, line, column) == ":"):
         message = f"the `{bracket}` that opens here is never closed"
         return text.diagnostic("HS004", message, text.span(*opened), f"close it with `{closing}`")
+    if line != opened[0] and not content[: column - 1].strip() and column <= _indent(text.lines[opened[0] - 1]) + 1:
+        message = f"the `{bracket}` that opens here is never closed"
+        return text.diagnostic("HS004", message, text.span(*opened), f"close it with `{closing}`")
     found = _character(text, line, column)
     message = f"YAML cannot read on at `{found}` inside `{bracket}` and `{closing}`"
-    return text.diagnostic("HS007", message, text.span(line, column), f"{_QUOTE} if `{found}` belongs to one")
+    hint = f"{_QUOTE} if `{found}` belongs to one"
+    name = _LAST_WORD.search(content, max(0, column - _FAR), column - 1)
+    if found == ":" and name:
+        hint = f"write a comma before `{name.group(1)}`, or quote the expression that `:` belongs to"
+    return text.diagnostic("HS007", message, text.span(line, column), hint)
+
+
+def _indent(content: str) -> int:
+    return len(content) - len(content.lstrip())
 
 
 def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
@@ -140,6 +155,8 @@ def _with_colon(content: str) -> str:
 def _two_colons(content: str, column: int) -> str:
     """The hint for ``reset: v: -c*v``, and for a text or an expression with a colon in it."""
     key, _, value = content.partition(": ")
+    if key.strip(" -") in _TEXTS:
+        return f'quote the text: {key.strip(" -")}: "{shown(value)}"'
     if "?" in content[: column - 1]:
         return "write a mode for each case, or use min, max, abs or sign"
     if value[: column - len(key) - 3].isidentifier():
@@ -165,6 +182,11 @@ def _indentation(text: Text, line: int, column: int) -> Diagnostic:
 
 def _misread(text: Text, line: int, column: int) -> Diagnostic:
     content = text.lines[line - 1] if line <= len(text.lines) else ""
+    remark = _COMMENT.match(content, column - 1) or _COMMENT.match(content, _indent(content))
+    if remark and content[: remark.start()].rstrip()[-1:] in ("", "}", "]"):
+        column = remark.start() + 1
+        message = f"`{remark.group()}` begins no comment"
+        return text.diagnostic("HS004", message, text.span(line, column, len(remark.group())), "write `#` before it")
     found = _VALUE.match(content)
     start = found.start("value") if found else column - 1
     first = content[start : start + 1]

@@ -1,0 +1,146 @@
+"""The right form of what people write for a name, a mapping or a list who come from another tool."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, cast
+
+from hsdsl.names import is_identifier, shown
+from hsdsl.source import Key, Scalar
+
+_LONGEST = 1000  # of texts that are looked at for a better form
+_TARGET = r"([^\W\d]\w*)(?:'|\+|\(t\))?|d([^\W\d]\w*)/dt|der\(\s*([^\W\d]\w*)\s*\)"
+_ASSIGNMENT = re.compile(rf"\s*(?:{_TARGET})\s*:?=\s*([^=].*)")
+_REINIT = re.compile(r"reinit\(\s*([^\W\d]\w*)(?:\s*,\s*(.+)\))?")
+_DERIVATIVE = re.compile(r"([^\W\d]\w*)(?:'|\(t\)|\.)|d([^\W\d]\w*)/dt|(?:der|diff|d)\(([^\W\d]\w*)(?:, *t)?\)(?:/dt)?")
+_SECOND = re.compile(r"([^\W\d]\w*)(?:''|\.\.)|d2([^\W\d]\w*)/dt2|der\(der\(([^\W\d]\w*)\)\)")
+_AND = re.compile(r"\s+and\s+|\s*(?:,|&&)\s*")
+
+
+def assigned(text: str) -> tuple[str, str] | None:
+    """The name and the value of ``x = 1``, ``x := 1``, ``x' = 1``, ``der(x) = 1`` or ``reinit(x, 1)``."""
+    short = len(text) < _LONGEST
+    found = (_ASSIGNMENT.fullmatch(text) or _REINIT.fullmatch(text)) if short else None
+    if not found:
+        return None
+    *names, value = found.groups()
+    return next(name for name in names if name), (value or "").strip()
+
+
+def undifferentiated(key: str) -> str | None:
+    """The state that ``x'``, ``dx/dt`` or ``der(x)`` is the derivative of, also the second."""
+    found = (_DERIVATIVE.fullmatch(key) or _SECOND.fullmatch(key)) if len(key) < _LONGEST else None
+    return next(part for part in found.groups() if part) if found else None
+
+
+def as_name(key: str) -> str:
+    """The hint for a key that cannot be a name."""
+    equation = assigned(key)
+    if equation:
+        return _entry(*equation)
+    state = undifferentiated(key)
+    if state and _SECOND.fullmatch(key):
+        return f"write two states: {state}: d{state}, and d{state}: with the second derivative"
+    if state:
+        return f"write {state}: what stands under a state's name is its derivative"
+    if ":" in key:
+        return "write a space after the colon"
+    words = re.sub(r"[-. ]", "_", key)
+    return f"write {words}" if is_identifier(words) else "names have letters, digits and _, no digit first"
+
+
+def _entry(name: str, value: str) -> str:
+    return f"write {name}: {shown(value) or '...'}"
+
+
+def as_mapping(value: Any) -> str:
+    """The hint for what should have been names with values."""
+    match value:
+        case Scalar(value=text) if found := assigned(text):
+            name, said = found
+            return _entry(name, said) if _on_its_own_line(value) else f"write {{{name}: {shown(said)}}}"
+        case Scalar(value=text) if ":" in text:
+            return "a key is followed by a colon and a space"
+        case [{"name": Scalar(value=name)}, *_]:
+            return f"write names as keys, without dashes: `{shown(name)}:`"
+        case [first, *_] if not _after_a_dash(first):
+            return _braces(cast(list[Any], value)) or "write braces and names: {name: value, ...}"
+        case list():
+            return "leave the dashes out: `name: value`, one on each line"
+        case _:
+            return "write {name: value}"
+
+
+def as_list(value: Any) -> str:
+    """The hint for what should have been a list."""
+    match value:
+        case Scalar(value=text):
+            parts = [text.strip()] if "(" in text else _AND.split(text.strip())
+            return f"write [{shown(', '.join(parts))}]"
+        case {**entries} if interval := _intervals(cast(dict[str, Any], entries)):
+            return f"write each inequality as an item: [{interval}]"
+        case {**entries} if entries and all(isinstance(inner, dict) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
+            name = shown(str(next(iter(cast(dict[str, Any], entries)))))
+            return f"begin each item with a dash, and give its name in it: - name: {name}"
+        case dict():
+            return "begin each item with a dash and a blank: `- `"
+        case _:
+            return "write it as [..., ...]"
+
+
+def in_brackets(value: Any) -> str | None:
+    """The hint for one expression in braces or brackets that YAML took for its own."""
+    match value:
+        case [Scalar() as only]:
+            return f"write it without brackets: {shown(only.value)}"
+        case {**entries} if len(entries) == 1 and all(_nothing(inner) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
+            return f"write it without braces: {shown(next(iter(entries)))}"
+        case dict():
+            return "quote the expression, if it is one"
+        case _:
+            return None
+
+
+def _intervals(entries: dict[str, Any]) -> str | None:
+    """``{x: [0, 1]}`` as inequalities."""
+    said: list[str] = []
+    for name, bounds in entries.items():
+        match bounds:
+            case [Scalar(value=low), Scalar(value=high)]:
+                said.append(f"{shown(name)} >= {shown(low)}, {shown(name)} <= {shown(high)}")
+            case _:
+                return None
+    return ", ".join(said)
+
+
+def _braces(items: list[Any]) -> str | None:
+    """The items of a list in brackets, each ``v: 1`` or ``v = 1``, as one mapping in braces."""
+    said: list[str] = []
+    for item in items:
+        match item:
+            case {**entries} if all(isinstance(inner, Scalar) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
+                said += [f"{key}: {inner.value}" for key, inner in cast(dict[str, Scalar], entries).items()]
+            case Scalar(value=text) if found := assigned(text):
+                said.append(": ".join(found))
+            case _:
+                return None
+    return f"write {{{shown(', '.join(said))}}}"
+
+
+def _nothing(value: Any) -> bool:
+    return isinstance(value, Scalar) and value.kind == "null"
+
+
+def _on_its_own_line(scalar: Scalar) -> bool:
+    return not _before(scalar).strip()
+
+
+def _after_a_dash(item: Any) -> bool:
+    """Whether an item of a list stands behind a dash, and not in brackets."""
+    first = next(iter(cast(dict[Any, Any], item)), None) if isinstance(item, dict) else item
+    return not isinstance(first, (Scalar, Key)) or _before(first).rstrip().endswith("-")
+
+
+def _before(part: Scalar | Key) -> str:
+    _, line, column = part.place.start
+    return part.place.text.lines[line][:column]
