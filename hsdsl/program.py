@@ -33,14 +33,20 @@ class Operation:
     """One line of a tape: what kind of recurrence, of which earlier lines, with which constant.
 
     With u, v lines and c the constant, ``kind`` is ``constant`` (c), ``add`` (u + v), ``sub`` (u - v), ``neg`` (-u),
-    ``offset`` (u + c), ``scale`` (c u), ``mul`` (u v), ``div`` (u / v), ``under`` (c / u), ``sqrt`` (of u), ``pow``
-    (u**c), ``atan2`` (of lines y, x, with its derivatives by y and by x as lines), or the name of a function of u with
-    its derivative by u as the second line. A derivative may be a later line: coefficient k asks it for those before k.
+    ``offset`` (u + c), ``scale`` (c u), ``mul`` (u v), ``square`` (u u), ``div`` (u / v), ``under`` (c / u), ``sqrt``
+    (of u), ``pow`` (u**c), ``atan2`` (of lines y, x, with its derivatives by y and by x as lines), or the name of a
+    function of u with its derivative by u as the second line. A derivative may be a later line: coefficient k asks it
+    for those before k.
+
+    ``degree`` is given where the series that its sum goes along (the first line, of ``div`` the second) is a polynomial
+    of time alone: then no more than so many coefficients of it count. The sine of something linear in time costs one
+    product a coefficient.
     """
 
     kind: str
     lines: tuple[int, ...]
     constant: int | None
+    degree: int | None = None
 
 
 @dataclass(frozen=True)
@@ -50,9 +56,10 @@ class Tape:
     Attributes
     ----------
     constants : Routines
-        One routine ``constants`` without arguments: the constants' values, from the data that ``bind`` takes.
-    constant_count : int
-        How many there are.
+        Two routines without arguments, ``flow`` and ``surfaces``: the values of the constants that the flow needs, and
+        of those that surfaces need besides; from the data that ``bind`` takes.
+    constant_count, surface_constant_count : int
+        How many there are of each.
     operations : tuple of Operation
         Lines 0 to n are time and the n states, operation i is line n + 1 + i.
     flow : tuple of int
@@ -65,6 +72,7 @@ class Tape:
 
     constants: Routines
     constant_count: int
+    surface_constant_count: int
     operations: tuple[Operation, ...]
     flow: tuple[int, ...]
     surfaces: tuple[int | None, ...]

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from itertools import product
 
-from conformance.test_agreement import FLOATS, LONG, MODELS, SHORT, STEPS, arguments
+from conformance.test_agreement import COMPILED, FLOATS, LONG, MODELS, SHORT, STEPS, arguments
 from conformance.test_conformance import CASES, Run, model, read
-from property.random_models import SETTINGS, random_model
+from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smooth_model
 
 import hsdsl
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
-from hsdsl.integrators import INTEGRATORS
+from hsdsl.integrators import AUTO
 from hsdsl.model import Model
 from hsdsl.simulate import chunks
 from hsdsl.simulate.compiled import SCHEMES
@@ -25,21 +25,23 @@ def main() -> None:
     count = 0
     for name in CASES:
         for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():
-            for setting, scheme in product(list(FLOATS.values())[::3], SCHEMES):
-                count += model(name).simulate(**arguments(run, setting, scheme), engine="c").engine == "c"
+            for setting, (scheme, method) in product(list(FLOATS.values())[::3], COMPILED):
+                if setting.get("method", AUTO) == method:
+                    count += model(name).simulate(**arguments(run, setting, scheme), engine="c").engine == "c"
     for name, path in MODELS.items():
         loaded = hsdsl.load(path)
-        for method in INTEGRATORS:
-            for setting, scheme in product(({**s, **SHORT.get(name, {})} for s in STEPS), SCHEMES):
-                run = loaded.simulate(method=method, max_transitions=40, scheme=scheme, **setting, engine="c")
-                count += run.engine == "c"
+        for setting, (scheme, method) in product(({**s, **SHORT.get(name, {})} for s in STEPS), COMPILED):
+            run = loaded.simulate(method=method, max_transitions=40, scheme=scheme, **setting, engine="c")
+            count += run.engine == "c"
     for seed in range(25):
-        try:
-            drawn = Model(elaborate("random.yaml", text=random_model(seed).encode()))
-            for setting, scheme in product(SETTINGS, SCHEMES):
-                count += drawn.simulate(max_transitions=25, scheme=scheme, **setting, engine="c").engine == "c"
-        except (ModelError, UsageError):
-            continue
+        for text, settings in ((random_model(seed), SETTINGS), (smooth_model(seed), SMOOTH_SETTINGS)):
+            try:
+                drawn = Model(elaborate("random.yaml", text=text.encode()))
+                for setting, scheme in product(settings, SCHEMES):
+                    if (scheme, setting.get("method", AUTO)) in COMPILED:
+                        count += drawn.simulate(max_transitions=25, scheme=scheme, **setting, engine="c").engine == "c"
+            except (ModelError, UsageError):
+                continue
     print(f"{count} runs")
 
 

@@ -9,6 +9,8 @@ See A. Griewank and A. Walther, *Evaluating Derivatives*, Sec. 13.2 (doi:10.1137
 
 from __future__ import annotations
 
+from math import inf
+
 import sympy as sp
 
 from hsdsl.lower.routines import Definition, print_routines
@@ -16,6 +18,8 @@ from hsdsl.program import Operation, Tape
 from hsdsl.system import TIME
 
 _ONE = sp.Integer(1)
+_WITHOUT_SUM = ("constant", "add", "sub", "neg", "offset", "scale", "square", "sqrt", "atan2")
+_POLYNOMIAL = ("constant", "add", "sub", "neg", "offset", "scale", "mul")  # of polynomials
 
 
 class Kinked(Exception):
@@ -32,10 +36,11 @@ def make_tape(flow, surfaces, states, data) -> Tape | None:
         rows = tuple(writer.line(f) for f in flow)
     except Kinked:
         return None
-    needed = len(writer.operations)
+    needed, count = len(writer.operations), len(writer.constants)
     lines = tuple(writer.line_or_none(r) for r in surfaces)
-    constants = print_routines([Definition("constants", (), tuple(writer.constants))], data)
-    return Tape(constants, len(writer.constants), tuple(writer.operations), rows, lines, needed)
+    first, further = tuple(writer.constants[:count]), tuple(writer.constants[count:])
+    constants = print_routines([Definition("flow", (), first), Definition("surfaces", (), further)], data)
+    return Tape(constants, count, len(further), tuple(writer.operations), rows, lines, needed)
 
 
 class _Writer:
@@ -46,17 +51,20 @@ class _Writer:
         self._moving = set(self._known)
         self._first = len(self._known)
         self._numbers: dict[sp.Expr, int] = {}
+        self._written: dict[Operation, int] = {}
+        self._degrees: list[int | None] = [1, *(None for _ in states)]
         self.constants: list[sp.Expr] = []
         self.operations: list[Operation] = []
 
     def line_or_none(self, expr) -> int | None:
         """The line of an expression; None where it is kinked, with nothing written."""
-        before, known = len(self.operations), dict(self._known)
+        before = len(self.operations), len(self.constants)
+        kept = dict(self._known), dict(self._written), dict(self._numbers)
         try:
             return self.line(expr)
         except Kinked:
-            del self.operations[before:]
-            self._known = known
+            del self.operations[before[0] :], self._degrees[self._first + before[0] :], self.constants[before[1] :]
+            self._known, self._written, self._numbers = kept
             return None
 
     def line(self, expr) -> int:
@@ -89,8 +97,37 @@ class _Writer:
                 self._numbers[constant] = len(self.constants)
                 self.constants.append(constant)
             number = self._numbers[constant]
-        self.operations.append(Operation(kind, lines, number))
-        return self._first + len(self.operations) - 1
+        operation = self._shortest(kind, lines, number)
+        if operation not in self._written:
+            self._written[operation] = self._first + len(self.operations)
+            self.operations.append(operation)
+            self._degrees.append(self._degree(operation))
+        return self._written[operation]
+
+    def _shortest(self, kind: str, lines: tuple[int, ...], constant: int | None) -> Operation:
+        """Choose how an operation is summed: along a polynomial of time where there is one."""
+        if kind == "mul":
+            shorter, longer = sorted(lines, key=lambda line: (self._length(line), line))
+            lines = shorter, longer
+            if shorter == longer and self._degrees[shorter] is None:
+                return Operation("square", lines[:1], constant)
+        if kind in _WITHOUT_SUM:
+            return Operation(kind, lines, constant)
+        along = self._degrees[lines[1 if kind == "div" else 0]]
+        return Operation(kind, lines, constant, None if along is None else max(1, along))
+
+    def _length(self, line: int) -> float:
+        degree = self._degrees[line]
+        return inf if degree is None else degree
+
+    def _degree(self, operation: Operation) -> int | None:
+        """The degree of a line that is a polynomial of time; None for others."""
+        if operation.kind not in _POLYNOMIAL:
+            return None
+        degrees = [d for line in operation.lines if (d := self._degrees[line]) is not None]
+        if len(degrees) < len(operation.lines):
+            return None
+        return sum(degrees) if operation.kind == "mul" else max(degrees, default=0)
 
     def _sum(self, expr) -> int:
         terms = expr.as_ordered_terms()

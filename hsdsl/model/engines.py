@@ -14,7 +14,6 @@ from collections.abc import Callable
 from functools import cache
 
 from hsdsl.errors import UsageError
-from hsdsl.integrators import ButcherTableau
 from hsdsl.names import did_you_mean
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
@@ -66,9 +65,9 @@ def _refusal(settings: Settings, precision: int | None) -> str | None:
         return "it computes with float64 only, and a precision is asked for"
     if settings.scheme not in SCHEMES:
         return f"scheme '{settings.scheme}' has no compiled loop"
-    if not isinstance(settings.method, ButcherTableau):
+    if not isinstance(settings.method, SCHEMES[settings.scheme]):
         name = settings.method.name if settings.method else settings.scheme
-        return f"method '{name}' has no compiled loop"
+        return f"method '{name}' has no compiled loop in scheme '{settings.scheme}'"
     return None
 
 

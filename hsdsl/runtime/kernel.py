@@ -14,8 +14,8 @@ from typing import Any
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.backends.c import model_source
 from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
-from hsdsl.kernel import Routine, Taylor, Vector
-from hsdsl.program import Program
+from hsdsl.kernel import Routine, Series, Taylor, Vector
+from hsdsl.program import Program, Tape
 from hsdsl.runtime import tables
 from hsdsl.runtime.library import load
 
@@ -23,6 +23,8 @@ Address = int | None
 Double = ctypes.c_double
 Doubles = ctypes.POINTER(ctypes.c_double)
 RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Doubles)
+SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Doubles, Doubles)
+SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
 @cache
@@ -86,8 +88,9 @@ class CompiledKernel:
         return self._python.expressions(mode, data)
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
-        """Return Taylor coefficients along a mode's flow, by the Python kernel."""
-        return self._python.taylor(mode, data)
+        """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
+        tape = self._program.modes[mode].tape
+        return None if tape is None else _taylor(self._compiled.table.mode[mode], tape, data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states, by the Python kernel."""
@@ -114,6 +117,33 @@ class CompiledKernel:
             resets=tuple(bound(e.reset, e.target_dimension) for e in edges),
             spreads=tuple(bound(e.spread, e.target_dimension, 2 * n) for e in edges),
         )
+
+
+def _taylor(table: tables.Mode, tape: Tape, data: Sequence[Number]) -> Taylor:
+    numbers = (Double * max(1, len(data)))(*data)
+    own = 1 + table.dimension + tape.needed
+    every = 1 + table.dimension + len(tape.operations)
+    assert table.series is not None and table.surface_series is not None
+    write, write_surfaces = SeriesPointer(table.series), SurfaceSeriesPointer(table.surface_series)
+
+    def flow(order: int, t: Number, x: Vector) -> tuple[Series, ...]:
+        length = order + 2
+        found = (Double * (length * every))()
+        if write(numbers, order, t, (Double * max(1, len(x)))(*x), found):
+            raise ValueError("no finite value")
+        return tuple(found[i * length : (i + 1) * length - (i > table.dimension)] for i in range(own))
+
+    def surfaces(order: int, lines: tuple[Series, ...]) -> tuple[Series | None, ...]:
+        length = order + 2
+        found = (Double * (length * every))()
+        for i, line in enumerate(lines):
+            found[i * length : i * length + len(line)] = line
+        if write_surfaces(numbers, order, found):
+            raise ValueError("no finite value")
+        rows = (None if line is None else line * length for line in tape.surfaces)
+        return tuple(None if start is None else found[start : start + order + 1] for start in rows)
+
+    return Taylor(flow, surfaces)
 
 
 def _routine(address: Address, data: ctypes.Array[Double], arguments: int, results: int) -> Routine:

@@ -13,6 +13,7 @@ import numpy as np
 
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
+from hsdsl.integrators import ButcherTableau, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
@@ -34,7 +35,7 @@ from hsdsl.simulate.spans import along_steps
 from hsdsl.simulate.surfaces import Obstacle, Surfaces
 from hsdsl.simulate.timeline import Timeline
 
-SCHEMES = ("relaxed",)
+SCHEMES: dict[str, tuple[type, ...]] = {"relaxed": (ButcherTableau, TaylorMethod)}  # and which methods each one takes
 
 
 class CompiledPlan:

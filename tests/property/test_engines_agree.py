@@ -6,32 +6,39 @@ from collections import Counter
 
 import pytest
 from engines import assert_engines_agree, needs_compiler
-from property.random_models import SETTINGS, random_model
+from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smooth_model
 
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.execution import Execution
+from hsdsl.integrators import TaylorMethod
 from hsdsl.model import Model
 from hsdsl.simulate.compiled import SCHEMES
 
 pytestmark = needs_compiler
 
 
-def runs_of(seed: int) -> list[Execution]:
+def runs_of(text: str, every: tuple[dict, ...], schemes: list[str]) -> list[Execution]:
     """Every setting's run of one random model, after the engines were found to agree; none where it is refused."""
     try:
-        model = Model(elaborate("random.yaml", text=random_model(seed).encode()))
+        model = Model(elaborate("random.yaml", text=text.encode()))
         return [
             assert_engines_agree(model, max_transitions=25, scheme=scheme, **settings)
-            for scheme in SCHEMES
-            for settings in SETTINGS
+            for scheme in schemes
+            for settings in every
         ]
     except (ModelError, UsageError):  # no value anywhere, such as log(-1)
         return []
 
 
 def check(seeds: range) -> Counter[str]:
-    return Counter(run.stop.reason for seed in seeds for run in runs_of(seed))
+    return Counter(run.stop.reason for seed in seeds for run in runs_of(random_model(seed), SETTINGS, list(SCHEMES)))
+
+
+def check_smooth(seeds: range) -> Counter[str]:
+    schemes = [scheme for scheme, methods in SCHEMES.items() if TaylorMethod in methods]
+    texts = map(smooth_model, seeds)
+    return Counter(run.stop.reason for text in texts for run in runs_of(text, SMOOTH_SETTINGS, schemes))
 
 
 def test_random_models_run_alike() -> None:
@@ -39,7 +46,14 @@ def test_random_models_run_alike() -> None:
     assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain"}, reasons
 
 
+def test_smooth_random_models_run_alike_by_taylor_series() -> None:
+    reasons = check_smooth(range(20))
+    assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain"}, reasons
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(6))
 def test_many_random_models_run_alike(block: int) -> None:
-    assert check(range(1000 + 100 * block, 1100 + 100 * block)).total() > 100
+    seeds = range(1000 + 100 * block, 1100 + 100 * block)
+    assert check(seeds).total() > 100
+    assert check_smooth(seeds).total() > 100

@@ -67,6 +67,17 @@ def function_body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
     return "\n".join(f"  {line}" for line in lines)
 
 
+def expression(text: str, names: Mapping[str, str]) -> str:
+    """Print one expression of the language of routines.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    return _Printer(names).expression(ast.parse(text, mode="eval").body)
+
+
 class _Printer:
     def __init__(self, names: Mapping[str, str]) -> None:
         self.names = dict(names)

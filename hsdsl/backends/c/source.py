@@ -12,14 +12,15 @@ from itertools import count
 from textwrap import dedent
 
 from hsdsl.backends.c.printer import function_body
-from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines
+from hsdsl.backends.c.series import flow_lines, line_count, surface_lines
+from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _HEAD = """\
 /* Generated from a model; see hs.h for what the tables mean. */
 
 #include "hs.h"
-#include "hs_math.h"
+#include "hs_series.h"
 
 """
 _FUNCTION = """\
@@ -28,6 +29,20 @@ static int {name}(const double *restrict p, double t, const double *restrict x, 
   (void)p, (void)t, (void)x, (void)out;
 {body}
   return bad;
+}}
+"""
+_SERIES = """\
+static int NAME(const double *p, int order, double t, const double *x, double *lines) {{
+  double c[{size}] = {{0.0}};
+  (void)p;
+  return order > HS_MOST_ORDER || {constants}{core}(c, order, t, x, lines);
+}}
+"""
+_SURFACE_SERIES = """\
+static int NAME(const double *p, int order, double *lines) {{
+  double c[{size}] = {{0.0}};
+  (void)p;
+  return order > HS_MOST_ORDER || {constants}{core}(c, order, lines);
 }}
 """
 
@@ -41,7 +56,7 @@ def model_source(program: Program) -> str:
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.modes)}, {max(len(m.edges) for m in program.modes)}, "
-        f"{len(program.outputs)}, {len(writer.data)}, 0, {table}}};\n"
+        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -50,6 +65,11 @@ def width(program: Program) -> int:
     """How many states the largest mode has; one without a flow has those it is entered with."""
     entered = (len(edge.target_states) for mode in program.modes for edge in mode.edges)
     return max((len(program.initial_states), *(len(mode.states) for mode in program.modes), *entered))
+
+
+def lines(program: Program) -> int:
+    """How many lines the largest tape has."""
+    return max((line_count(m.tape, len(m.states)) for m in program.modes if m.tape), default=0)
 
 
 class _Writer:
@@ -73,9 +93,26 @@ class _Writer:
             self.pointers(routine[f"gradient_{k}"] for k in surfaces),
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
-            *("0", "0", "0"),
+            *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
         ]
         return f"{{{', '.join(fields)}}}"
+
+    def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
+        """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""
+        own, further = tape.constant_count, tape.surface_constant_count
+        names, size = self.routines(tape.constants), max(1, own + further)
+        first = f"{names['flow']}(p, 0.0, 0, c) || " if own else ""
+        second = f"{names['surfaces']}(p, 0.0, 0, c + {own}) || " if further else ""
+        core = self.shared("flow_lines", flow_lines(tape, dimension))
+        series = _SERIES.format(size=size, constants=first, core=core)
+        core = self.shared("surface_lines", surface_lines(tape, dimension))
+        surface_series = _SURFACE_SERIES.format(size=size, constants=first + second, core=core)
+        found = [str(-1 if line is None else line) for line in tape.surfaces]
+        return (
+            self.shared("series", series),
+            self.shared("surface_series", surface_series),
+            self.table("int", "surface_line", found),
+        )
 
     def edge(self, k: int, edge: EdgeProgram, mode: ModeProgram, routine: dict[str, str]) -> str:
         parts = [routine[name] for name in mode.routines.names if name.startswith(f"condition_{k}_")]
@@ -103,6 +140,13 @@ class _Writer:
         """Write a mode's routines; returns their names in C."""
         return {name: self.function(text) for name, text in _DEFINITION.findall(routines.source)}
 
+    def shared(self, kind: str, text: str) -> str:
+        """Write a function whose name stands in its text as ``NAME``; equal texts are one function."""
+        if text not in self.functions:
+            self._names[text] = f"{kind}_{len(self.functions)}"
+            self.functions[text] = text.replace("NAME", self._names[text])
+        return self._names[text]
+
     def function(self, text: str) -> str:
         if text not in self.functions:
             self._names[text] = name = f"routine_{len(self.functions)}"
@@ -114,5 +158,7 @@ class _Writer:
 
 
 def _arguments(definition: ast.FunctionDef) -> dict[str, str]:
+    if not definition.args.args:
+        return {}
     time, *others = (argument.arg for argument in definition.args.args)
     return {time: time} | {name: f"x[{i}]" for i, name in enumerate(others)}

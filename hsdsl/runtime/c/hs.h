@@ -19,6 +19,7 @@ typedef int hs_routine(const double *p, double t, const double *x, double *out);
 /* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
    lines[l*(order + 2) + m]. Line 0 is time, lines 1 to n are the states, with coefficients 0 to order + 1; the others
    have those from 0 to order. No value where one of them has none. */
+#define HS_MOST_ORDER 30 /* round-off is below the terms of any order that is higher */
 typedef int hs_series(const double *p, int order, double t, const double *x, double *lines);
 
 /* The same of the lines behind them, which surfaces need besides: coefficients 0 to order. */

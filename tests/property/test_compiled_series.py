@@ -1,0 +1,106 @@
+"""Compiled Taylor coefficients against those of the Python kernel: the same to the bit, and none at the same points."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from engines import bits, needs_compiler
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from property.test_compiled_kernel import EXPRESSIONS, NUMBERS, ONE, SPECIAL, TWO
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
+from hsdsl.backends.python import PythonKernel
+from hsdsl.elaborate import elaborate
+from hsdsl.kernel import Taylor
+from hsdsl.model import Model
+from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+
+pytestmark = needs_compiler
+DATA = [0.35, 1.0, 0.2, 0.0]
+
+
+def kernels(flow: str, surface: str) -> tuple[Taylor, Taylor] | None:
+    """The series of a model of one mode, by either kernel; None where it is refused or kinked."""
+    text = f"""
+hsdsl: 1
+parameters: {{a: 0.35}}
+inputs: {{u: {{times: [0, 10], values: [1, 3], hold: linear}}}}
+modes:
+  m:
+    flow: {{x: "{flow}", v: "1 - x*v/4"}}
+    domain: ["{surface} <= v", "abs(x) <= 10", "x*{surface} >= t"]
+initial: {{mode: m, x: 0, v: 0}}
+experiment: {{until: 1}}
+"""
+    try:
+        program = Model(elaborate("random.yaml", text=text.encode())).program
+    except Exception:  # the language refuses what has no value anywhere, such as 1/0
+        return None
+    both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
+    found = both[0].taylor(0, DATA), both[1].taylor(0, DATA)
+    assert (found[0] is None) == (found[1] is None)
+    return None if found[0] is None or found[1] is None else (found[0], found[1])
+
+
+def outcome(taylor: Taylor, order: int, point: tuple[float, ...]) -> object:
+    """All lines of the flow and all surfaces, to the bit; None in place of what has no value."""
+    try:
+        lines = taylor.flow(order, point[0], point[1:])
+    except DOMAIN_ERRORS:
+        return None
+    try:
+        surfaces = taylor.surfaces(order, lines)
+    except DOMAIN_ERRORS:
+        return [bits(line) for line in lines], None
+    return [bits(line) for line in lines], [row and bits(row) for row in surfaces]
+
+
+def assert_alike(both: tuple[Taylor, Taylor], points: list[tuple[float, ...]], order: int) -> int:
+    """How many points had values everywhere."""
+    found = [outcome(both[0], order, point) for point in points]
+    for point, wanted in zip(points, found, strict=True):
+        assert outcome(both[1], order, point) == wanted, point
+    return sum(one is not None for one in found)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    EXPRESSIONS,
+    EXPRESSIONS,
+    st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=20, max_size=20),
+    st.integers(4, 20),
+)
+def test_random_series_agree_at_any_point(flow, surface, points, order):
+    both = kernels(flow, surface)
+    if both is not None:
+        assert_alike(both, points, order)
+
+
+SMOOTH = [*(f"{name}(x)" for name in ONE), *(f"{name}(x, v)" for name in TWO if name not in ("min", "max"))]
+SMOOTH = [text for text in SMOOTH if not text.startswith(("abs", "sign", "floor", "heaviside"))]
+SMOOTH += ["x**v", "x/v", "x**9", "x**-3", "x**0.5", "x**-1.5", "x**(a*20)", "(x - 0.5)**(a/0.07)", "-x*v", "x*x*v*v"]
+SMOOTH += ["sin(3*t)*x", "t*x", "(t**2 - 1)*exp(x)", "x/(1 + t)", "1/(t**3 + x)", "1/(2 - t**2)", "cos(t**2)", "t**a"]
+SMOOTH += ["sqrt(t)", "u*x", "sin(u)", "exp(a)*x", "3", "x**2 + sin(x**2)", "atan2(t, x)", "log(1 + t)"]
+
+
+@pytest.mark.parametrize("text", SMOOTH)
+def test_each_operation_agrees_at_special_points(text):
+    both = kernels(text, text)
+    assert both is not None
+    points = [(0.25, x, v) for x, v in product(SPECIAL, SPECIAL)]
+    points += [(t, x, 0.75) for t, x in product((0.0, -0.5, 2.0), (0.5, 1.25, -0.25, 3.5))]
+    assert assert_alike(both, points, 12) > 0
+    assert assert_alike(both, points[-12:], 4) > 0
+
+
+def test_constants_without_a_value_leave_no_coefficients():
+    point, pole = (0.0, 1.0, 1.0), "(a - 7/20)"
+    in_flow, in_surface = kernels(f"x/{pole}", "v"), kernels("x", f"v/{pole}")
+    assert in_flow is not None and in_surface is not None
+    for taylor in in_flow:
+        assert outcome(taylor, 8, point) is None
+    for taylor in in_surface:
+        found = outcome(taylor, 8, point)
+        assert isinstance(found, tuple) and found[1] is None
