@@ -100,9 +100,9 @@ class _Writer:
     def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""
         own, further = tape.constant_count, tape.surface_constant_count
-        names, size = self.routines(tape.constants), max(1, own + further)
-        first = f"{names['flow']}(p, 0.0, 0, c) || " if own else ""
-        second = f"{names['surfaces']}(p, 0.0, 0, c + {own}) || " if further else ""
+        texts, size = dict[str, str](_DEFINITION.findall(tape.constants.source)), max(1, own + further)
+        first = f"{self.function(texts['flow'])}(p, 0.0, 0, c) || " if own else ""
+        second = f"{self.function(texts['surfaces'])}(p, 0.0, 0, c + {own}) || " if further else ""
         core = self.shared("flow_lines", flow_lines(tape, dimension))
         series = _SERIES.format(size=size, constants=first, core=core)
         core = self.shared("surface_lines", surface_lines(tape, dimension))
