@@ -22,11 +22,7 @@ COMPILED = [
     (scheme, name) for scheme, kinds in SCHEMES.items() for name, method in METHODS.items() if isinstance(method, kinds)
 ]
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
-FLOATS = {
-    name: setting
-    for name, setting in SETTINGS.items()
-    if "precision" not in setting
-}
+FLOATS = {name: setting for name, setting in SETTINGS.items() if "precision" not in setting}
 LONG = ("m4-chattering", "zeno-ball")  # tens of thousands of transitions
 SHORT = {"stiff-switch": {"until": "1e-4"}}  # explicit steps on it are a ten-millionth long
 OVER_BOTH = ("midpoint", "adaptive")
