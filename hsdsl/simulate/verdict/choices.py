@@ -54,7 +54,7 @@ def commute(run: Looking, place: Place, tied: Sequence[int], since: Number = 0) 
 
     Surfaces that are reached within the time ``since`` count as reached together.
     """
-    since = max(since, run.tie(place.t))
+    since = max(since, 2 * run.tie(place.t))  # what is tied may be that far apart, and off a surface by the rest
     try:
         landed = [settle(run, place, k, since) for k in tied]
     except DOMAIN_ERRORS:
