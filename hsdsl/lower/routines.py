@@ -7,6 +7,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 
@@ -27,26 +28,31 @@ class Definition:
     results: tuple
     statements: Sequence[Statement] = ()
 
-    def written_out(self) -> tuple[list[Statement], tuple]:
-        """Cut down statements and results, and take out what is common to them."""
-        cut = Cut("v", powers=True)
-        given = [(symbol, cut.down(expr)) for symbol, expr in self.statements]
-        small = [cut.down(expr) for expr in map(sp.sympify, self.results)]
-        known = [*given, *cut.statements]
-        common, reduced = sp.cse([*(e for _, e in known), *small], symbols=sp.numbered_symbols("w", real=True))
-        last = tuple(reduced)[len(known) :]
-        named = zip((symbol for symbol, _ in known), reduced, strict=False)
-        return in_order([*common, *named], sp.Tuple(*last)), last
-
 
 def text_of(definition: Definition) -> str:
     """Print one routine as a Python function."""
+    head = f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n"
+    return head + _body(definition.results, tuple(definition.statements))
+
+
+@lru_cache(maxsize=4096)  # the modes of a large model have most of their routines in common
+def _body(results: tuple, statements: tuple[Statement, ...]) -> str:
     printer = KernelPrinter()
-    statements, results = definition.written_out()
-    lines = [f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):"]
-    lines += [f"    {symbol.name} = {printer.doprint(expr)}" for symbol, expr in statements]
-    lines += [f"    return ({''.join(printer.doprint(expr) + ', ' for expr in results)})"]
-    return "\n".join(lines) + "\n"
+    statements, results = written_out(results, statements)
+    lines = [f"    {symbol.name} = {printer.doprint(expr)}\n" for symbol, expr in statements]
+    return "".join([*lines, f"    return ({''.join(printer.doprint(expr) + ', ' for expr in results)})\n"])
+
+
+def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:
+    """Cut down statements and results, and take out what is common to them."""
+    cut = Cut("v", powers=True)
+    given = [(symbol, cut.down(expr)) for symbol, expr in statements]
+    small = [cut.down(expr) for expr in map(sp.sympify, results)]
+    known = [*given, *cut.statements]
+    common, reduced = sp.cse([*(e for _, e in known), *small], symbols=sp.numbered_symbols("w", real=True))
+    last = tuple(reduced)[len(known) :]
+    named = zip((symbol for symbol, _ in known), reduced, strict=False)
+    return in_order([*common, *named], sp.Tuple(*last)), last
 
 
 def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol]) -> Routines:

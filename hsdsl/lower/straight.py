@@ -10,6 +10,7 @@ derivative or a text without end. After the cut every one of these costs as much
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import accumulate, count
 
 import sympy as sp
@@ -117,13 +118,18 @@ class Gradient:
 
     def _row(self, expr: sp.Expr) -> tuple[sp.Expr, ...]:
         present = expr.free_symbols
-        direct = {a: expr.diff(a) if a in present else sp.S.Zero for a in self._arguments}
+        direct = {a: _derivative(expr, a) if a in present else sp.S.Zero for a in self._arguments}
         through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
             slope = self._cut.name(expr.diff(symbol))
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] += slope * inner
         return tuple(direct[a] for a in self._arguments)
+
+
+@lru_cache(maxsize=4096)  # the modes of a large model have most of their derivatives in common
+def _derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    return expr.diff(symbol)
 
 
 def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:
