@@ -3,14 +3,18 @@
 An entry is found by the bytes of the model file, this package's own files and the limits in force; it names the data
 files that were read with their checksums, and holds for as long as they are unchanged. JSON is read into the types that
 `hsdsl.program` declares, and into nothing else.
+
+Every piece of a program is a row of a table and is named by its number, and equal pieces are one row: the modes of a
+large model have much in common, which is then read once.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -19,11 +23,15 @@ from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hsdsl import cache as store
+from hsdsl import program as declared
 from hsdsl.limits import Limits, current
 from hsdsl.program import Program
 
 KIND = "programs"
 _PACKAGE = Path(__file__).parents[1]
+_READERS = ("source", "schema", "expression", "elaborate", "lower", "model")  # what a program depends on, beside files
+_PIECES: dict[str, Any] = {kind.__name__: kind for kind in vars(declared).values() if is_dataclass(kind)}
+Row = list[Any]
 
 
 def key_of(model: bytes, limits: Limits | None) -> str:
@@ -34,8 +42,16 @@ def key_of(model: bytes, limits: Limits | None) -> str:
 @cache
 def _fingerprint() -> str:
     """What tells this package's files from those of another version; to hash them would take as long as to use them."""
-    stats = ((str(path), path.stat()) for path in sorted(_PACKAGE.rglob("*.py")))
-    return "\n".join(f"{path} {status.st_size} {status.st_mtime_ns}" for path, status in stats)
+    return "\n".join(sorted(_described(_PACKAGE, *(_PACKAGE / name for name in _READERS))))
+
+
+def _described(*folders: Path) -> Iterator[str]:
+    for folder in folders:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.name.endswith(".py"):
+                    status = entry.stat()
+                    yield f"{entry.path} {status.st_size} {status.st_mtime_ns}"
 
 
 def find(path: Path, key: str) -> Program | None:
@@ -43,17 +59,16 @@ def find(path: Path, key: str) -> Program | None:
     entry = store.find(KIND, key)
     if entry is None:
         return None
-    with suppress(OSError, ValueError, KeyError, TypeError):
+    with suppress(OSError, ValueError, KeyError, TypeError, IndexError):
         found = json.loads(entry.read_bytes())
         if all(_checksum((path.parent / name).read_bytes()) == checksum for name, checksum in found["files"].items()):
-            program: Program = _reader(Program)(found["program"])
-            return replace(program, path=str(path))
+            return replace(_read(found["rows"]), path=str(path))
     return None
 
 
 def keep(path: Path, key: str, program: Program, files: Mapping[str, str]) -> None:
     """Keep a program; nothing happens where nothing can be kept. ``files`` are data files with their checksums."""
-    text = json.dumps({"files": dict(files), "program": _plain(program)}, separators=(",", ":"))
+    text = json.dumps({"files": dict(files), "rows": _rows(program)}, separators=(",", ":"))
     with suppress(OSError):
         store.keep(KIND, key, ".json", lambda target: _write(target, text))
 
@@ -66,39 +81,67 @@ def _checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _plain(value: Any) -> Any:
-    """Turn frozen data into what JSON has: a dataclass is the list of its fields."""
-    if isinstance(value, Fraction):
-        return f"{value.numerator}/{value.denominator}"
-    if is_dataclass(value):
-        return [_plain(getattr(value, field.name)) for field in fields(value)]
-    if isinstance(value, (tuple, list)):
-        return [_plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-    return value
+def _rows(program: Program) -> list[Row]:
+    """Turn a program into rows of what JSON has: the name of a piece's type and its fields, behind what it names."""
+    rows: list[Row] = []
+    numbers: dict[str, int] = {}
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Fraction):
+            return f"{value.numerator}/{value.denominator}"
+        if isinstance(value, (tuple, list)):
+            return [plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+        if not is_dataclass(value):
+            return value
+        row = [type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))]
+        number = numbers.setdefault(json.dumps(row), len(rows))
+        if number == len(rows):
+            rows.append(row)
+        return number
+
+    plain(program)
+    return rows
+
+
+def _read(rows: list[Row]) -> Program:
+    """Read a table; it raises ValueError, TypeError, KeyError or IndexError where it is none of a program."""
+    pieces: list[Any] = []
+    for name, *row in rows:
+        kind = _PIECES[name]
+        pieces.append(kind(*(read(item, pieces) for read, item in zip(_readers(kind), row, strict=True))))
+    return _checked(Program)(pieces[-1], pieces)
+
+
+Reader = Callable[[Any, list[Any]], Any]
 
 
 @cache
-def _reader(kind: Any) -> Callable[[Any], Any]:
+def _readers(kind: Any) -> tuple[Reader, ...]:
+    hints = get_type_hints(kind)
+    return tuple(_reader(hints[field.name]) for field in fields(kind))
+
+
+@cache
+def _reader(kind: Any) -> Reader:
     """Make the function that turns JSON back into a type; it raises ValueError or TypeError where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if is_dataclass(kind):
-        hints = get_type_hints(kind)
-        readers = [_reader(hints[field.name]) for field in fields(kind)]
-        return lambda value: kind(*(read(item) for read, item in zip(readers, value, strict=True)))  # type: ignore[operator]
+        piece = _checked(kind)  # type: ignore[arg-type]
+        return lambda value, pieces: piece(pieces[value], pieces)
     if origin is tuple and arguments[-1] is Ellipsis:
         one = _reader(arguments[0])
-        return lambda value: tuple(map(one, value))
+        return lambda value, pieces: tuple([one(item, pieces) for item in value])
     if origin in (Union, types.UnionType):
         (other,) = (a for a in arguments if a is not type(None))
         given = _reader(other)
-        return lambda value: None if value is None else given(value)
+        return lambda value, pieces: None if value is None else given(value, pieces)
     if kind is Fraction:
-        return Fraction
+        return lambda value, _: Fraction(value)
     return _checked(dict if origin is dict else str if origin is Literal else kind)
 
 
-def _checked(kind: type) -> Callable[[Any], Any]:
-    def read(value: Any) -> Any:
+def _checked(kind: type) -> Reader:
+    def read(value: Any, _: list[Any]) -> Any:
         if type(value) is not kind:
             raise TypeError(f"{kind.__name__} expected")
         return value
