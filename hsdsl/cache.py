@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import secrets
-import shutil
 import stat
 import sys
 from collections.abc import Callable
@@ -80,6 +78,8 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     OSError
         The folder is refused or cannot be written.
     """
+    import secrets
+
     if refusal := private(folder()):
         raise PermissionError(refusal)
     entry = folder() / kind / key
@@ -106,6 +106,8 @@ def _prune(kind: Path) -> None:
     entries = [entry for entry in os.scandir(kind) if entry.is_dir()]
     if len(entries) <= MOST_ENTRIES:
         return
+    import shutil
+
     with suppress(OSError):  # another process prunes as well
         for entry in sorted(entries, key=lambda e: _used(e.path))[: len(entries) - MOST_ENTRIES]:
             shutil.rmtree(entry.path, ignore_errors=True)

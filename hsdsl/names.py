@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -42,6 +41,8 @@ def closest(name: str, candidates: Iterable[str]) -> str | None:
             return candidate
     if len(names) > _MOST_TO_COMPARE:
         return None
+    import difflib  # few names are misspelt
+
     found = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return found[0] if found else None
 

@@ -100,7 +100,7 @@ class Execution(Deferred):
 
     def _repr_html_(self) -> str:
         """Show a short summary in Jupyter."""
-        from hsdsl.report import html
+        from hsdsl.report.page import html
 
         return html(self, limit=12)
 

@@ -17,7 +17,6 @@ from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.limits import Limits, applied
 from hsdsl.model import engines, seen
-from hsdsl.model.estimate import Estimate, compare, finer_settings
 from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
@@ -30,6 +29,7 @@ from hsdsl.simulate.recorder import Progress
 
 if TYPE_CHECKING:
     from hsdsl.metrics.points import Place, PointDistance
+    from hsdsl.model.estimate import Estimate
     from hsdsl.system import HybridSystem
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
@@ -227,6 +227,8 @@ class Model:
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
+        from hsdsl.model.estimate import compare, finer_settings
+
         finer = finer_settings(execution)
         asked |= {"step": None, "tolerance": None, "watch": None, **finer}
         if execution.method in METHODS:

@@ -30,7 +30,7 @@ from hsdsl.program import Program
 KIND = "programs"
 _PACKAGE = Path(__file__).parents[1]
 _READERS = ("source", "schema", "expression", "elaborate", "lower", "model")  # what a program depends on, beside files
-_PIECES: dict[str, Any] = {kind.__name__: kind for kind in vars(declared).values() if is_dataclass(kind)}
+_PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 Row = list[Any]
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from html import escape
 
 from hsdsl.execution import Execution
-from hsdsl.report import html, words
+from hsdsl.report import words
+from hsdsl.report.page import html
 
 CSS = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 75rem; margin: 2rem auto; padding: 0 1rem }

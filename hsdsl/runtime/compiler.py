@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import shlex
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,6 +42,8 @@ class Compiler:
         NoCompiler
             It fails; the message holds the first line of what it says.
         """
+        import subprocess  # what is compiled already needs none
+
         command = [*self.command, *FLAGS, *(f"-I{folder}" for folder in includes), "-o", str(target)]
         command += [*map(str, sources), "-lm"]
         try:
@@ -64,7 +63,7 @@ def find_compiler() -> Compiler:
     NoCompiler
         None was found, or ``CC`` names none.
     """
-    if given := shlex.split(os.environ.get("CC", "")):
+    if given := _words(os.environ.get("CC", "")):
         path = shutil.which(given[0])
         if path is None:
             raise NoCompiler(f"CC is {given[0]}, which is not there")
@@ -72,9 +71,19 @@ def find_compiler() -> Compiler:
     for name in NAMES:
         if path := shutil.which(name):
             return Compiler((path,), _identity(path))
-    if spec := importlib.util.find_spec("ziglang"):
+    from importlib.util import find_spec
+
+    if spec := find_spec("ziglang"):
         return Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(str(spec.origin)))
     raise NoCompiler("no C compiler was found (cc, gcc, clang, or the package ziglang: pip install 'hsdsl[compiler]')")
+
+
+def _words(text: str) -> list[str]:
+    if not text:
+        return []
+    import shlex
+
+    return shlex.split(text)
 
 
 def _identity(path: str, arguments: Sequence[str] = ()) -> str:

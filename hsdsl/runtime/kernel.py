@@ -12,7 +12,6 @@ from functools import cache
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.c import model_source
 from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
@@ -53,7 +52,7 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
-        self._library = load(repr((sizes, program.modes)), lambda: model_source(program))
+        self._library = load(repr((sizes, program.modes)), lambda: _source(program))
         self.table = tables.Model.in_dll(self._library, "hs_the_model")
         self._shared: dict[Hashable, Any] = {}
 
@@ -69,6 +68,12 @@ class CompiledModel:
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
+
+
+def _source(program: Program) -> str:
+    from hsdsl.backends.c import model_source  # what is compiled already needs none
+
+    return model_source(program)
 
 
 class CompiledKernel:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import platform
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-import hsdsl.backends.c as backends_c
 from hsdsl.cache import find, keep, key_of
 from hsdsl.runtime.compiler import FLAGS, Compiler, NoCompiler, find_compiler
 
 RUNTIME = Path(__file__).parent / "c"
-PRINTER = Path(backends_c.__file__).parent
+PRINTER = Path(__file__).parents[1] / "backends" / "c"
 KIND = "compiled"
 
 
@@ -54,6 +51,9 @@ def _processor() -> str:
 
 
 def _compile(compiler: Compiler, source: str, target: Path) -> None:
+    import shutil
+    import tempfile
+
     with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
         text, library = Path(folder) / "model.c", Path(folder) / "model.so"
         text.write_text(source)
@@ -63,6 +63,8 @@ def _compile(compiler: Compiler, source: str, target: Path) -> None:
 
 def _load_unkept(compiler: Compiler, source: str, refusal: OSError) -> ctypes.CDLL:
     """Compile for this process alone where nothing can be kept."""
+    import tempfile
+
     print(f"hsdsl: compiled code is not kept: {refusal}", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
         library = Path(folder) / "model.so"

@@ -10,6 +10,13 @@ from hsdsl.execution import Stop
 from hsdsl.simulate.recorder import Recorder
 from hsdsl.simulate.stops import show
 
+TWO_STEP = (
+    "the theorem says nothing of the scheme paoli-schatzman",
+    "only positions at the steps are the scheme's: velocities are difference quotients of them, and a last row between "
+    "two steps lies on their line",
+    "transitions are recognised where steps are in contact with the stop, consecutive ones as one, to about a step",
+)
+
 
 def crowded(recorder: Recorder, free: int, t: Number) -> None:
     """More transitions than cost no time fell within the relaxation."""

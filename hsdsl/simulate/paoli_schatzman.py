@@ -25,12 +25,6 @@ from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
 
-NOTES = (
-    "the theorem says nothing of the scheme paoli-schatzman",
-    "only positions at the steps are the scheme's: velocities are difference quotients of them, and a last row between "
-    "two steps lies on their line",
-    "transitions are recognised where steps are in contact with the stop, consecutive ones as one, to about a step",
-)
 Force = Callable[[Number], Number]
 
 

@@ -15,8 +15,6 @@ from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.entry import enter
-from hsdsl.simulate.located import located
-from hsdsl.simulate.paoli_schatzman import paoli_schatzman
 from hsdsl.simulate.recorder import Progress, Recorder
 from hsdsl.simulate.relaxed import relaxed
 from hsdsl.simulate.result import Written, from_recorder
@@ -25,10 +23,24 @@ from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted
 from hsdsl.simulate.timeline import Timeline, make_timeline
 
+
+def _located(run: Run, here: Here | Stop) -> Stop:
+    """The loop, loaded when it is asked for: the compiled ones need nothing of it."""
+    from hsdsl.simulate.located import located
+
+    return located(run, here)
+
+
+def _paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
+    from hsdsl.simulate.paoli_schatzman import paoli_schatzman
+
+    return paoli_schatzman(run, here)
+
+
 SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {
     "relaxed": relaxed,
-    "located": located,
-    "paoli-schatzman": paoli_schatzman,
+    "located": _located,
+    "paoli-schatzman": _paoli_schatzman,
 }
 Watch = Callable[[Progress], None]
 

@@ -12,8 +12,8 @@ import numpy as np
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Array, Execution, Point, Stop, Verdict
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate import notes
 from hsdsl.simulate.chunks import arcs_of, transitions_of
-from hsdsl.simulate.paoli_schatzman import NOTES
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.verdict import Looking, assess
@@ -132,5 +132,5 @@ def described(settings: Settings) -> dict[str, Any]:
 
 def _verdict(run: Run, execution: Execution) -> Verdict:
     if run.settings.one_stop is not None:
-        return Verdict("unknown", NOTES)
+        return Verdict("unknown", notes.TWO_STEP)
     return assess(Looking(run, execution), run.recorder.departures, run.recorder.doubts)
