@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
 from dataclasses import fields, replace
 from typing import Any
@@ -49,6 +50,21 @@ def outcome(routine: Any, *arguments: float) -> list[int | str] | None:
         return None
 
 
+def assert_sampled_alike(run: Any) -> None:
+    """The compiled sampler must give what the execution's arrays give in Python, to the last bit."""
+    assert run.sampler is not None
+    plain, rng = replace(run, sampler=None), random.Random(len(run.times))
+    start, end = map(float, run.time_span)
+    times = [rng.uniform(start, end) for _ in range(40)] + rng.choices(run.times.tolist(), k=20)
+    rising = [start + (end - start) * k / 150 for k in range(150)] + [end * (1 + 5e-13)]
+    for asked in (times, rising):
+        for side in ("right", "left"):
+            for columns in (None, [*run.output_names[:1], *run.states[-1:]]):
+                fast, slow = (r.sample(asked, side, columns) for r in (run, plain))
+                for field in fields(fast):
+                    assert same(getattr(fast, field.name), getattr(slow, field.name)), (field.name, side, columns)
+
+
 def assert_engines_agree(model: Model, kernel: bool = True, **arguments: Any) -> Any:
     """Run by the Python loop over either kernel and by the compiled loop; all three must be one execution."""
     python = model.simulate(**arguments, engine="python")
@@ -63,4 +79,5 @@ def assert_engines_agree(model: Model, kernel: bool = True, **arguments: Any) ->
         ]  # fmt: skip
         assert not differing, (name, differing, python.stop, other.stop, arguments)
         assert alike(python) == alike(other)
+    assert_sampled_alike(others["C loop"])
     return python

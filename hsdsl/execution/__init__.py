@@ -26,17 +26,19 @@ Numbers are float64, or objects (mpmath) for a run at higher precision.
 from hsdsl.execution.parts import REASONS, Arc, Kind, Point, Stop, Transition, Verdict
 from hsdsl.execution.run import Execution, OutputFunction
 from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
-from hsdsl.execution.sampling import Side
+from hsdsl.execution.sampling import Evaluated, Sampler, Side
 
 __all__ = [
     "HYBRID_TIME",
     "REASONS",
     "Arc",
     "Array",
+    "Evaluated",
     "Execution",
     "Kind",
     "OutputFunction",
     "Point",
+    "Sampler",
     "Samples",
     "Side",
     "Stop",

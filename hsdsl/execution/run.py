@@ -16,7 +16,7 @@ from hsdsl.execution.deferred import Deferred
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.same import same
 from hsdsl.execution.samples import Samples
-from hsdsl.execution.sampling import ArcTable, Side, evaluate, find
+from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
@@ -26,8 +26,8 @@ OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
 class Execution(Deferred):
     """A run's result; see the package's docstring for the arrays.
 
-    Two executions are equal when every field is, not-a-number being equal to itself; ``output_function`` is
-    left out.
+    Two executions are equal when every field is, not-a-number being equal to itself; ``output_function`` and
+    ``sampler`` are left out.
 
     Attributes
     ----------
@@ -35,6 +35,8 @@ class Execution(Deferred):
         ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only: between rows
         this function gives them from the state there (not-a-number where they have no value); without it (an
         execution read from a file) they are interpolated linearly between the two rows.
+    sampler : callable or None
+        A faster way to the same values at many times, of a compiled run.
     """
 
     model: str
@@ -58,6 +60,7 @@ class Execution(Deferred):
     digits: int | None = None  # decimal digits of the numbers, None for float64
     title: str | None = None
     output_function: OutputFunction | None = field(default=None, compare=False)
+    sampler: Sampler | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         self.check()
@@ -134,8 +137,7 @@ class Execution(Deferred):
         ValueError
             For a time outside the run.
         """
-        rows, times = find(self, t, side)
-        one = evaluate(self, rows, times)
+        one = self.sample(t, side)
         state = {
             name: value
             for name, value, there in zip(one.states, one.state_columns[0].tolist(), one.present[0], strict=True)
@@ -143,17 +145,28 @@ class Execution(Deferred):
         }
         outputs = dict(zip(one.outputs, one.output_columns[0].tolist(), strict=True))
         kind = "strip" if one.kind[0] == "strip" else "flow"
-        return Point(times.tolist()[0], str(one.mode[0]), int(one.jump[0]), kind, state, outputs)
+        return Point(one.time.tolist()[0], str(one.mode[0]), int(one.jump[0]), kind, state, outputs)
 
-    def sample(self, times: Any, side: Side = "right") -> Samples:
+    def sample(self, times: Any, side: Side = "right", columns: Sequence[str] | None = None) -> Samples:
         """Return the values at many times, given in any order.
+
+        Parameters
+        ----------
+        times : numbers
+            Within :attr:`time_span`, or outside it by no more than the tie tolerance.
+        side : {"right", "left"}
+            At a jump: the value after the last transition at that instant, or before the first.
+        columns : names, optional
+            Which states and outputs; left out, all of them.
 
         Raises
         ------
         ValueError
             For a time outside the run; the message names the first such time.
+        UsageError
+            For a name that is neither a state nor an output.
         """
-        return evaluate(self, *find(self, times, side))
+        return sample(self, times, side, columns)
 
     def rows(self) -> Samples:
         """Return the recorded rows, two at each jump, without those that only repeat the one above."""

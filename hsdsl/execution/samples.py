@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
 import numpy.typing as npt
 
 from hsdsl.errors import UsageError
+from hsdsl.execution.deferred import Deferred
+from hsdsl.names import did_you_mean
 
 Array = npt.NDArray[Any]
 
@@ -18,7 +20,7 @@ HYBRID_TIME = ("time", "mode", "j")
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(Deferred):
     """Values of an execution at n points of hybrid time, by column.
 
     Attributes
@@ -60,6 +62,28 @@ class Samples:
         """All states, then all outputs."""
         return self.states + self.outputs
 
+    def only(self, columns: Sequence[str] | None) -> Samples:
+        """Keep only the states and outputs named, in the order named (states still stand before outputs).
+
+        Raises
+        ------
+        UsageError
+            For a name that is neither a state nor an output; the closest one is suggested.
+        """
+        if columns is None:
+            return self
+        chosen_states, chosen_outputs = split(columns, self.states, self.outputs)
+        states = [self.states.index(name) for name in chosen_states]
+        outputs = [self.outputs.index(name) for name in chosen_outputs]
+        return replace(
+            self,
+            states=chosen_states,
+            outputs=chosen_outputs,
+            state_columns=self.state_columns[:, states],
+            output_columns=self.output_columns[:, outputs],
+            present=self.present[:, states],
+        )
+
     @property
     def labels(self) -> tuple[str, ...]:
         """What heads the columns of a table: ``time``, ``mode``, ``j``, states, outputs."""
@@ -84,6 +108,25 @@ class Samples:
         """
         pandas = optional("pandas", "a DataFrame")
         return pandas.DataFrame({label: values for label, values, _ in self.columns()})
+
+
+def split(
+    columns: Sequence[str], states: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Sort names of columns into those of states and those of outputs, each once.
+
+    Raises
+    ------
+    UsageError
+        For a name that is neither; the closest one is suggested.
+    """
+    known = states + outputs
+    for name in columns:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"there are {', '.join(known) or 'none'}"
+            raise UsageError(f"no state or output is called {name}", hint=hint)
+    asked = dict.fromkeys(columns)
+    return tuple(name for name in asked if name in states), tuple(name for name in asked if name not in states)
 
 
 def optional(library: str, what: str) -> Any:

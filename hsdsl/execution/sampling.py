@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,12 +10,37 @@ import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution.parts import Arc
-from hsdsl.execution.samples import Array, Samples
+from hsdsl.execution.samples import Array, Samples, split
 
 if TYPE_CHECKING:
     from hsdsl.execution.run import Execution
 
 Side = Literal["right", "left"]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """What a sampler finds at n times.
+
+    Attributes
+    ----------
+    outside : int
+        The number of the first time that is outside the run; -1 where none is, and only then the rest is there.
+    times : array, shape (n,)
+        Those outside the run by no more than the tie tolerance moved to its ends.
+    rows : array of int, shape (n,)
+        Where the piece begins that each time is in.
+    states, outputs : array, shape (n, number of them)
+    """
+
+    outside: int
+    times: Array
+    rows: Array
+    states: Array
+    outputs: Array
+
+
+Sampler = Callable[[Array, bool, Sequence[str], bool], Evaluated]
 
 
 class ArcTable:
@@ -29,6 +54,10 @@ class ArcTable:
         self.layouts = list(dict.fromkeys(arc.states for arc in arcs))
         number = {layout: i for i, layout in enumerate(self.layouts)}
         self.layout = np.array([number[arc.states] for arc in arcs])
+
+    def present(self, states: Sequence[str]) -> Array:
+        """Say which arcs have which states: shape (arcs, states)."""
+        return np.array([[name in layout for name in states] for layout in self.layouts], dtype=bool)[self.layout]
 
 
 def within(execution: Execution, times: Any) -> tuple[Array, Array]:
@@ -65,20 +94,51 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     ValueError
         For a time that is not :func:`within` the run, or a ``side`` that is neither.
     """
-    if side not in ("right", "left"):
-        raise ValueError(f"side is 'right' or 'left', not {side!r}")
+    _check(side)
     asked, inside = within(execution, times)
     start, end = execution.time_span
     if not inside.all():
-        first = asked[int(np.argmin(inside))]
-        raise ValueError(
-            f"time {float(first):.17g} is outside the run, which goes from {float(start):.17g} to {float(end):.17g}"
-        )
+        raise _outside(execution, asked[int(np.argmin(inside))])
     asked = np.minimum(np.maximum(asked, start), end)
     rows = np.searchsorted(execution.times, asked, side=side)
     if side == "right":
         return rows - 1, asked
     return np.where(np.asarray(execution.times[rows] == asked, dtype=bool), rows, rows - 1), asked
+
+
+def _check(side: Side) -> None:
+    if side not in ("right", "left"):
+        raise ValueError(f"side is 'right' or 'left', not {side!r}")
+
+
+def _outside(execution: Execution, time: Any) -> ValueError:
+    start, end = execution.time_span
+    return ValueError(
+        f"time {float(time):.17g} is outside the run, which goes from {float(start):.17g} to {float(end):.17g}"
+    )
+
+
+def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] | None) -> Samples:
+    """Evaluate at any times, by the execution's own sampler where it has one."""
+    if execution.sampler is None:
+        return evaluate(execution, *find(execution, times, side)).only(columns)
+    _check(side)
+    states, outputs, names = execution.states, execution.output_names, execution.output_names
+    if columns is not None:
+        states, names = split(columns, states, outputs)
+    asked = _as_times(execution, times)
+    found = execution.sampler(asked, side == "left", states, bool(names))
+    if found.outside >= 0:
+        raise _outside(execution, asked[found.outside])
+    values = found.outputs if names == outputs else found.outputs[:, [outputs.index(name) for name in names]]
+    later: dict[str, Callable[[Samples], Array]] = {
+        "mode": lambda _: execution.arc_table.mode[_arcs(execution, found.rows)],
+        "jump": lambda _: execution.arc_table.jump[_arcs(execution, found.rows)],
+        "kind": lambda _: execution.arc_table.kind[_arcs(execution, found.rows)],
+        "present": lambda _: execution.arc_table.present(states)[_arcs(execution, found.rows)],
+    }
+    now = {"time": found.times, "state_columns": found.states, "output_columns": values}
+    return Samples.deferred(later, states=states, outputs=names, **now)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +159,11 @@ def _places(execution: Execution, rows: Array, times: Array) -> _Places:
     fraction = np.zeros_like(times)
     begin = execution.times[rows[between]]
     fraction[between] = (times[between] - begin) / (execution.times[follower[between]] - begin)
-    arcs = np.searchsorted(execution.arc_table.first, rows, side="right") - 1
-    return _Places(times, arcs, rows, follower, fraction, between)
+    return _Places(times, _arcs(execution, rows), rows, follower, fraction, between)
+
+
+def _arcs(execution: Execution, rows: Array) -> Array:
+    return np.searchsorted(execution.arc_table.first, rows, side="right") - 1
 
 
 def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:

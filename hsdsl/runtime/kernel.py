@@ -38,6 +38,7 @@ def runtime() -> ctypes.CDLL:
     library = load("runtime", lambda: '#include "hs.c"\n')
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.restype = None
+    library.hs_sample.restype = ctypes.c_int64
     return library
 
 

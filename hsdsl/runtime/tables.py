@@ -251,8 +251,33 @@ class Task(ctypes.Structure):
     )
 
 
+class Sampling(ctypes.Structure):
+    """``hs_sampling``."""
+
+    samples: int
+    width: int
+    outputs: int
+    columns: int
+    left: int
+    column: int
+    time: int
+    row: int
+    states: int
+    results: int
+    scratch: int
+
+    _fields_ = (
+        ("model", POINTER(Model)),
+        ("timeline", POINTER(Timeline)),
+        *((name, c_int64) for name in ("rows", "arcs", "samples")),
+        *((name, c_int32) for name in ("width", "degree", "outputs", "columns", "left")),
+        *((name, c_void_p) for name in ("times", "values", "recorded", "pieces", "arc", "layout", "dimension")),
+        *((name, c_void_p) for name in ("column", "time", "row", "states", "results", "scratch")),
+    )
+
+
 STRUCTURES = (  # as in hs_sizes
-    Edge, Mode, Model, Row, Method, Timeline, Interpolation, Settings, Chunk, Visited, Stop, Task,
+    Edge, Mode, Model, Row, Method, Timeline, Interpolation, Settings, Chunk, Visited, Stop, Task, Sampling,
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,11 +121,18 @@ def arcs_of(whole: dict[str, Array], program: Program, states: tuple[str, ...]) 
     rows = len(whole["times"])
     opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
     ends = [first - 1 for first, *_ in opened[1:]] + [rows - 1]
-    for (first, jump, index, kind), last in zip(opened, ends, strict=True):
-        mode = program.modes[index]
-        states = mode.states if mode.states or not mode.final else states  # one without a flow has those it is given
+    layouts = states_of_arcs([mode for _, _, mode, _ in opened], program, states)
+    for (first, jump, index, kind), last, layout in zip(opened, ends, layouts, strict=True):
         if first <= last:
-            yield Arc(mode.name, states, tables.KINDS[kind], jump, first, last)
+            yield Arc(program.modes[index].name, layout, tables.KINDS[kind], jump, first, last)
+
+
+def states_of_arcs(modes: Iterable[int], program: Program, states: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Give the states of each arc of a run that began with ``states``; a final mode without a flow keeps them."""
+    for index in modes:
+        mode = program.modes[index]
+        states = mode.states if mode.states or not mode.final else states
+        yield states
 
 
 def transitions_of(whole: dict[str, Array], program: Program) -> Iterator[Transition]:

@@ -60,7 +60,8 @@ class CompiledPlan:
             tables.SCHEMES.index(scheme),
         )
         self._interpolation = _interpolations(settings)
-        self._timeline = _Timeline(timeline)
+        self._columns = _Timeline(timeline)
+        self.timeline = self._columns.pointer
         self._mode, self._x = mode, np.array(x, np.float64)
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
@@ -68,7 +69,7 @@ class CompiledPlan:
         """Put everything on a desk."""
         desk.clear(self._rows)
         task = desk.task
-        task.timeline, task.settings = self._timeline.pointer, self._settings
+        task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
         task.mode, task.dimension, task.x = self._mode, len(self._x), self._x.ctypes.data
 

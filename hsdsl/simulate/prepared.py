@@ -99,7 +99,7 @@ class Prepared:
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the desk for longer than the run lasts
             plan.desks.leave(under_way.desk)
-        return Written(run, whole, self.states).execution(stop, spent)
+        return Written(run, plan, whole, self.states).execution(stop, spent)
 
 
 def prepare(

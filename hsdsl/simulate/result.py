@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -12,8 +12,10 @@ import numpy as np
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Array, Execution, Point, Stop, Verdict
 from hsdsl.integrators.stepper import State
+from hsdsl.runtime.sampling import Sampler
 from hsdsl.simulate import notes
-from hsdsl.simulate.chunks import arcs_of, transitions_of
+from hsdsl.simulate.chunks import arcs_of, states_of_arcs, transitions_of
+from hsdsl.simulate.compiled import CompiledPlan
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.verdict import Looking, assess
@@ -39,6 +41,7 @@ class Written:
     """What the compiled loop has written in a run that began with ``states``."""
 
     run: Run
+    plan: CompiledPlan
     whole: dict[str, Array]
     states: tuple[str, ...]
 
@@ -47,7 +50,7 @@ class Written:
 
         Of a short run those objects would take longer than the run.
         """
-        whole, width = self.whole, self._width()
+        whole, one_layout, width = self.whole, self._one_layout(), self._width()
         arrays = {name: whole[name] for name in ("times", "values", "outputs", "depth", "coefficients")}
         if width < whole["values"].shape[1]:
             for name in ("values", "coefficients"):
@@ -59,17 +62,30 @@ class Written:
             "final": self._final,
             "verdict": partial(_verdict, self.run),
         }
-        return Execution.deferred(later, **_about(self.run, stop, seconds, "c"), **arrays)
+        sampler = Sampler(self.plan.compiled, self.plan.timeline, arrays, whole["arc"], self._layouts)
+        about = _about(self.run, stop, seconds, "c") | ({"states": self.states} if one_layout else {})
+        return Execution.deferred(later, sampler=sampler, **about, **arrays)
 
     def _arcs(self) -> tuple[Arc, ...]:
         return tuple(arcs_of(self.whole, self.run.program, self.states))
 
+    def _one_layout(self) -> bool:
+        """Whether all modes have the states that the run began with."""
+        return all(mode.states == self.states or (mode.final and not mode.states) for mode in self.run.program.modes)
+
     def _width(self) -> int:
         """How many states the largest mode has that the run was in."""
-        sizes = {len(mode.states) for mode in self.run.program.modes if mode.states or not mode.final}
-        if sizes == {len(self.states)} == {self.whole["values"].shape[1]}:
-            return len(self.states)
-        return max(len(arc.states) for arc in self._arcs())
+        return len(self.states) if self._one_layout() else max(len(arc.states) for arc in self._arcs())
+
+    def _layouts(self) -> tuple[Sequence[tuple[str, ...]], Array | None]:
+        """The states of each kind of arcs, and of which kind each arc is (None where there is only one)."""
+        if self._one_layout():
+            return (self.states,), None
+        arcs = self.whole["arc"]
+        of_arc = list(states_of_arcs(arcs["mode"].tolist(), self.run.program, self.states))
+        layouts = list(dict.fromkeys(of_arc))
+        number = {layout: i for i, layout in enumerate(layouts)}
+        return layouts, np.array([number[states] for states in of_arc], np.int32)
 
     def _final(self, execution: Execution) -> Point:
         return _final(execution.arcs[-1], self.whole, execution.output_names)

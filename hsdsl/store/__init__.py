@@ -16,7 +16,7 @@ from hsdsl.execution import Execution
 from hsdsl.store.atomic import replacing
 from hsdsl.store.npz import load, save_npz
 from hsdsl.store.sidecar import write_sidecar
-from hsdsl.store.table import at_samples, select, write_csv, write_parquet
+from hsdsl.store.table import at_samples, write_csv, write_parquet
 
 __all__ = ["load", "save"]
 
@@ -41,7 +41,7 @@ def save(
     if suffix not in _TABLES:
         raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix says what to write")
     rows = execution.rows() if samples is None else at_samples(execution, samples)
-    table = select(rows, columns)
+    table = rows.only(columns)
     beside = target.with_name(target.name + ".json")
     with replacing(target) as file:
         _TABLES[suffix](table, file)

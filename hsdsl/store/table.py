@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from hsdsl import decimals
-from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Execution, Samples
 from hsdsl.execution.samples import optional
 from hsdsl.execution.sampling import evaluate, find, within
@@ -35,34 +32,6 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
     ordered = sorted(points)
     instants = np.array([time for _, time in ordered], dtype=execution.times.dtype)
     return evaluate(execution, np.array([row for row, _ in ordered], dtype=int), instants)
-
-
-def select(samples: Samples, columns: Sequence[str] | None) -> Samples:
-    """Keep only the states and outputs named, in the order named (states still stand before outputs).
-
-    Raises
-    ------
-    UsageError
-        For a name that is neither a state nor an output; the closest one is suggested.
-    """
-    if columns is None:
-        return samples
-    for name in columns:
-        if name not in samples.names:
-            close = difflib.get_close_matches(name, samples.names, 1)
-            hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(samples.names) or 'none'}"
-            raise UsageError(f"no state or output is called {name}", hint=hint)
-    asked = list(dict.fromkeys(columns))
-    states = [samples.states.index(name) for name in asked if name in samples.states]
-    outputs = [samples.outputs.index(name) for name in asked if name not in samples.states]
-    return replace(
-        samples,
-        states=tuple(samples.states[i] for i in states),
-        outputs=tuple(samples.outputs[i] for i in outputs),
-        state_columns=samples.state_columns[:, states],
-        output_columns=samples.output_columns[:, outputs],
-        present=samples.present[:, states],
-    )
 
 
 def write_csv(samples: Samples, file: BinaryIO) -> None:

@@ -296,7 +296,7 @@ def test_chosen_columns(tmp_path):
     assert _read(tmp_path / "run.csv")[-1] == ["3.0", "end", "4", "-1.0", "", ""]
     with pytest.raises(UsageError, match="no state or output is called dubble") as caught:
         run.save(tmp_path / "run.csv", columns=["dubble"])
-    assert caught.value.hint == "did you mean double?"
+    assert caught.value.hint == "did you mean 'double'?"
     with pytest.raises(UsageError, match="whole execution"):
         run.save(tmp_path / "run.npz", columns=["x"])
 

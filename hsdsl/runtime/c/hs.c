@@ -1,9 +1,11 @@
 /* The runtime: one translation unit, each file the twin of one in hsdsl/simulate or hsdsl/integrators. */
 
 #include <stddef.h>
+#include <string.h>
 #include <time.h>
 
 #include "run.h"
+#include "hs_sample.h"
 
 #include "table.c"
 #include "taylor.c"
@@ -24,6 +26,7 @@
 #include "rest.c"
 #include "tails.c"
 #include "located.c"
+#include "sample.c"
 
 /* What is left of the caller's memory. Counted without memory first, then given out. */
 typedef struct {
@@ -172,4 +175,5 @@ void hs_simulate(hs_task *task) {
 /* Sizes of the structures a caller fills, so that it can check its own idea of them. */
 HS_EXPORT const int64_t hs_sizes[] = {
     sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_method), sizeof(hs_timeline),
-    sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task)};
+    sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task),
+    sizeof(hs_sampling)};

@@ -1,0 +1,175 @@
+/* The value of a run at many times. See hsdsl/execution/sampling.py.
+
+   Times in one piece are evaluated together, a block of them at once; a block may go beyond them, since what it writes
+   there is written again. Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)). */
+
+#if defined(__GNUC__)
+typedef double hs_pair __attribute__((vector_size(16)));
+#else
+typedef double hs_pair;
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
+#define HS_UNROLLED __attribute__((optimize("O3")))
+#else
+#define HS_UNROLLED
+#endif
+
+enum { HALF_BLOCK = HS_BLOCK / 2, STEPS_BEFORE_SEARCH = 8 };
+#define PAIRS(count) ((count) / (int)(sizeof(hs_pair) / sizeof(double)))
+
+/* A row's piece, and where its arc's states are among the columns asked for. */
+typedef struct {
+  int64_t row, arc;
+  double begin, end;
+  const double *x, *c;
+  int degree;
+  const int32_t *column;
+  int dimension;
+} hs_place;
+
+/* Evaluate the columns asked for at the times of a block, to `out` and further columns behind it. */
+#define DEFINE_BLOCK(name, count)                                                                                 \
+  HS_INLINE void name(const hs_sampling *s, const hs_place *at, const double *time, double *out) {               \
+    const int w = s->width, top = at->degree - 1;                                                                \
+    const double length = at->end - at->begin;                                                                   \
+    hs_pair u[PAIRS(count)], y[PAIRS(count)];                                                                    \
+    memcpy(u, time, sizeof u);                                                                                   \
+    for (int q = 0; q < PAIRS(count); q++) u[q] = (u[q] - at->begin) / length;                                   \
+    for (int k = 0; k < s->columns; k++, out += s->samples + HS_BLOCK) {                                         \
+      const int place = at->column[k];                                                                           \
+      const double *c = place < 0 ? at->c : at->c + place, x = place < 0 ? NAN : at->x[place];                                       \
+      for (int q = 0; q < PAIRS(count); q++) y[q] = (hs_pair){0} + (place < 0 ? 0.0 : c[top * w]);               \
+      for (int m = place < 0 ? -1 : top - 1; m >= 0; m--)                                                        \
+        for (int q = 0; q < PAIRS(count); q++) y[q] = c[m * w] + u[q] * y[q];                                    \
+      for (int q = 0; q < PAIRS(count); q++) y[q] = x + u[q] * y[q];                                             \
+      memcpy(out, y, sizeof y);                                                                                  \
+    }                                                                                                            \
+  }
+
+DEFINE_BLOCK(half_block, HALF_BLOCK)
+DEFINE_BLOCK(whole_block, HS_BLOCK)
+
+/* The last row not after a time; it is likely to be soon behind `from`. */
+HS_INLINE int64_t row_at(const hs_sampling *s, double t, int64_t from) {
+  const double *times = s->times;
+  int64_t low = from, high = s->rows;
+  if (t < times[from]) {
+    low = 0, high = from;
+  } else {
+    for (int i = 0; i < STEPS_BEFORE_SEARCH; i++, low++)
+      if (low + 1 == s->rows || t < times[low + 1]) return low;
+  }
+  while (high - low > 1) {
+    const int64_t middle = low + (high - low) / 2;
+    if (times[middle] <= t)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/* The arc that a row is in: the last one that begins not after it. */
+HS_INLINE int64_t arc_at(const hs_sampling *s, int64_t row, int64_t from) {
+  int64_t low = from, high = s->arcs;
+  if (s->arc[from].first > row)
+    low = 0, high = from;
+  else
+    for (int i = 0; i < STEPS_BEFORE_SEARCH; i++, low++)
+      if (low + 1 == s->arcs || row < s->arc[low + 1].first) return low;
+  while (high - low > 1) {
+    const int64_t middle = low + (high - low) / 2;
+    if (s->arc[middle].first <= row)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/* Go to a row. The straight line to the next one is a piece of degree 1. */
+HS_INLINE void go_to(const hs_sampling *s, int64_t row, hs_place *at) {
+  const int w = s->width;
+  at->row = row;
+  at->arc = arc_at(s, row, at->arc);
+  const int layout = s->layout ? s->layout[at->arc] : 0;
+  at->column = s->column + layout * s->columns;
+  at->dimension = s->dimension[layout];
+  at->begin = s->times[row];
+  at->end = row + 1 < s->rows ? s->times[row + 1] : INFINITY;
+  at->x = s->values + row * w;
+  at->degree = s->degree;
+  at->c = s->pieces + row * s->degree * w;
+  if (s->degree == 0 && row + 1 < s->rows) {
+    at->degree = 1;
+    at->c = s->scratch;
+    for (int k = 0; k < w; k++) s->scratch[k] = at->x[w + k] - at->x[k];
+  }
+}
+
+/* What was recorded at a row. */
+static void at_row(const hs_sampling *s, const hs_place *at, int64_t row, int64_t i) {
+  s->row[i] = row;
+  for (int k = 0; k < s->columns; k++)
+    s->states[k * (s->samples + HS_BLOCK) + i] =
+        at->column[k] < 0 ? NAN : s->values[row * s->width + at->column[k]];
+  for (int k = 0; k < s->outputs; k++) s->results[i * s->outputs + k] = s->recorded[row * s->outputs + k];
+}
+
+/* Outputs between rows, from the states there; not-a-number where they have no value. */
+static void outputs_between(const hs_sampling *s, const hs_place *at, int64_t i) {
+  const hs_mode *mode = &s->model->mode[s->arc[at->arc].mode];
+  const int w = s->width;
+  const double t = s->time[i], u = (t - at->begin) / (at->end - at->begin);
+  const double *p = s->timeline->data + segment_at(s->timeline, t) * s->model->data;
+  double *const state = s->scratch + w, *const out = s->results + i * s->outputs;
+  for (int k = 0; k < at->dimension; k++) {
+    double y = at->c[(at->degree - 1) * w + k];
+    for (int m = at->degree - 2; m >= 0; m--) y = at->c[m * w + k] + u * y;
+    state[k] = at->x[k] + u * y;
+  }
+  if (mode->dimension != at->dimension || mode->outputs(p, t, state, out))
+    for (int k = 0; k < s->outputs; k++) out[k] = NAN;
+}
+
+/* The number of the first time outside the run, or -1; those outside it to round-off are moved to its ends. */
+static int64_t outside(const hs_sampling *s) {
+  const double start = s->times[0], end = s->times[s->rows - 1];
+  const double slack = HS_TIE * hs_max(hs_max(1.0, fabs(start)), fabs(end));
+  for (int64_t i = 0; i < s->samples; i++) {
+    const double t = s->time[i];
+    if (!(t >= start - slack && t <= end + slack)) return i;
+    if (!(t >= start)) s->time[i] = start;
+    if (!(t <= end)) s->time[i] = end;
+  }
+  return -1;
+}
+
+HS_UNROLLED int64_t hs_sample(const hs_sampling *s) {
+  const int64_t first = outside(s);
+  hs_place at;
+  if (first >= 0 || !s->samples) return first;
+  at.arc = 0;
+  go_to(s, 0, &at);
+  for (int64_t i = 0; i < s->samples;) {
+    const double t = s->time[i];
+    if (!(at.begin <= t && t < at.end)) go_to(s, row_at(s, t, at.row), &at);
+    if (t == at.begin) {
+      int64_t row = at.row;
+      while (s->left && row > 0 && s->times[row - 1] == t) row--;
+      if (row < at.row) go_to(s, row, &at);
+      at_row(s, &at, row, i++);
+      continue;
+    }
+    const int64_t start = i;
+    for (; i < s->samples && at.begin < s->time[i] && s->time[i] < at.end; i++) s->row[i] = at.row;
+    for (int64_t k = start; k < i; k += HS_BLOCK) {
+      if (i - k > HALF_BLOCK)
+        whole_block(s, &at, s->time + k, s->states + k);
+      else
+        half_block(s, &at, s->time + k, s->states + k);
+    }
+    for (int64_t k = start; s->outputs && k < i; k++) outputs_between(s, &at, k);
+  }
+  return -1;
+}
