@@ -35,7 +35,10 @@ from hsdsl.simulate.spans import along_steps
 from hsdsl.simulate.surfaces import Obstacle, Surfaces
 from hsdsl.simulate.timeline import Timeline
 
-SCHEMES: dict[str, tuple[type, ...]] = {"relaxed": (ButcherTableau, TaylorMethod)}  # and which methods each one takes
+SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
+    "relaxed": (ButcherTableau, TaylorMethod),
+    "located": (ButcherTableau, TaylorMethod),
+}
 
 
 class CompiledPlan:

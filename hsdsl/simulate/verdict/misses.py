@@ -177,7 +177,10 @@ def _at_the_end(run: Looking) -> Iterator[Finding]:
         made = run.transitions[-1]
         place = run.place(made.source, made.time, tuple(made.before.values()))
         k = [edge.name for edge in place.mode.edges].index(made.edge)
-        shift, rate = run.shift(place, k, run.row_at(made.time)), place.rate(k)
+        try:
+            shift, rate = run.shift(place, k, run.row_at(made.time)), place.rate(k)
+        except DOMAIN_ERRORS:  # `crossings` has said so
+            return
         if shift is not None and (until - made.time) * rate < SAFE * shift:
             yield Finding("end", "unknown", _undecided(made.edge))
 
