@@ -34,9 +34,9 @@ class Operation:
 
     With u, v lines and c the constant, ``kind`` is ``constant`` (c), ``add`` (u + v), ``sub`` (u - v), ``neg`` (-u),
     ``offset`` (u + c), ``scale`` (c u), ``mul`` (u v), ``square`` (u u), ``div`` (u / v), ``under`` (c / u), ``sqrt``
-    (of u), ``pow`` (u**c), ``atan2`` (of lines y, x, with its derivatives by y and by x as lines), or the name of a
-    function of u with its derivative by u as the second line. A derivative may be a later line: coefficient k asks it
-    for those before k.
+    (of u), ``pow`` (u**c), ``slope`` (time from the point of expansion, times u'), or the name of a function of u with
+    the slope of u as the second line and its derivative by u as the third; ``atan2`` has lines y and x, its derivatives
+    by them, and their slopes. A derivative may be a later line: coefficient k asks it for those before k.
 
     ``degree`` is given where the series that its sum goes along (the first line, of ``div`` the second) is a polynomial
     of time alone: then no more than so many coefficients of it count. The sine of something linear in time costs one

@@ -1,7 +1,7 @@
 """A tape's lines as text: what coefficient 0 of each is, and what coefficient k > 0 is, in Python and in C.
 
 Coefficient 0 is the operation itself, in the language of routines (`hsdsl.program`). The others are the recurrences of
-`recurrences.py`, in C those of `runtime/c/hs_series.h`; the text of both is the same up to how a line is named.
+`recurrences.py`, in C those of `runtime/c/hs_series.h`; the text of both is the same up to how things are named.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ VALUES = {
     "neg": "-{u}",
     "offset": "{u} + {c}",
     "scale": "{c}*{u}",
+    "slope": "{zero}",
     "mul": "{u}*{v}",
     "square": "{u}*{u}",
     "div": "{u}/{v}",
@@ -34,15 +35,23 @@ COEFFICIENTS = {
     "neg": "-{u}",
     "offset": "{u}",
     "scale": "{c}*{u}",
-    "mul": "{call}product(k, {U}, {V}, {last})",
+    "slope": "k*{u}",
+    "mul": "{call}product(k, {U}, {V})",
     "square": "{call}square(k, {U})",
-    "div": "{call}quotient(k, {Z}, {u}, {V}, {last})",
-    "under": "{call}quotient(k, {Z}, {zero}, {U}, {last})",
+    "div": "({u} - {call}behind(k, {V}, {Z})) / {V}[0]",
+    "under": "-{call}behind(k, {U}, {Z}) / {U}[0]",
     "sqrt": "{call}root(k, {Z}, {u}{bad})",
-    "pow": "{call}power(k, {Z}, {U}, {c}, {last}{bad})",
-    "atan2": "{call}integral(k, {U}, {G}, k) + {call}integral(k, {V}, {W}, k)",
+    "pow": "{call}power(k, {Z}, {U}, {c}{bad})",
+    "atan2": "({call}behind(k, {A}, {G}) + {call}behind(k, {B}, {W})) / k",
 }
-COEFFICIENT = "{call}integral(k, {U}, {V}, {last})"
+COEFFICIENT = "{call}behind(k, {V}, {G}) / k"
+# where a sum goes along a polynomial of time
+SHORT = {
+    "mul": "{call}few(k, {U}, {V}, {last}) + {U}[0]*{v}",
+    "div": "({u} - {call}few(k, {V}, {Z}, {last})) / {V}[0]",
+    "under": "-{call}few(k, {U}, {Z}, {last}) / {U}[0]",
+}
+SHORT_COEFFICIENT = "{call}few(k, {V}, {G}, {last}) / k"
 
 
 @dataclass(frozen=True)
@@ -78,16 +87,18 @@ class Language:
 def value_of(operation: Operation, language: Language) -> str:
     """Write coefficient 0 of an operation."""
     template = VALUES.get(operation.kind, VALUE)
-    return template.format(kind=operation.kind, **_operands(operation, language, language.value))
+    return template.format(kind=operation.kind, zero=language.zero, **_operands(operation, language, language.value))
 
 
 def coefficient_of(line: int, operation: Operation, language: Language) -> str:
     """Write coefficient k > 0 of the operation that is this line."""
-    template, degree = COEFFICIENTS.get(operation.kind, COEFFICIENT), operation.degree
-    wholes = dict(zip("UVGW", map(language.series, operation.lines), strict=False))
+    kind, degree = operation.kind, operation.degree
+    short = degree is not None
+    template = SHORT.get(kind, SHORT_COEFFICIENT) if short else COEFFICIENTS.get(kind, COEFFICIENT)
+    wholes = dict(zip("UVGWAB", map(language.series, operation.lines), strict=False))
     return template.format(
         Z=language.series(line),
-        last="k" if degree is None else "1" if degree == 1 else language.least(degree),
+        last=language.least(degree) if degree and degree > 1 else "1",
         zero=language.zero,
         call=language.call,
         bad=language.bad,

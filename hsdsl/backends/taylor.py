@@ -10,19 +10,19 @@ from typing import Any, NoReturn
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.backends.python import compile_routines
-from hsdsl.backends.recurrences import integral, power, product, quotient, root, square
+from hsdsl.backends.recurrences import behind, few, power, product, root, square
 from hsdsl.backends.tape import Language, coefficient_of, value_of
 from hsdsl.kernel import Taylor
 from hsdsl.program import Tape
 
 HELPERS: dict[str, Any] = {
-    "product": product,
-    "square": square,
-    "quotient": quotient,
-    "root": root,
+    "behind": behind,
+    "few": few,
     "power": power,
-    "integral": integral,
+    "product": product,
     "range": range,
+    "root": root,
+    "square": square,
 }
 PYTHON = Language(
     series="l{}".format,

@@ -3,7 +3,10 @@
 """Expressions -> the tape that Taylor coefficients are computed from: one elementary operation a line.
 
 A function of one argument u is a line of the kind z' = g u', with its derivative g a line of its own (which may use z:
-the coefficient k of z needs g up to k - 1 only). Other kinds have the recurrences of products, quotients and powers.
+the coefficient k of z needs g up to k - 1 only), and u' another, which all functions of u share. Other kinds have the
+recurrences of products, quotients and powers. What is a polynomial of time alone is known as such, so that sums along it
+are short. Equal operations are one line.
+
 See A. Griewank and A. Walther, *Evaluating Derivatives*, Sec. 13.2 (doi:10.1137/1.9780898717761).
 """
 
@@ -18,8 +21,8 @@ from hsdsl.program import Operation, Tape
 from hsdsl.system import TIME
 
 _ONE = sp.Integer(1)
-_WITHOUT_SUM = ("constant", "add", "sub", "neg", "offset", "scale", "square", "sqrt", "atan2")
-_POLYNOMIAL = ("constant", "add", "sub", "neg", "offset", "scale", "mul")  # of polynomials
+_WITHOUT_SUM = ("constant", "add", "sub", "neg", "offset", "scale", "slope", "square", "sqrt", "pow", "atan2")
+_POLYNOMIAL = ("constant", "add", "sub", "neg", "offset", "scale", "slope", "mul")  # of polynomials
 
 
 class Kinked(Exception):
@@ -186,14 +189,19 @@ class _Writer:
 
     def chain(self, name: str, u: int, derivative: int) -> int:
         """The function ``name`` of line u, whose derivative by u is a line."""
-        return self._operation(name, u, derivative)
+        return self._operation(name, u, self.slope(u), derivative)
+
+    def slope(self, u: int) -> int:
+        """The line of u', which a function of u needs; written once."""
+        return self._operation("slope", u)
 
     def ahead(self, lines: int) -> int:
-        """The number of a line that will be written after so many others."""
+        """The number of a line that will be written after so many others, slopes being written already."""
         return self._first + len(self.operations) + lines
 
     def exp(self, u: int) -> int:
         """Z' = z u'."""
+        self.slope(u)
         return self.chain("exp", u, self.ahead(0))
 
     def log(self, u: int) -> int:
@@ -203,6 +211,7 @@ class _Writer:
     def _pair(self, first: str, second: str, u: int, turn: bool) -> tuple[int, int]:
         key = (first, u)
         if key not in self._known:
+            self.slope(u)
             self._known[key] = one = self.chain(first, u, self.ahead(1))
             self.chain(second, u, self.ahead(1) if turn else one)
             if turn:
@@ -226,6 +235,7 @@ class _Writer:
         return self._pair("sinh", "cosh", u, turn=False)[1]
 
     def _own_square(self, name: str, u: int, negative: bool) -> int:
+        self.slope(u)
         z = self.chain(name, u, self.ahead(3 if negative else 2))
         square = self._operation("mul", z, z)
         if negative:
@@ -257,7 +267,7 @@ class _Writer:
         radius = self._operation("add", *squares)
         by_y = self._operation("div", x, radius)
         by_x = self._operation("neg", self._operation("div", y, radius))
-        return self._operation("atan2", y, x, by_y, by_x)
+        return self._operation("atan2", y, x, by_y, by_x, self.slope(y), self.slope(x))
 
 
 _DERIVATIVES = {

@@ -86,7 +86,7 @@ def surface_lines(tape: Tape, dimension: int) -> str:
 
 def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[str]:
     found: list[str] = []
-    language = _language("c{}".format, "n{}".format)
+    language = _language("c{}".format, "n{}".format, "q_0_1")
     for i in lines:
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
@@ -98,20 +98,20 @@ def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], 
 
 def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[str]:
     found: list[str] = []
-    language = _language("c[{}]".format, name)
+    language = _language("c[{}]".format, name, "0.0")
     for i in lines:
         found.append(f"const double v{i} = {coefficient_of(i, tape.operations[i - first], language)};")
         found.append(f"l{i}[k] = v{i};")
     return found
 
 
-def _language(constant: Callable[[int], str], name: Callable[[int], str]) -> Language:
+def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: str) -> Language:
     return Language(
         series="l{}".format,
         value=name,
         newest=name,
         constant=constant,
-        zero="0.0",
+        zero=zero,
         call="hs_",
         bad=", &bad",
         least="k < {0} ? k : {0}".format,
