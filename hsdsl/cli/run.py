@@ -92,6 +92,8 @@ def _simulate(
     with progress(quiet or json) as watch:
         execution = model.simulate(**asked, watch=watch)
     found = model.estimate(execution, **asked) if estimate else None
+    if found is not None and found.error is not None:
+        execution = execution.with_error(found.error)
     if out is not None:
         for written in execution.save(out, columns=names):
             say(f"wrote {written}")

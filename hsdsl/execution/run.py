@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
+Assessment = Callable[["Execution", "Mapping[str, Any] | None"], Verdict]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,6 +38,9 @@ class Execution(Deferred):
         execution read from a file) they are interpolated linearly between the two rows.
     sampler : callable or None
         A faster way to the same values at many times, of a compiled run.
+    assessment : callable or None
+        ``assessment(execution, error) -> Verdict``: the verdict, the error being that of each state, or None for what
+        the run's settings allow; without it the verdict stays what it is.
     """
 
     model: str
@@ -61,6 +65,7 @@ class Execution(Deferred):
     title: str | None = None
     output_function: OutputFunction | None = field(default=None, compare=False)
     sampler: Sampler | None = field(default=None, compare=False)
+    assessment: Assessment | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         self.check()
@@ -121,6 +126,12 @@ class Execution(Deferred):
     def states(self) -> tuple[str, ...]:
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
+
+    def with_error(self, error: Mapping[str, Any]) -> Execution:
+        """Return the same execution with its verdict held against a known error of each state."""
+        if self.assessment is None:
+            return self
+        return replace(self, verdict=self.assessment(self, error))
 
     def __call__(self, t: Any, side: Side = "right") -> Point:
         """Return the execution's value at a time.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Execution, Transition
 from hsdsl.simulate.stops import show
 
+SAMPLES = 1000
 FINER_TOLERANCE = 32  # a method of order 5 halves its steps
 
 
@@ -26,12 +28,20 @@ class Estimate:
         Largest difference between transition times, strips' delays subtracted; None where the sequences differ.
     final : dict or None
         Difference of each final state; None where the runs ended in different modes or at different times.
+    largest : dict or None
+        Largest difference of each state at `SAMPLES` times away from transitions; None where the sequences differ.
     """
 
     settings: dict[str, Any]
     same_transitions: bool
     time: Number | None
     final: dict[str, Number] | None
+    largest: dict[str, Number] | None = None
+
+    @property
+    def error(self) -> dict[str, Number] | None:
+        """What the coarser run's error may be where both errors fall at least linearly; None where nothing is known."""
+        return None if self.largest is None else {name: 2 * value for name, value in self.largest.items()}
 
     def as_json(self) -> dict[str, Any]:
         """Return the ``estimate`` object of ``hsdsl run --estimate --json``."""
@@ -40,6 +50,7 @@ class Estimate:
             "same_transitions": self.same_transitions,
             "time": self.time,
             "final": self.final,
+            "largest": self.largest,
         }
 
     @property
@@ -77,7 +88,33 @@ def compare(coarse: Execution, fine: Execution, settings: dict[str, Number]) -> 
     a, b = coarse.final, fine.final
     comparable = (a.mode, coarse.stop.reason, list(a.state)) == (b.mode, fine.stop.reason, list(b.state))
     final = {name: abs(a.state[name] - b.state[name]) for name in a.state} if comparable else None
-    return Estimate(settings, same, times, final)
+    return Estimate(settings, same, times, final, _largest(coarse, fine, times) if same else None)
+
+
+def _largest(coarse: Execution, fine: Execution, apart: Number | None) -> dict[str, Number]:
+    """The largest difference of each state at times at which neither run has a transition nearby."""
+    start, end = coarse.time_span[0], min(coarse.time_span[1], fine.time_span[1])
+    step = (end - start) / SAMPLES
+    grid = [start + step * k for k in range(SAMPLES)] + [end]
+    clear = [t for t in grid if not any(_close(run, t, 2 * (apart or 0)) for run in (coarse, fine))]
+    if not clear:
+        return {}
+    a, b = coarse.sample(clear), fine.sample(clear)
+    found: dict[str, Number] = {}
+    for name in (name for name in a.states if name in b.states):
+        differences = [abs(x - y) for x, y in zip(a[name].tolist(), b[name].tolist(), strict=True)]
+        found[name] = max((d for d in differences if d == d), default=0.0)
+    return found
+
+
+def _close(run: Execution, t: Number, margin: Number) -> bool:
+    """Whether a transition of a run, or a wait behind one, is near a time."""
+    times = run.transitions
+    k = bisect_right(times, t + margin, key=lambda made: made.time) - 1
+    if k < 0:
+        return False
+    resumed = times[k].resumed
+    return resumed is None or t - margin <= resumed
 
 
 def corrected_times(transitions: tuple[Transition, ...]) -> list[Number]:

@@ -25,7 +25,7 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     """Make the execution of what the Python loop has recorded."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
-        {"verdict": partial(_verdict, run)},
+        {"verdict": _verdict},
         **_about(run, stop, seconds, "python"),
         settings=described(run.settings),
         transitions=transitions,
@@ -60,7 +60,7 @@ class Written:
             "transitions": lambda _: tuple(transitions_of(whole, self.run.program)),
             "arcs": lambda _: self._arcs(),
             "final": self._final,
-            "verdict": partial(_verdict, self.run),
+            "verdict": _verdict,
         }
         sampler = Sampler(self.plan.compiled, self.plan.timeline, arrays, whole["arc"], self._layouts)
         about = _about(self.run, stop, seconds, "c") | ({"states": self.states} if one_layout else {})
@@ -101,6 +101,7 @@ def _about(run: Run, stop: Stop, seconds: dict[str, float], engine: str) -> dict
         "method": method.name if method else "two-step",
         "stop": stop,
         "output_function": partial(output_values, run),
+        "assessment": partial(_assessment, run),
         "output_names": program.outputs,
         "seconds": seconds,
         "title": program.title,
@@ -146,7 +147,12 @@ def described(settings: Settings) -> dict[str, Any]:
     }
 
 
-def _verdict(run: Run, execution: Execution) -> Verdict:
+def _verdict(execution: Execution) -> Verdict:
+    assert execution.assessment is not None
+    return execution.assessment(execution, None)
+
+
+def _assessment(run: Run, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
     if run.settings.one_stop is not None:
         return Verdict("unknown", notes.TWO_STEP)
-    return assess(Looking(run, execution), run.recorder.departures, run.recorder.doubts)
+    return assess(Looking(run, execution, error), run.recorder.departures, run.recorder.doubts)

@@ -12,7 +12,8 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.looking import Looking, Place
+from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.place import Place
 
 SAME = 1e-9  # relative to 1 + abs(x): one point
 LONGEST = 64  # transitions at one instant

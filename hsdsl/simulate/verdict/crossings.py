@@ -9,8 +9,9 @@ from __future__ import annotations
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Arc, Transition
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.finding import SAFE, Finding, times
-from hsdsl.simulate.verdict.looking import Looking, Place
+from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.place import Place
 
 TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 
@@ -42,7 +43,7 @@ def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
     each = (
         f"{len(made)} transition{'s' * (len(made) > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
     )
-    return found, [each + (f", {times(least)} what the error allowed could undo" if least is not None else "")]
+    return found, [each + (f", {times(least)} what the error could undo" if least is not None else "")]
 
 
 def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
@@ -69,18 +70,16 @@ def _findings(
         return [Finding("flat", "unknown", f"the surface of {where} has no slope there")]
     if not rate > TANGENT_UNITS * run.arithmetic.unit * size:
         return [Finding("tangency", "left", f"the flow is tangent to the surface of {where}")]
-    if margin is not None and margin < SAFE:
+    if margin is not None and margin < run.safe:
         found.append(
             Finding(
                 "tangency",
                 "unknown",
                 f"the crossing of {where}, at a rate of {float(rate):.3g}, would be undone by {times(margin)} "
-                "the error allowed",
+                "the error",
             )
         )
     error = run.error(place, run.row_at(made.time))
     if error is not None and place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
-        found.append(
-            Finding("condition", "unknown", f"whether the condition of {where} holds is within the error allowed")
-        )
+        found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found

@@ -27,9 +27,6 @@ class Finding:
     sentence: str
 
 
-SAFE = 10  # times the allowed error: margins below are named
-
-
 def times(margin: Number) -> str:
     """Write a margin as so many times something."""
     if not margin < 1e15:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -12,60 +12,29 @@ from itertools import accumulate
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
-from hsdsl.kernel import ModeKernel
+from hsdsl.kernel import ModeKernel, Vector
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.surfaces import TIE, Surfaces, at
-from hsdsl.simulate.verdict.allowed import Allowed
+from hsdsl.simulate.verdict.allowed import Allowed, Measured
+from hsdsl.simulate.verdict.place import Place
 
 JUMPS = re.compile(r"\b(?:sign|floor)\(")
 
 
 @dataclass(frozen=True)
-class Place:
-    """A mode at a time: its routines bound, and one state to look at."""
-
-    mode: ModeProgram
-    kernel: ModeKernel
-    surfaces: Surfaces
-    t: Number
-    x: State
-
-    def value(self, k: int) -> Number:
-        """Surface k."""
-        return self.kernel.surfaces(self.t, *self.x)[k]
-
-    def rate(self, k: int) -> Number:
-        """How fast surface k rises along the flow."""
-        return self.kernel.rates[k](self.t, *self.x)[0]
-
-    def noise(self, k: int) -> Number:
-        """Round-off of surface k."""
-        return self.surfaces.noise(k, self.t, self.x)
-
-    def moved_by(self, error: State) -> Iterator[State]:
-        """The state, and with each component moved by its error either way."""
-        yield self.x
-        for i, e in enumerate(error):
-            for way in (-1, 1):
-                yield (*self.x[:i], self.x[i] + way * e, *self.x[i + 1 :])
-
-    def conditions(self, k: int, error: State) -> set[bool]:
-        """What the condition of edge k is at the state and around it."""
-        return {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
-
-    def name(self, k: int) -> str:
-        """Surface k for a person."""
-        edges = self.mode.edges
-        return edges[k].name if k < len(edges) else f"the wall {self.mode.walls[k - len(edges)]} of {self.mode.name}"
-
-
-@dataclass(frozen=True)
 class Looking:
-    """What a run recorded."""
+    """What a run recorded.
+
+    Attributes
+    ----------
+    measured : mapping or None
+        The error of each state, where it is known better than from the run's settings.
+    """
 
     run: Run
     execution: Execution
+    measured: Mapping[str, Number] | None = None
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -94,13 +63,20 @@ class Looking:
         return [arc for arc in arcs if arc.kind == "flow" and self.times[arc.last] > self.times[arc.first]]
 
     @cached_property
-    def allowed(self) -> Allowed | None:
-        """The error the run allows itself; None where its settings do not tell."""
+    def allowed(self) -> Allowed | Measured | None:
+        """The error the run allows itself or was measured to have; None where nothing tells."""
+        if self.measured is not None:
+            return Measured(self.measured)
         tolerance = self.run.settings.tolerance
         if tolerance is None:
             return None
         waits = [t.resumed - t.time if t.resumed is not None else 0 for t in self.transitions]
         return Allowed(tolerance, tuple(t.time for t in self.transitions), tuple(accumulate(waits)))
+
+    @property
+    def safe(self) -> int:
+        """Margins below so many errors are named."""
+        return self.allowed.safe if self.allowed else 1
 
     def jumping_flows(self) -> list[str]:
         """Modes visited whose flow is not continuous."""
@@ -130,6 +106,15 @@ class Looking:
         """The state at a row."""
         return tuple(self.execution.values[row][: len(arc.states)].tolist())
 
+    def surfaces_along(self, arc: Arc) -> Iterator[Vector]:
+        """The values of the surfaces at an arc's rows."""
+        values: list[list[Number]] = self.execution.values[arc.first : arc.last + 1, : len(arc.states)].tolist()
+        bound = self.at_row(arc, arc.first)
+        end = self.run.timeline.at(bound.t).end
+        for t, x in zip(self.times[arc.first : arc.last + 1], values, strict=True):
+            surfaces = bound.kernel.surfaces if t <= end else self.place(arc.mode, t, tuple(x)).kernel.surfaces
+            yield surfaces(t, *x)
+
     def at_row(self, arc: Arc, row: int) -> Place:
         """Look at a row."""
         return self.place(arc.mode, self.times[row], self.state(arc, row))
@@ -151,7 +136,7 @@ class Looking:
             slope = place.kernel.flow(place.t, *place.x)
         except DOMAIN_ERRORS:
             return None
-        return self.allowed.error(row, place.t, place.x, slope)
+        return self.allowed.error(row, place, slope)
 
     def shift(self, place: Place, k: int, row: int) -> Number | None:
         """How much the error may move surface k; None where nothing tells."""

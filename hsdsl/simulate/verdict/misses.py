@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.choices import commute
-from hsdsl.simulate.verdict.finding import SAFE, Finding, times
-from hsdsl.simulate.verdict.looking import Looking, Place
+from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.place import Place
 
-MOST_ROWS = 100_000
+MOST_ROWS = 1_000_000
+FEW = 256  # rows of an arc: between those of a longer one a surface is taken to turn at most once
 ROUNDS = 12  # of closing in on a turning point
 TWICE = 2  # as long as it takes to reach a surface: reached together
 STANDING = 1e-12  # relative to the sizes in a surface: a state that starts on it
@@ -42,29 +45,43 @@ def misses(run: Looking) -> tuple[list[Finding], list[str]]:
     if nearest is None:
         return found, []
     margin, name, t = nearest
-    return found, [f"the nearest miss is of {name} at t = {show(t)}, by {times(margin)} the error allowed"]
+    return found, [f"the nearest miss is of {name} at t = {show(t)}, by {times(margin)} the error"]
 
 
 def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None]]:
     """Give what is found along one arc: findings, and how near surfaces came that turned back."""
     crossed = _crossed(run, arc)
     last_arc = arc is run.flows[-1] and crossed is None
-    places = [run.at_row(arc, row) for row in range(arc.first, arc.last + 1)]
-    count = len(places[0].mode.edges) + len(places[0].mode.walls)
-    values = [p.kernel.surfaces(p.t, *p.x) for p in places]
-    for k in range(count):
-        rates = [p.rate(k) for p in places]
-        for i, row in enumerate(range(arc.first, arc.last)):
-            low, high = values[i][k], values[i + 1][k]
-            ends_here = row + 1 == arc.last
-            if rates[i] > 0 >= rates[i + 1] and low <= 0 and not (k == crossed and ends_here):
-                yield _turned(run, arc, row, k, (rates[i], rates[i + 1]))
-            elif low <= 0 < high and _has_condition(places[0], k) and not (k == crossed and ends_here):
-                yield _transparent(run, arc, row, k, (low, high)), None
-        if not last_arc and k != crossed and rates[-1] > 0 and values[-1][k] <= 0:
-            yield _other(run, arc, places[-1], k, crossed), None
-        if values[0][k] <= 0 and rates[0] < 0:
-            yield _start(run, arc, places[0], k), None
+    first, last = run.at_row(arc, arc.first), run.at_row(arc, arc.last)
+    for k, values in enumerate(zip(*run.surfaces_along(arc), strict=True)):
+        for i in _where_it_may_turn(values):
+            row = arc.first + i
+            if (k == crossed and row + 1 == arc.last) or values[i] > 0:
+                continue
+            rates = run.at_row(arc, row).rate(k), run.at_row(arc, row + 1).rate(k)
+            if rates[0] > 0 >= rates[1]:
+                yield _turned(run, arc, row, k, rates)
+        for i in _where_it_rises(values) if _has_condition(first, k) else ():
+            if not (k == crossed and arc.first + i + 1 == arc.last):
+                yield _transparent(run, arc, arc.first + i, k, (values[i], values[i + 1])), None
+        if not last_arc and k != crossed and values[-1] <= 0 < last.rate(k):
+            yield _other(run, arc, last, k, crossed), None
+        if values[0] <= 0 and first.rate(k) < 0:
+            yield _start(run, arc, first, k), None
+
+
+def _where_it_may_turn(values: Sequence[Number]) -> Iterator[int]:
+    """Give the steps in which a surface may have a largest value: all of few, of many those at a peak of the rows."""
+    last = len(values) - 2
+    for i in range(last + 1):
+        rises = i == 0 or values[i] >= values[i - 1]
+        if len(values) <= FEW or (rises and (i == last or values[i + 1] >= values[i + 2])):
+            yield i
+
+
+def _where_it_rises(values: Sequence[Number]) -> Iterator[int]:
+    """Give the steps in which a surface rises through zero."""
+    return (i for i, (low, high) in enumerate(pairwise(values)) if low <= 0 < high)
 
 
 def _crossed(run: Looking, arc: Arc) -> int | None:
@@ -121,9 +138,9 @@ def _judged(run: Looking, place: Place, k: int, row: int, how: str) -> tuple[Fin
     margin = below / shift if shift > 0 else run.arithmetic.zero + float("inf")
     name = place.name(k)
     miss: Miss = (margin, name, place.t)
-    if margin >= SAFE:
+    if margin >= run.safe:
         return None, miss
-    sentence = f"the run {how} the surface of {name} at t = {show(place.t)}, {times(margin)} the error allowed away"
+    sentence = f"the run {how} the surface of {name} at t = {show(place.t)}, {times(margin)} the error away"
     return Finding("miss", "unknown", sentence), miss
 
 
@@ -134,7 +151,7 @@ def _transparent(run: Looking, arc: Arc, row: int, k: int, ends: tuple[Number, N
     if error is None or place.conditions(k, error) == {False}:
         return None
     where = f"{place.name(k)} at t = {show(place.t)}"
-    return Finding("condition", "unknown", f"whether the condition of {where} holds is within the error allowed")
+    return Finding("condition", "unknown", f"whether the condition of {where} holds is within the error")
 
 
 def _other(run: Looking, arc: Arc, place: Place, k: int, crossed: int | None) -> Finding | None:
@@ -144,9 +161,7 @@ def _other(run: Looking, arc: Arc, place: Place, k: int, crossed: int | None) ->
         return None
     if commute(run, place, (crossed, k), TWICE * -place.value(k) / place.rate(k)):
         return None
-    sentence = (
-        f"the order of {place.name(crossed)} and {place.name(k)} at t = {show(place.t)} is within the error allowed"
-    )
+    sentence = f"the order of {place.name(crossed)} and {place.name(k)} at t = {show(place.t)} is within the error"
     return Finding("order", "unknown", f"{sentence}, and it matters")
 
 
@@ -181,7 +196,7 @@ def _at_the_end(run: Looking) -> Iterator[Finding]:
             shift, rate = run.shift(place, k, run.row_at(made.time)), place.rate(k)
         except DOMAIN_ERRORS:  # `crossings` has said so
             return
-        if shift is not None and (until - made.time) * rate < SAFE * shift:
+        if shift is not None and (until - made.time) * rate < run.safe * shift:
             yield Finding("end", "unknown", _undecided(made.edge))
 
 

@@ -1,0 +1,51 @@
+"""One state of a mode at a time, and what can be asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import Number
+from hsdsl.integrators.stepper import State
+from hsdsl.kernel import ModeKernel
+from hsdsl.program import ModeProgram
+from hsdsl.simulate.surfaces import Surfaces
+
+
+@dataclass(frozen=True)
+class Place:
+    """A mode at a time: its routines bound, and one state to look at."""
+
+    mode: ModeProgram
+    kernel: ModeKernel
+    surfaces: Surfaces
+    t: Number
+    x: State
+
+    def value(self, k: int) -> Number:
+        """Surface k."""
+        return self.kernel.surfaces(self.t, *self.x)[k]
+
+    def rate(self, k: int) -> Number:
+        """How fast surface k rises along the flow."""
+        return self.kernel.rates[k](self.t, *self.x)[0]
+
+    def noise(self, k: int) -> Number:
+        """Round-off of surface k."""
+        return self.surfaces.noise(k, self.t, self.x)
+
+    def moved_by(self, error: State) -> Iterator[State]:
+        """The state, and with each component moved by its error either way."""
+        yield self.x
+        for i, e in enumerate(error):
+            for way in (-1, 1):
+                yield (*self.x[:i], self.x[i] + way * e, *self.x[i + 1 :])
+
+    def conditions(self, k: int, error: State) -> set[bool]:
+        """What the condition of edge k is at the state and around it."""
+        return {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
+
+    def name(self, k: int) -> str:
+        """Surface k for a person."""
+        edges = self.mode.edges
+        return edges[k].name if k < len(edges) else f"the wall {self.mode.walls[k - len(edges)]} of {self.mode.name}"
