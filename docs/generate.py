@@ -96,7 +96,7 @@ decays fast does not bound the step once it has decayed. Inside a step: the coll
 order 3 in general (its error is O(h^4)), exact to order 5 at the step's end. The error estimate falls as h^4 and holds
 for the curve between the samples too; right after a switch to a fast decay the steps are therefore short enough to
 show it. Where the equations are not solved, the step
-is halved. It has no compiled loop yet: the Python engine runs it. When to take it is in
+is halved. When to take it is in
 [theory](../theory.md#stiff-modes)."""
 
 SCALARS = {

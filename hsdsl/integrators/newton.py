@@ -23,7 +23,7 @@ MOST = 7  # iterations of a step that has a tolerance
 LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
 DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
 SLOW = 0.5  # likewise for iterations that go on to round-off
-ROUNDING = 2**10  # units of round-off, relative to 1 + |x|: a correction this small may be all noise
+NOISE = 2**10  # units of round-off, relative to 1 + |x|: a correction this small may be all noise
 SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
 
 
@@ -56,7 +56,7 @@ class Convergence:
         """
         unit, tolerance, one = self._arithmetic.unit, self._tolerance, self._arithmetic.zero + 1
         assert tolerance is not None
-        noise = ROUNDING * unit / tolerance
+        noise = NOISE * unit / tolerance
         enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
         left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
         for count, (largest, z) in enumerate(iterations, 1):
@@ -89,7 +89,7 @@ class Convergence:
             They become no smaller before that.
         """
         unit, before, z = self._arithmetic.unit, None, None
-        allowed = max(ROUNDING * unit, SHARE * (self._tolerance or 0))
+        allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
         for largest, z in islice(iterations, 16 - 2 * int(log2(unit))):
             size = _scaled(largest, x)
             rate = SLOW if not before else size / before

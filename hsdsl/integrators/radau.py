@@ -144,11 +144,12 @@ class Steps:
             before = t == start + length
             if before or t == start:
                 c = [_weighted(row, z) for row in self._known.powers]
-                share, one = h / length, self._one if before else self._arithmetic.zero
-                base = z[2] if before else [a * 0 for a in x]
+                zero = self._arithmetic.zero
+                share, one = h / length, self._one if before else zero
+                base = z[2] if before else [zero for _ in x]
                 at = [one + node * share for node in self._known.nodes]
                 return _three([s * (a + s * (b + s * d)) - e for a, b, d, e in zip(*c, base, strict=True)] for s in at)
-        return _three([a * 0 for a in x] for _ in range(3))
+        return _three([self._arithmetic.zero for _ in x] for _ in range(3))
 
     def _iterations(self, flow: Flow, t: Number, h: Number, x: State, z: Increments) -> Iterator[Iteration]:
         """Iterate by Newton's method."""

@@ -99,8 +99,10 @@ class CompiledKernel:
         return None if tape is None else _taylor(self._compiled.table.mode[mode], tape, data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
-        """Return the derivatives of a mode's flow by its states, by the Python kernel."""
-        return self._python.jacobian(mode, data)
+        """Return the derivatives of a mode's flow by its states, row by row."""
+        table = self._compiled.table.mode[mode]
+        n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
+        return _routine(table.jacobian, numbers, n, n * n)
 
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""

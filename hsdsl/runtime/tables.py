@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators import ButcherTableau, RadauMethod
 from hsdsl.integrators import Method as Integrator
+from hsdsl.integrators.collocation import coefficients
 
 ARC = np.dtype([("first", "i8"), ("jump", "i8"), ("mode", "i4"), ("kind", "i4")])
 TRANSITION = np.dtype(
@@ -29,7 +30,7 @@ REASONS = (
     "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
     "entered outside", "stuck", "interrupted", "left", "step not finite", "accumulated",
 )  # fmt: skip
-OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping")
+OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved")
 
 
 class Edge(ctypes.Structure):
@@ -65,6 +66,7 @@ class Mode(ctypes.Structure):
     series: int | None
     surface_series: int | None
     surface_line: Any
+    jacobian: int | None
 
     _fields_ = (
         *((name, c_int) for name in ("dimension", "edges", "surfaces", "final")),
@@ -75,6 +77,7 @@ class Mode(ctypes.Structure):
         ("series", c_void_p),
         ("surface_series", c_void_p),
         ("surface_line", POINTER(c_int)),
+        ("jacobian", c_void_p),
     )
 
 
@@ -100,6 +103,22 @@ class Row(ctypes.Structure):
     _fields_ = (("terms", c_int), ("stage", POINTER(c_int)), ("weight", POINTER(c_double)))
 
 
+class Collocation(ctypes.Structure):
+    """``hs_collocation``."""
+
+    _fields_ = (
+        ("node", c_double * 3),
+        ("power", c_double * 3 * 3),
+        *((name, c_double) for name in ("gamma", "alpha", "beta")),
+        ("mix", c_double * 3 * 3),
+        ("unmix", c_double * 3 * 3),
+        ("estimate", c_double * 3),
+        ("share", c_double),
+        ("value", c_double * 3),
+        ("slope", c_double * 3),
+    )
+
+
 class Method(ctypes.Structure):
     """``hs_method``."""
 
@@ -112,6 +131,7 @@ class Method(ctypes.Structure):
         ("coarse", Row),
         ("dense", POINTER(Row)),
         ("gain", c_double),
+        ("collocation", POINTER(Collocation)),
     )
 
 
@@ -277,7 +297,8 @@ class Sampling(ctypes.Structure):
 
 
 STRUCTURES = (  # as in hs_sizes
-    Edge, Mode, Model, Row, Method, Timeline, Interpolation, Settings, Chunk, Visited, Stop, Task, Sampling,
+    Edge, Mode, Model, Row, Collocation, Method, Timeline, Interpolation, Settings,
+    Chunk, Visited, Stop, Task, Sampling,
 )  # fmt: skip
 
 
@@ -299,6 +320,29 @@ def method_table(method: Integrator) -> Method:
         order=method.error_order,
         interpolant=INTERPOLANTS.index("dense"),
         degree=method.degree,
+        collocation=ctypes.pointer(_collocation()) if isinstance(method, RadauMethod) else None,
+    )
+
+
+def _collocation() -> Collocation:
+    """Write the coefficients of Radau IIA."""
+    known = coefficients(FLOAT64)
+
+    def square(rows: Sequence[Sequence[float]]) -> Any:
+        return (c_double * 3 * 3)(*((c_double * 3)(*row) for row in rows))
+
+    return Collocation(
+        (c_double * 3)(*known.nodes),
+        square(known.powers),
+        known.gamma,
+        known.alpha,
+        known.beta,
+        square(known.mix),
+        square(known.unmix),
+        (c_double * 3)(*known.estimate),
+        known.share,
+        (c_double * 3)(*known.values),
+        (c_double * 3)(*known.slope),
     )
 
 

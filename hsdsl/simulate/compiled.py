@@ -13,7 +13,7 @@ import numpy as np
 
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
-from hsdsl.integrators import ButcherTableau, TaylorMethod
+from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
@@ -36,8 +36,8 @@ from hsdsl.simulate.surfaces import Obstacle, Surfaces
 from hsdsl.simulate.timeline import Timeline
 
 SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
-    "relaxed": (ButcherTableau, TaylorMethod),
-    "located": (ButcherTableau, TaylorMethod),
+    "relaxed": (ButcherTableau, TaylorMethod, RadauMethod),
+    "located": (ButcherTableau, TaylorMethod, RadauMethod),
 }
 
 

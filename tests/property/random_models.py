@@ -17,6 +17,8 @@ SETTINGS = (
     {"method": "dopri5", "step": 0.3},
     {"tolerance": 1e-4},
     {"method": "dop853", "tolerance": 1e-7},
+    {"method": "radau", "tolerance": 1e-4},
+    {"method": "radau", "step": 0.1},
 )
 
 WITHOUT_KINK = {"abs": "sin", "sign": "tanh", "floor": "atan", "min": "atan2", "max": "atan2"}

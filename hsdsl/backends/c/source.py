@@ -94,6 +94,7 @@ class _Writer:
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
+            self.routines(mode.jacobian)["jacobian"],
         ]
         return f"{{{', '.join(fields)}}}"
 

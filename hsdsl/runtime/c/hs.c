@@ -9,6 +9,8 @@
 
 #include "table.c"
 #include "taylor.c"
+#include "linear.c"
+#include "radau.c"
 #include "stepper.c"
 
 #include "control.c"
@@ -50,6 +52,17 @@ static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
   return piece;
 }
 
+static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
+  double **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
+  double **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->wanted, radau->right};
+  for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, (int64_t)w * w);
+  for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
+  radau->largest = numbers(store, w);
+  radau->error = numbers(store, w);
+  radau->order = take(store, w, sizeof(int));
+  radau->turned = take(store, w, sizeof(int));
+}
+
 /* Give every array of a run its place. */
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
@@ -64,6 +77,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   }
   if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
   if (run->method->kind == HS_TAYLOR) run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
+  if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, w, store);
   run->values = numbers(store, m);
   run->ahead = numbers(store, m);
   run->magnitudes = numbers(store, m);
@@ -161,6 +175,7 @@ void hs_simulate(hs_task *task) {
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
   run.control.order = task->method->order;
+  run.control.implicit = task->method->kind == HS_RADAU;
   run.steps_to_poll = run.poll_steps = 64;
   run.polled = clock();
   copy(run.x, task->x, task->dimension);
@@ -174,6 +189,7 @@ void hs_simulate(hs_task *task) {
 
 /* Sizes of the structures a caller fills, so that it can check its own idea of them. */
 HS_EXPORT const int64_t hs_sizes[] = {
-    sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_method), sizeof(hs_timeline),
+    sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_collocation),
+    sizeof(hs_method), sizeof(hs_timeline),
     sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task),
     sizeof(hs_sampling)};

@@ -51,6 +51,7 @@ typedef struct {
   hs_series *series; /* 0 where the flow is kinked: it has no Taylor coefficients everywhere; then there are no others */
   hs_surface_series *surface_series;
   const int *surface_line; /* for each surface; -1 where it is kinked */
+  hs_routine *jacobian;    /* of the flow by the states, row by row */
 } hs_mode;
 
 typedef struct {

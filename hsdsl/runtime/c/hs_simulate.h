@@ -22,7 +22,15 @@ enum { HS_SECANT, HS_HERMITE, HS_DENSE };
 
 typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_kind;
 
-/* Only tables have what stands behind `degree`. */
+/* The coefficients of Radau IIA: see Coefficients in hsdsl/integrators/collocation.py. */
+typedef struct {
+  double node[3], power[3][3];
+  double gamma, alpha, beta, mix[3][3], unmix[3][3];
+  double estimate[3];
+  double share, value[3], slope[3];
+} hs_collocation;
+
+/* Only tables have what stands between `degree` and `collocation`, which is that of Radau IIA. */
 typedef struct {
   int kind;
   int stages; /* to evaluate in a step */
@@ -37,6 +45,7 @@ typedef struct {
   hs_row coarse; /* and less those of a second one; no terms where there is none */
   const hs_row *dense;
   double gain; /* by how much a step can enlarge the round-off of its stages */
+  const hs_collocation *collocation;
 } hs_method;
 
 /* Time cut at the samples of inputs; segment i has the numbers data[i*model->data ...] to bind routines to. */
@@ -145,7 +154,17 @@ typedef enum {
   HS_ACCUMULATED
 } hs_reason;
 
-typedef enum { HS_CLEAR, HS_WALL, HS_DEEP, HS_FLAT, HS_INWARD, HS_NOT_FINITE, HS_ERROR, HS_CREEPING } hs_obstacle;
+typedef enum {
+  HS_CLEAR,
+  HS_WALL,
+  HS_DEEP,
+  HS_FLAT,
+  HS_INWARD,
+  HS_NOT_FINITE,
+  HS_ERROR,
+  HS_CREEPING,
+  HS_UNSOLVED
+} hs_obstacle;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
    `slope` is the end of a step along which something has no value. */

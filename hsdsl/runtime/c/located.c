@@ -143,7 +143,7 @@ static int first_event(hs_run *run) {
 
 /* No step is short enough: take a guard that the state stands on, or stop and say why. */
 static int located_stuck(hs_run *run, hs_obstacle kind) {
-  const int count = kind == HS_NOT_FINITE ? standing_on(run) : 0;
+  const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
     sizes(run, run->x, run->x);

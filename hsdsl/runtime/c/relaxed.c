@@ -15,7 +15,9 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
   hs_found found;
   trial->t = here->t, trial->h = h, trial->t1 = t1;
   trial->looked = trial->ends = trial->has_piece = 0;
-  if (step(run, n, here->t, h) || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
+  const int status = step(run, n, here->t, h);
+  if (status == NO_CONVERGENCE) return UNSOLVED;
+  if (status || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
   double largest = m ? run->ahead[0] : 0.0;
   for (int k = 1; k < m; k++) largest = hs_max(largest, run->ahead[k]);
   if (largest <= 0) {
@@ -98,6 +100,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
   run->patience.idle = run->patience.creeping = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
+  begin_steps(run);
   while (here->t < limit) {
     double h = control->h, t1, ratio = NAN;
     int halvings = 0;
@@ -119,14 +122,14 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       }
       if (found.obstacle == HS_CLEAR) break;
       last = found;
-      if (found.obstacle == HS_ERROR && halvings == 0) {
-        reject(control, h, ratio);
+      const int too_long = found.obstacle == HS_ERROR || (found.obstacle == HS_UNSOLVED && adaptive);
+      if (too_long && halvings == 0) {
+        reject(control, h, found.obstacle == HS_UNSOLVED ? NAN : ratio);
         h = control->h;
       } else {
         h = h / 2, halvings++;
       }
-      if (halvings > MOST_HALVINGS ||
-          (found.obstacle == HS_ERROR && (struggles(control) || !(here->t + h > here->t))))
+      if (halvings > MOST_HALVINGS || (too_long && (struggles(control) || !(here->t + h > here->t))))
         return stuck(run, found.obstacle, found.surface);
     }
     if (ratio == ratio && halvings == 0) accept(control, h, ratio);

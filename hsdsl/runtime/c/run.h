@@ -18,6 +18,8 @@
 #define HS_TIE 1e-12
 #define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
 
+enum { NO_VALUE = 1, NO_CONVERGENCE = 2 }; /* why a step has no end */
+
 /* A step's interpolant: x + c_1 s + c_2 s**2 + ..., power m at c[m*width]. */
 typedef struct {
   int degree;
@@ -61,8 +63,29 @@ typedef struct {
 typedef struct {
   double h, tolerance, largest;
   int order;
+  int implicit;
+  double before, ratio_before; /* the step last accepted, 0 for none, and its error ratio */
   int64_t accepted, rejected;
 } hs_control;
+
+/* How iterations converge: what the last one left of the one before, and what all that follow would have added. */
+typedef struct {
+  double rate, left;
+} hs_convergence;
+
+/* What Radau IIA knows from one step to the next, and what it works with: vectors of `width`, matrices of its square. */
+typedef struct {
+  int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
+  double derived_at, factored_for, start, length;
+  hs_convergence convergence;
+  double *rows, *fresh;            /* the flow's derivatives */
+  double *real, *re, *im;          /* factors of the real matrix and of the complex one */
+  int *order, *turned;             /* the order of their rows */
+  double *z[3], *last[3];          /* increments: as they are now, and of the last step */
+  double *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
+  double *wanted[3], *right[3];
+  double *largest, *error;
+} hs_radau;
 
 typedef struct {
   double reached;
@@ -109,6 +132,7 @@ typedef struct {
   double **k;          /* stages, then the flow at the end */
   double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */
+  hs_radau radau;
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
   int *stood_on, *beyond;
   int *tied;           /* one for each edge */

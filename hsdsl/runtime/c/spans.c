@@ -25,7 +25,7 @@ static int span_point(hs_run *run, double s, double *time, double **state) {
   if (!(s > 0)) return copy(*state, run->x, n), 0;
   if (run->method->kind == HS_TAYLOR) return at(run, &span->piece, s, *state), 0;
   aside(run, state);
-  const int status = step(run, n, span->t, s * span->h);
+  const int status = part_of_step(run, n, span->t, s * span->h);
   aside(run, state);
   return status ? RAISED : 0;
 }
@@ -33,7 +33,7 @@ static int span_point(hs_run *run, double s, double *time, double **state) {
 static int shorter_piece(hs_run *run, double s, hs_polynomial *piece) {
   const hs_span *span = &run->span;
   const double h = s * span->h;
-  return step(run, run->here.dimension, span->t, h) ||
+  return part_of_step(run, run->here.dimension, span->t, h) ||
          run->here.table->flow(run->here.p, span->t + h, run->z, run->end) || method_piece(run, span->t, h, piece);
 }
 
@@ -50,7 +50,7 @@ static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
 
 /* The sums of the absolute terms that the state at the share s of a step is computed from. */
 static double span_size(const hs_run *run, const hs_span *span, double s, int state) {
-  if (run->method->kind != HS_TAYLOR)
+  if (run->method->kind == HS_TABLE)
     return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
   const int w = run->width, last = span->piece.degree - 1;
   double v = fabs(span->piece.c[last * w + state]) * s;
@@ -87,13 +87,15 @@ static void begin_span(hs_run *run, double h, double t1) {
   copy(span->x, run->x, run->here.dimension);
 }
 
-/* Try a step of a table, or say what is in its way. */
+/* Try a step of a table or of Radau IIA, or say what is in its way. */
 HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
   hs_span *const span = &run->span;
   const hs_mode *mode = run->here.table;
   const double *p = run->here.p;
   begin_span(run, h, t1);
-  if (step(run, n, span->t, h) || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
+  const int status = step(run, n, span->t, h);
+  if (status == NO_CONVERGENCE) return HS_UNSOLVED;
+  if (status || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
     local_error(run, h);
@@ -108,12 +110,13 @@ HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
   return mode->values(p, t1, run->z, run->ends) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
-/* Make one step of a table: rejected by the error estimate, halved where something has no value. */
+/* Make one step of a table or of Radau IIA: rejected by the error estimate, halved where something has no value. */
 HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
   hs_control *const control = &run->control;
   const double t = run->here.t;
   int halvings = 0;
   if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
+  if (!run->sloped) begin_steps(run);
   run->sloped = 1;
   double h = control->h, t1;
   for (;;) {
@@ -127,8 +130,8 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
       run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
       return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
     }
-    if (tried == HS_ERROR && halvings == 0) {
-      reject(control, h, run->ratio);
+    if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
+      reject(control, h, tried == HS_UNSOLVED ? NAN : run->ratio);
       h = control->h;
     } else {
       h = h / 2, halvings++;

@@ -8,7 +8,8 @@
 
 enum { RAISED = -1 };
 
-static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0}, TOO_WRONG = {HS_ERROR, -1, 0};
+static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0};
+static const hs_found TOO_WRONG = {HS_ERROR, -1, 0}, UNSOLVED = {HS_UNSOLVED, -1, 0};
 
 static hs_found obstacle(hs_obstacle kind, int surface) {
   const hs_found found = {kind, surface, 0};

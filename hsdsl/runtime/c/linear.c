@@ -1,0 +1,96 @@
+/* Systems of linear equations: dense LU with partial pivoting. See hsdsl/integrators/linear.py. */
+
+static void exchange_rows(double *a, int n, int i, int k) {
+  if (i == k) return;
+  for (int j = 0; j < n; j++) {
+    const double kept = a[i * n + j];
+    a[i * n + j] = a[k * n + j];
+    a[k * n + j] = kept;
+  }
+}
+
+static void exchange_places(int *order, int i, int k) {
+  const int kept = order[i];
+  order[i] = order[k];
+  order[k] = kept;
+}
+
+/* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. */
+HS_INLINE int factored(int n, double *restrict a, int *restrict order) {
+  for (int i = 0; i < n; i++) order[i] = i;
+  for (int k = 0; k < n; k++) {
+    int pivot = k;
+    for (int i = k + 1; i < n; i++)
+      if (fabs(a[i * n + k]) > fabs(a[pivot * n + k])) pivot = i;
+    exchange_rows(a, n, k, pivot);
+    exchange_places(order, k, pivot);
+    if (!(fabs(a[k * n + k]) > 0)) return 1;
+    a[k * n + k] = 1 / a[k * n + k];
+    for (int i = k + 1; i < n; i++) {
+      if (a[i * n + k] == 0) continue;
+      const double share = a[i * n + k] = a[i * n + k] * a[k * n + k];
+      for (int j = k + 1; j < n; j++) a[i * n + j] = a[i * n + j] - share * a[k * n + j];
+    }
+  }
+  return 0;
+}
+
+/* Solve for a right-hand side, to `found`. */
+HS_INLINE void solve(int n, const double *restrict a, const int *restrict order, const double *restrict right,
+                     double *restrict found) {
+  for (int i = 0; i < n; i++) found[i] = right[order[i]];
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < i; j++) found[i] = found[i] - a[i * n + j] * found[j];
+  for (int i = n - 1; i >= 0; i--) {
+    for (int j = i + 1; j < n; j++) found[i] = found[i] - a[i * n + j] * found[j];
+    found[i] = found[i] * a[i * n + i];
+  }
+}
+
+/* The same of a complex matrix, real and imaginary parts apart; the size of a pivot is the sum of its parts' sizes. */
+HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, int *restrict order) {
+  for (int i = 0; i < n; i++) order[i] = i;
+  for (int k = 0; k < n; k++) {
+    int pivot = k;
+    for (int i = k + 1; i < n; i++)
+      if (fabs(re[i * n + k]) + fabs(im[i * n + k]) > fabs(re[pivot * n + k]) + fabs(im[pivot * n + k])) pivot = i;
+    exchange_rows(re, n, k, pivot);
+    exchange_rows(im, n, k, pivot);
+    exchange_places(order, k, pivot);
+    const double size = re[k * n + k] * re[k * n + k] + im[k * n + k] * im[k * n + k];
+    if (!(size > 0)) return 1;
+    const double c = re[k * n + k] = re[k * n + k] / size, d = im[k * n + k] = -im[k * n + k] / size;
+    for (int i = k + 1; i < n; i++) {
+      const double a = re[i * n + k], b = im[i * n + k];
+      if (a == 0 && b == 0) continue;
+      const double p = re[i * n + k] = c * a - d * b, q = im[i * n + k] = c * b + d * a;
+      for (int j = k + 1; j < n; j++) {
+        const double u = re[k * n + j], v = im[k * n + j];
+        re[i * n + j] = re[i * n + j] - (p * u - q * v);
+        im[i * n + j] = im[i * n + j] - (p * v + q * u);
+      }
+    }
+  }
+  return 0;
+}
+
+/* Take the products of row i with what is known off its right-hand side a + i b. */
+HS_INLINE void take_off(int n, const double *re, const double *im, double *a, double *b, int i, int first, int end) {
+  for (int j = first; j < end; j++) {
+    const double c = re[i * n + j], d = im[i * n + j];
+    a[i] = a[i] - (c * a[j] - d * b[j]);
+    b[i] = b[i] - (c * b[j] + d * a[j]);
+  }
+}
+
+HS_INLINE void solve_complex(int n, const double *restrict re, const double *restrict im, const int *restrict order,
+                             const double *const right[2], double *restrict a, double *restrict b) {
+  for (int i = 0; i < n; i++) a[i] = right[0][order[i]], b[i] = right[1][order[i]];
+  for (int i = 0; i < n; i++) take_off(n, re, im, a, b, i, 0, i);
+  for (int i = n - 1; i >= 0; i--) {
+    take_off(n, re, im, a, b, i, i + 1, n);
+    const double c = re[i * n + i], d = im[i * n + i], p = a[i], q = b[i];
+    a[i] = c * p - d * q;
+    b[i] = c * q + d * p;
+  }
+}

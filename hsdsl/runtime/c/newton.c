@@ -1,0 +1,86 @@
+/* When the iterations for an implicit step have done enough, and when they will not. See hsdsl/integrators/newton.py. */
+
+#define MOST_ITERATIONS 7
+#define MOST_TO_ROUNDOFF 122 /* 16 - 2 log2(u) */
+#define LEAST_LEFT 1e-3
+#define MOST_LEFT 0.03
+#define DIVERGING 0.99
+#define SLOW_RATE 0.5
+#define NEWTON_NOISE 1024
+#define NEWTON_SHARE 1e-2
+
+/* The largest change relative to 1 + |x|. */
+HS_INLINE double scaled(const hs_run *run, int n) {
+  const double *const largest = run->radau.largest;
+  double size = largest[0] / (1 + fabs(run->x[0]));
+  for (int s = 1; s < n; s++) size = hs_max(size, largest[s] / (1 + fabs(run->x[s])));
+  return size;
+}
+
+static int unsettled(hs_convergence *convergence) {
+  convergence->rate = 1.0;
+  return NO_CONVERGENCE;
+}
+
+/* Iterate until what is left is a small share of the tolerance. */
+HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
+  hs_convergence *const convergence = &run->radau.convergence;
+  const double tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
+  const double enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
+  double left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
+  for (int count = 1;; count++) {
+    const int status = iterate(run, n, t, h);
+    if (status) return status;
+    const double size = scaled(run, n) / tolerance;
+    if (count > 1) {
+      const double rate = size / before;
+      if (rate >= DIVERGING) {
+        if (size <= noise) return 0;
+        break;
+      }
+      convergence->rate = rate;
+      left = rate / (1 - rate);
+    }
+    double ahead = left * size;
+    if (size == 0 || ahead <= enough) {
+      convergence->left = left;
+      return 0;
+    }
+    if (count > 1)
+      for (int i = count; i < MOST_ITERATIONS; i++) ahead = ahead * convergence->rate;
+    if (count == MOST_ITERATIONS || (count > 1 && ahead > enough && size > noise)) break;
+    before = size;
+  }
+  convergence->left = 1.0;
+  return unsettled(convergence);
+}
+
+/* Whether the next corrections would be below the last digits of x and of all stages. */
+HS_INLINE int below_digits(const hs_run *run, int n, double rate) {
+  const hs_radau *radau = &run->radau;
+  for (int s = 0; s < n; s++) {
+    double reach = fabs(run->x[s]);
+    for (int i = 0; i < 3; i++) reach = hs_max(reach, fabs(run->x[s] + radau->z[i][s]));
+    if (!(rate * radau->largest[s] <= HS_UNIT * reach)) return 0;
+  }
+  return 1;
+}
+
+/* Iterate until the next correction would be below the last digit, or they are all noise. */
+HS_INLINE int to_roundoff(hs_run *run, int n, double t, double h) {
+  hs_convergence *const convergence = &run->radau.convergence;
+  const double allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
+  double before = 0.0;
+  for (int count = 0; count < MOST_TO_ROUNDOFF; count++) {
+    const int status = iterate(run, n, t, h);
+    if (status) return status;
+    const double size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
+    if (size == 0 || (rate < SLOW_RATE && below_digits(run, n, rate))) {
+      convergence->rate = rate;
+      return 0;
+    }
+    if (before != 0 && rate >= SLOW_RATE) return size <= allowed ? 0 : unsettled(convergence);
+    before = size;
+  }
+  return 0;
+}

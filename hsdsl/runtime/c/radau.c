@@ -1,0 +1,176 @@
+/* Steps by Radau IIA. See hsdsl/integrators/radau.py. */
+
+#define RENEWED 1e-3
+
+/* The weighted sum of three vectors. */
+HS_INLINE void weighted3(int n, const double *w, double *const v[3], double *out) {
+  for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
+}
+
+/* One iteration of Newton's method on Z = h A f(x + Z), in the coordinates that take A apart: the increments after it
+   and the largest change of each state. Not 0 where the flow has no value there, or the change has none. */
+HS_INLINE int iterate(hs_run *run, int n, double t, double h) {
+  hs_radau *const radau = &run->radau;
+  const hs_collocation *const known = run->method->collocation;
+  double *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->wanted;
+  for (int i = 0; i < 3; i++) {
+    for (int s = 0; s < n; s++) run->at[s] = run->x[s] + radau->z[i][s];
+    if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, f[i])) return NO_VALUE;
+  }
+  for (int s = 0; s < n; s++) {
+    double g[3];
+    for (int i = 0; i < 3; i++)
+      g[i] = known->unmix[i][0] * f[0][s] + known->unmix[i][1] * f[1][s] + known->unmix[i][2] * f[2][s];
+    radau->right[0][s] = h * g[0] - known->gamma * u[0][s];
+    radau->right[1][s] = h * g[1] - (known->alpha * u[1][s] + known->beta * u[2][s]);
+    radau->right[2][s] = h * g[2] - (known->alpha * u[2][s] - known->beta * u[1][s]);
+  }
+  const double *const pair[2] = {radau->right[1], radau->right[2]};
+  solve(n, radau->real, radau->order, radau->right[0], d[0]);
+  solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
+  double total = 0.0;
+  for (int s = 0; s < n; s++) {
+    const double a = fabs(d[0][s]), b = fabs(d[1][s]), c = fabs(d[2][s]);
+    for (int i = 0; i < 3; i++) u[i][s] = u[i][s] + d[i][s];
+    radau->largest[s] = hs_max(hs_max(a, b), c);
+    total = total + (a + b + c);
+  }
+  for (int i = 0; i < 3; i++) weighted3(n, known->mix[i], u, radau->z[i]);
+  return hs_finite(total) ? 0 : NO_CONVERGENCE;
+}
+
+#include "newton.c"
+
+static void radau_forget(hs_radau *radau) {
+  radau->derived = radau->factored = radau->stepped = 0;
+  radau->convergence.rate = radau->convergence.left = 1.0;
+}
+
+HS_INLINE int derive(hs_run *run, double t) {
+  hs_radau *const radau = &run->radau;
+  if (run->here.table->jacobian(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
+  swap(&radau->rows, &radau->fresh);
+  radau->derived = 1;
+  radau->derived_at = t;
+  radau->factored = 0;
+  return 0;
+}
+
+/* Factor gamma - h J and alpha - i beta - h J, unless that is done. */
+HS_INLINE int factor_for(hs_run *run, int n, double h) {
+  hs_radau *const radau = &run->radau;
+  const hs_collocation *const known = run->method->collocation;
+  if (radau->factored && radau->factored_for == h) return 0;
+  for (int i = 0; i < n * n; i++) {
+    radau->real[i] = radau->re[i] = -h * radau->rows[i];
+    radau->im[i] = 0.0;
+  }
+  for (int i = 0; i < n; i++) {
+    radau->real[i * n + i] = known->gamma + radau->real[i * n + i];
+    radau->re[i * n + i] = known->alpha + radau->re[i * n + i];
+    radau->im[i * n + i] = -known->beta;
+  }
+  radau->factored_for = h;
+  radau->factored = !factored(n, radau->real, radau->order) && !factored_complex(n, radau->re, radau->im, radau->turned);
+  return radau->factored ? 0 : NO_CONVERGENCE;
+}
+
+/* Go on with the last step's polynomial: behind its end, or inside it where it was tried from here. To radau->z. */
+HS_INLINE void guess(hs_run *run, int n, double t, double h) {
+  hs_radau *const radau = &run->radau;
+  const hs_collocation *const known = run->method->collocation;
+  const int behind = radau->stepped && t == radau->start + radau->length;
+  const int known_here = behind || (radau->stepped && t == radau->start);
+  const double share = h / radau->length;
+  for (int s = 0; s < n; s++) {
+    double c[3];
+    for (int m = 0; m < 3; m++)
+      c[m] = known->power[m][0] * radau->last[0][s] + known->power[m][1] * radau->last[1][s] +
+             known->power[m][2] * radau->last[2][s];
+    for (int i = 0; i < 3; i++) {
+      const double at = (behind ? 1.0 : 0.0) + known->node[i] * share, base = behind ? radau->last[2][s] : 0.0;
+      radau->z[i][s] = known_here ? at * (c[0] + at * (c[1] + at * c[2])) - base : 0.0;
+    }
+  }
+}
+
+/* Solve for the step with the derivatives that there are. */
+HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly) {
+  hs_radau *const radau = &run->radau;
+  guess(run, n, t, h);
+  const int status = factor_for(run, n, h);
+  if (status) return status;
+  for (int i = 0; i < 3; i++) weighted3(n, run->method->collocation->unmix[i], radau->z, radau->apart[i]);
+  return exactly ? to_roundoff(run, n, t, h) : to_tolerance(run, n, t, h);
+}
+
+/* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */
+HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
+  hs_radau *const radau = &run->radau;
+  const int renew = radau->convergence.rate > RENEWED && radau->derived_at != t;
+  if ((!radau->derived || renew) && derive(run, t)) return NO_VALUE;
+  int status = settle(run, n, t, h, exactly);
+  if (status != NO_CONVERGENCE || radau->derived_at == t) return status;
+  if (derive(run, t)) return NO_VALUE;
+  return settle(run, n, t, h, exactly);
+}
+
+/* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */
+HS_INLINE int estimate(hs_run *run, int n, double t, double h) {
+  hs_radau *const radau = &run->radau;
+  const hs_collocation *const known = run->method->collocation;
+  double *const inside = radau->wanted[0], *const embedded = radau->change[0], *const along = radau->change[1];
+  weighted3(n, known->value, radau->z, run->at);
+  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + run->at[s];
+  if (run->here.table->flow(run->here.p, t + known->share * h, run->at, inside)) return NO_VALUE;
+  weighted3(n, known->estimate, radau->z, radau->right[0]);
+  weighted3(n, known->slope, radau->z, radau->right[1]);
+  for (int s = 0; s < n; s++) {
+    radau->right[0][s] = h * run->slope[s] + radau->right[0][s];
+    radau->right[1][s] = h * inside[s] - radau->right[1][s];
+  }
+  solve(n, radau->real, radau->order, radau->right[0], embedded);
+  solve(n, radau->real, radau->order, radau->right[1], along);
+  for (int s = 0; s < n; s++) radau->error[s] = fabs(embedded[s]) >= fabs(along[s]) ? embedded[s] : along[s];
+  return 0;
+}
+
+HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
+  hs_radau *const radau = &run->radau;
+  if (!n) return 0;
+  const int adaptive = run->control.tolerance > 0, status = solved(run, n, t, h, !adaptive);
+  if (status) return status;
+  radau->stepped = 1;
+  radau->start = t;
+  radau->length = h;
+  for (int i = 0; i < 3; i++) copy(radau->last[i], radau->z[i], n);
+  if (adaptive && estimate(run, n, t, h)) return NO_VALUE;
+  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + radau->z[2][s];
+  return 0;
+}
+
+/* Try a step, solved as well as its tolerance asks for; for a few states the compiler is told how many. */
+static int radau_step(hs_run *run, double t, double h) {
+  switch (run->here.dimension) {
+    case 1: return radau_step_in(run, 1, t, h);
+    case 2: return radau_step_in(run, 2, t, h);
+    case 3: return radau_step_in(run, 3, t, h);
+    case 4: return radau_step_in(run, 4, t, h);
+    default: return radau_step_in(run, run->here.dimension, t, h);
+  }
+}
+
+/* Make a part of the last step, solved to round-off: its end, run->z, is a smooth function of its length. */
+static int radau_landing(hs_run *run, double t, double h) {
+  const int n = run->here.dimension, status = n ? solved(run, n, t, h, 1) : 0;
+  if (status) return status;
+  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + run->radau.z[2][s];
+  return 0;
+}
+
+/* The polynomial through the increments. */
+static void radau_piece(const hs_run *run, hs_polynomial *piece) {
+  piece->degree = 3;
+  for (int m = 0; m < 3; m++)
+    weighted3(run->here.dimension, run->method->collocation->power[m], run->radau.z, piece->c + m * run->width);
+}
