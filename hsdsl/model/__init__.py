@@ -197,7 +197,7 @@ class Model:
             samples=samples,
             max_transitions=max_transitions,
         )
-        key = key_of(asked, parameters, initial, settings, engine, precision)
+        key = key_of(*asked.values(), parameters, initial, settings, engine, precision)
         ready = self._prepared.find(key)
         if ready is None:
             ready = self._prepare(settings, asked, parameters or {}, initial or {}, engine, precision)

@@ -31,24 +31,26 @@ class Remembered(Generic[Value]):
                 del self._values[next(iter(self._values))]
 
 
+_PLAIN = frozenset((type(None), str, int, float, bool))
+
+
 def key_of(*arguments: Any) -> Hashable | None:
-    """Return a key that calls share only if their arguments are the same; None where they are not plain data."""
+    """Return a key that calls share only if their arguments are the same; None where they are not plain data.
+
+    1, 1.0 and True are not the same, zeros of both signs are.
+    """
     try:
-        return tuple(map(_key, arguments))
+        return tuple([(a.__class__, a) if a.__class__ in _PLAIN else _key(a) for a in arguments])
     except TypeError:
         return None
 
 
 def _key(value: Any) -> Hashable:
     kind = cast("type[Any]", type(value))
-    if value is None or kind is str:
-        return value
-    if kind is float:
-        return value if value else repr(value)  # zeros of both signs are equal
-    if kind is int or kind is bool:
-        return kind, value  # which equal floats
+    if kind in _PLAIN:
+        return kind, value
     if kind is dict:
-        return tuple((name, _key(item)) for name, item in value.items())
+        return kind, tuple([(name, _key(item)) for name, item in value.items()])
     if kind is list or kind is tuple:
         return kind, tuple(map(_key, value))
     if isinstance(value, Mapping):

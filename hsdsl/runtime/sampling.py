@@ -13,9 +13,29 @@ from hsdsl.execution import Array, Evaluated
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel, runtime
 
-Layouts = Callable[[], tuple[Sequence[tuple[str, ...]], Array | None]]
 BLOCK = 8  # HS_BLOCK
 NUMBER = 8  # bytes
+
+Layouts = tuple[Sequence[tuple[str, ...]], Array | None]
+
+
+class Sampled:
+    """What is the same for all runs of one model over one timeline (a pointer to the ``hs_timeline``)."""
+
+    def __init__(self, compiled: CompiledModel, timeline: Any) -> None:
+        self.table = tables.Sampling(model=ctypes.pointer(compiled.table), timeline=timeline)
+        self._kept = compiled, timeline
+        self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
+
+    def columns(self, layouts: Sequence[tuple[str, ...]], names: Sequence[str]) -> tuple[int, int]:
+        """Where it is written how many states each layout has, and which of them have these names."""
+        key = tuple(layouts), tuple(names)
+        if key not in self._columns:
+            dimension = np.array([len(states) for states in layouts], np.int32)
+            places = [[there.index(name) if name in there else -1 for name in names] for there in layouts]
+            column = np.array(places, np.int32)
+            self._columns[key] = dimension, column, dimension.ctypes.data, column.ctypes.data
+        return self._columns[key][2:]
 
 
 class Sampler:
@@ -23,9 +43,7 @@ class Sampler:
 
     Parameters
     ----------
-    compiled : CompiledModel
-    timeline : pointer
-        To the ``hs_timeline`` of the run.
+    sampled : Sampled
     columns : mapping
         The execution's ``times``, ``values``, ``outputs`` and ``coefficients``.
     arcs : array
@@ -36,37 +54,25 @@ class Sampler:
     """
 
     def __init__(
-        self, compiled: CompiledModel, timeline: Any, columns: Mapping[str, Array], arcs: Array, layouts: Layouts
+        self, sampled: Sampled, columns: Mapping[str, Array], arcs: Array, layouts: Callable[[], Layouts]
     ) -> None:
-        self._compiled, self._timeline = compiled, timeline
-        self._columns, self._arcs, self._layouts = columns, arcs, layouts
+        self._sampled, self._columns, self._arcs, self._layouts = sampled, columns, arcs, layouts
 
     @cached_property
-    def _of_arcs(self) -> tuple[Sequence[tuple[str, ...]], Array | None, Array]:
-        """The kinds of arcs, the kind of each, and how many states each kind has."""
-        layouts, layout = self._layouts()
-        return layouts, layout, np.array([len(states) for states in layouts], np.int32)
+    def _kinds(self) -> Layouts:
+        return self._layouts()
 
     @cached_property
     def _table(self) -> tables.Sampling:
         """What is the same for any times."""
-        columns = self._columns
-        _, layout, dimension = self._of_arcs
-        return tables.Sampling(
-            model=ctypes.pointer(self._compiled.table),
-            timeline=self._timeline,
-            rows=len(columns["times"]),
-            arcs=len(self._arcs),
-            width=columns["values"].shape[1],
-            degree=columns["coefficients"].shape[1],
-            times=columns["times"].ctypes.data,
-            values=columns["values"].ctypes.data,
-            recorded=columns["outputs"].ctypes.data,
-            pieces=columns["coefficients"].ctypes.data,
-            arc=self._arcs.ctypes.data,
-            layout=None if layout is None else layout.ctypes.data,
-            dimension=dimension.ctypes.data,
-        )
+        columns, layout = self._columns, self._kinds[1]
+        table = tables.Sampling.from_buffer_copy(self._sampled.table)
+        table.rows, table.width = columns["values"].shape
+        table.degree, table.arcs = columns["coefficients"].shape[1], len(self._arcs)
+        table.times, table.values = columns["times"].ctypes.data, columns["values"].ctypes.data
+        table.recorded, table.pieces = columns["outputs"].ctypes.data, columns["coefficients"].ctypes.data
+        table.arc, table.layout = self._arcs.ctypes.data, None if layout is None else layout.ctypes.data
+        return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
         """Evaluate the states named, and the outputs if they are wanted.
@@ -84,12 +90,10 @@ class Sampler:
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * self._table.width)
         memory[:n], memory[n:room] = times, 0.0
-        places = [[there.index(name) if name in there else -1 for name in states] for there in self._of_arcs[0]]
-        column = np.array(places, np.int32)
-        table = tables.Sampling.from_buffer_copy(self._table)
+        table, start = tables.Sampling.from_buffer_copy(self._table), memory.ctypes.data
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
-        table.column, start = column.ctypes.data, memory.ctypes.data
-        table.time, table.row, table.states, table.results, table.scratch = (start + NUMBER * end for end in ends)
+        table.dimension, table.column = self._sampled.columns(self._kinds[0], states)
+        table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]
         return Evaluated(
             outside=runtime().hs_sample(ctypes.byref(table)),
             times=memory[:n],

@@ -43,10 +43,11 @@ class Chunks:
         self.table, self._shape = table, shape
         self._full: list[dict[str, Array]] = []
         self._rows = 0  # of the chunk that is there
+        self._before = 0  # rows of a run that needed more than one chunk
 
     def clear(self, rows: float) -> None:
         """Make ready for a run that may write about so many rows."""
-        wanted = int(min(max(rows, LEAST_ROWS), MOST_ROWS))
+        wanted = int(min(max(rows, self._before, LEAST_ROWS), MOST_ROWS))
         if wanted <= self._rows:
             self._reset()
         else:
@@ -107,11 +108,12 @@ class Chunks:
             whole = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0] if name != "pieces"}
             pieces = [chunk["pieces"][:-1] for chunk in chunks]
             whole["coefficients"] = np.concatenate([pieces[0][1:], *pieces[1:], chunks[-1]["pieces"][-1:]])
+            self._before = min(len(whole["times"]) * 9 // 8, MOST_KEPT // self._shape.row_bytes)
         else:
             whole = chunks[0]
             whole["coefficients"] = whole.pop("pieces")[1:]
             if self._rows * self._shape.row_bytes <= MOST_KEPT:
-                return {name: column.copy() for name, column in whole.items()}
+                return {name: column.copy() if column.size else column for name, column in whole.items()}
         self._rows, self._columns = 0, {}
         return whole
 

@@ -15,8 +15,10 @@ from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
 from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
+from hsdsl.program import Program
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import notes, stops
 from hsdsl.simulate.along import interpolation
 from hsdsl.simulate.chunks import Shape
@@ -42,13 +44,31 @@ SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
 
 
 class CompiledPlan:
-    """What the compiled loop is given, made once for any number of runs."""
+    """What the compiled loop is given, made once for any number of runs.
 
-    def __init__(self, compiled: CompiledModel, settings: Settings, timeline: Timeline, mode: int, x: State) -> None:
+    Attributes
+    ----------
+    states : tuple of str
+        Those a run begins with.
+    one_layout : bool
+        Whether every mode has these.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        compiled: CompiledModel,
+        settings: Settings,
+        timeline: Timeline,
+        mode: int,
+        states: tuple[str, ...],
+        x: State,
+    ) -> None:
         assert settings.method is not None
         method, model = tables.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
-        self.compiled = compiled
+        self.compiled, self.states = compiled, states
+        self.one_layout = all(m.states == states or (m.final and not m.states) for m in program.modes)
         scheme = settings.scheme
         key = settings.method, scheme, shape
         self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))
@@ -65,7 +85,9 @@ class CompiledPlan:
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(timeline)
         self.timeline = self._columns.pointer
+        self.sampled = Sampled(compiled, self.timeline)
         self._mode, self._x = mode, np.array(x, np.float64)
+        self._start = len(x), self._x.ctypes.data
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, desk: Desk) -> None:
@@ -74,7 +96,7 @@ class CompiledPlan:
         task = desk.task
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
-        task.mode, task.dimension, task.x = self._mode, len(self._x), self._x.ctypes.data
+        task.mode, (task.dimension, task.x) = self._mode, self._start
 
 
 def _interpolations(settings: Settings) -> Any:
@@ -128,7 +150,7 @@ class CompiledRun:
         """Run to the end: why it stopped, and the columns that were written."""
         desk = self.desk
         self.plan.lay(desk)
-        with noted(desk.pressed):
+        with noted(desk.press):
             self.plan.compiled.simulate(desk.task)
         if desk.failed:
             raise desk.failed[0]

@@ -6,7 +6,7 @@ To fetch fresh memory from the system costs more than a short run.
 from __future__ import annotations
 
 import ctypes
-from threading import Event
+from types import FrameType
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -27,7 +27,7 @@ class Desk:
     def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
         model = compiled.table
         self.task = tables.Task()
-        self.pressed, self.failed = Event(), list[BaseException]()
+        self.pressed, self.failed = False, list[BaseException]()
         self.chunks = Chunks(self.task.chunk, shape)
         self._width = model.width
         self._workspace = np.empty(compiled.workspace(method, scheme))
@@ -41,12 +41,16 @@ class Desk:
 
     def clear(self, rows: float) -> None:
         """Make ready for a run that may write about so many rows."""
-        self.pressed.clear()
+        self.pressed = False
         self.failed.clear()
         self.chunks.clear(rows)
         if len(self._visited) > 1:  # a large set takes long to forget
             self._visited = [grown(self.task.visited, VISITED, self._width)]
         self.task.now, self.task.made = 0.0, 0
+
+    def press(self, number: int, frame: FrameType | None) -> None:
+        """Ctrl-C: the run is to stop."""
+        self.pressed = True
 
     def x(self, dimension: int) -> State:
         """The state the run stopped at."""
@@ -63,7 +67,7 @@ class Desk:
         except BaseException as error:  # none can pass through C
             self.failed.append(error)
             return 2
-        return int(self.pressed.is_set())
+        return int(self.pressed)
 
     def more_visited(self, larger: tables.Visited) -> int:
         """Make room for twice as many visited states."""
@@ -104,7 +108,7 @@ def _answer_flush(task: int) -> int:
 
 
 def _answer_poll(task: int) -> int:
-    return int(_desks[task].pressed.is_set())
+    return int(_desks[task].pressed)
 
 
 def _answer_grow(task: int, larger: Any) -> int:

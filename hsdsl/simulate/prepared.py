@@ -99,7 +99,7 @@ class Prepared:
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the desk for longer than the run lasts
             plan.desks.leave(under_way.desk)
-        return Written(run, plan, whole, self.states).execution(stop, spent)
+        return Written(run, plan, whole).execution(stop, spent)
 
 
 def prepare(
@@ -114,5 +114,5 @@ def prepare(
 ) -> Prepared:
     """Prepare a run from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given."""
     timeline = make_timeline(program, kernel, parameters, settings.until)
-    plan = None if compiled is None else CompiledPlan(compiled, settings, timeline, mode, x)
+    plan = None if compiled is None else CompiledPlan(program, compiled, settings, timeline, mode, states, x)
     return Prepared(program, kernel, settings, timeline, mode, states, x, plan)

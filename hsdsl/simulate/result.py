@@ -20,6 +20,8 @@ from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.verdict import Looking, assess
 
+COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
+
 
 def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     """Make the execution of what the Python loop has recorded."""
@@ -38,51 +40,51 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What the compiled loop has written in a run that began with ``states``."""
+    """What the compiled loop has written."""
 
     run: Run
     plan: CompiledPlan
     whole: dict[str, Array]
-    states: tuple[str, ...]
 
     def execution(self, stop: Stop, seconds: dict[str, float]) -> Execution:
         """Make the execution: its arrays now, what is made of objects when it is first asked for.
 
         Of a short run those objects would take longer than the run.
         """
-        whole, one_layout, width = self.whole, self._one_layout(), self._width()
-        arrays = {name: whole[name] for name in ("times", "values", "outputs", "depth", "coefficients")}
-        if width < whole["values"].shape[1]:
-            for name in ("values", "coefficients"):
-                arrays[name] = np.ascontiguousarray(whole[name][..., :width])
-        later: dict[str, Callable[[Execution], Any]] = {
+        whole = self.whole
+        about, arrays = _about(self.run, stop, seconds, "c"), {name: whole[name] for name in COLUMNS}
+        if self.plan.one_layout:
+            about["states"] = self.plan.states
+        self._trim(arrays)
+        sampler = Sampler(self.plan.sampled, arrays, whole["arc"], self._layouts)
+        return Execution.deferred(self._later(), sampler=sampler, **about, **arrays)
+
+    def _later(self) -> dict[str, Callable[[Execution], Any]]:
+        return {
             "settings": lambda _: described(self.run.settings),
-            "transitions": lambda _: tuple(transitions_of(whole, self.run.program)),
+            "transitions": lambda _: tuple(transitions_of(self.whole, self.run.program)),
             "arcs": lambda _: self._arcs(),
             "final": self._final,
             "verdict": _verdict,
         }
-        sampler = Sampler(self.plan.compiled, self.plan.timeline, arrays, whole["arc"], self._layouts)
-        about = _about(self.run, stop, seconds, "c") | ({"states": self.states} if one_layout else {})
-        return Execution.deferred(later, sampler=sampler, **about, **arrays)
+
+    def _trim(self, arrays: dict[str, Array]) -> None:
+        """Cut arrays to as many states as the largest mode has that the run was in."""
+        plan, there = self.plan, arrays["values"].shape[1]
+        width = len(plan.states) if plan.one_layout else max(len(arc.states) for arc in self._arcs())
+        if width < there:
+            for name in ("values", "coefficients"):
+                arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
 
     def _arcs(self) -> tuple[Arc, ...]:
-        return tuple(arcs_of(self.whole, self.run.program, self.states))
-
-    def _one_layout(self) -> bool:
-        """Whether all modes have the states that the run began with."""
-        return all(mode.states == self.states or (mode.final and not mode.states) for mode in self.run.program.modes)
-
-    def _width(self) -> int:
-        """How many states the largest mode has that the run was in."""
-        return len(self.states) if self._one_layout() else max(len(arc.states) for arc in self._arcs())
+        return tuple(arcs_of(self.whole, self.run.program, self.plan.states))
 
     def _layouts(self) -> tuple[Sequence[tuple[str, ...]], Array | None]:
         """The states of each kind of arcs, and of which kind each arc is (None where there is only one)."""
-        if self._one_layout():
-            return (self.states,), None
-        arcs = self.whole["arc"]
-        of_arc = list(states_of_arcs(arcs["mode"].tolist(), self.run.program, self.states))
+        states = self.plan.states
+        if self.plan.one_layout:
+            return (states,), None
+        of_arc = list(states_of_arcs(self.whole["arc"]["mode"].tolist(), self.run.program, states))
         layouts = list(dict.fromkeys(of_arc))
         number = {layout: i for i, layout in enumerate(layouts)}
         return layouts, np.array([number[states] for states in of_arc], np.int32)

@@ -74,12 +74,15 @@ static int stuck(hs_run *run, hs_obstacle kind, int surface) {
   return stopped(run, HS_STUCK, run->here.t);
 }
 
-/* Ask the caller whether to go on; a clock costs more than a step, so how many steps lie between is learnt. */
+/* Ask the caller now and then whether to go on, of a short run never; a clock costs more than a step, so how many steps
+   lie between is learnt. */
 static void poll(hs_run *run) {
   const clock_t now = clock();
-  if (now - run->polled < POLL_EVERY) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
+  const int early = now - run->polled < POLL_EVERY;
+  if (early) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
   if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
   run->steps_to_poll = run->poll_steps;
+  if (early) return;
   run->polled = now;
   if (run->task->poll(run->task)) run->interrupted = 1;
 }
