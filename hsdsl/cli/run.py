@@ -83,8 +83,9 @@ def _simulate(
     json: bool,
     quiet: bool,
 ) -> Execution:
-    from hsdsl.model import load, split_overrides
+    from hsdsl.model import engines, load, split_overrides
 
+    engines.begin(asked["engine"], asked["precision"], asked["scheme"], path)
     model = load(path)
     names = _names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)

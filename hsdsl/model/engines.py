@@ -9,12 +9,16 @@ python   the readable one
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
+from hsdsl.defaults import DEFAULTS
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
+from hsdsl.runtime import kernel
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Settings
@@ -33,6 +37,23 @@ def check(engine: str) -> None:
     """
     if engine not in ENGINES:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
+
+
+def begin(engine: str, precision: int | None, scheme: str | None, path: Path) -> None:
+    """Compile the runtime while a model is read, where a run of it will need that and nobody has done it.
+
+    What the file seems to say of the scheme is taken for what it says; where that is wrong the right runtime is
+    compiled when it is needed.
+    """
+    if engine == "python" or precision is not None:
+        return
+    try:
+        said = re.search(r"\bscheme: *(\w+)", path.read_text(encoding="utf-8", errors="replace"))
+    except (OSError, ValueError):
+        return  # who reads it next says what is wrong
+    scheme = scheme or (said[1] if said else DEFAULTS["scheme"])
+    if scheme in SCHEMES:
+        kernel.begin(scheme)
 
 
 def choose(

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Hashable, Sequence
-from functools import cache
+from contextlib import suppress
+from threading import Lock, Thread
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64, Number
@@ -16,7 +17,8 @@ from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import tables
-from hsdsl.runtime.library import load
+from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.runtime.library import is_kept, load
 
 Address = int | None
 Double = ctypes.c_double
@@ -26,20 +28,45 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-@cache
-def runtime() -> ctypes.CDLL:
-    """The hand-written runtime, compiled.
+_loaded: dict[str, ctypes.CDLL] = {}
+_loading = Lock()
+
+
+def runtime(scheme: str | None = None) -> ctypes.CDLL:
+    """The hand-written runtime, compiled for a scheme, or for any.
+
+    Without the scheme `located` it compiles in half the time, which the first run of all waits for.
 
     Raises
     ------
     NoCompiler
         There is no compiler, or it fails.
     """
-    library = load("runtime", lambda: '#include "hs.c"\n')
-    library.hs_workspace.restype = ctypes.c_int64
-    library.hs_simulate.restype = None
-    library.hs_sample.restype = ctypes.c_int64
-    return library
+    name = scheme or next(iter(_loaded), tables.SCHEMES[-1])
+    with _loading:  # another thread may be at it: see `begin`
+        if name not in _loaded:
+            _loaded[name] = library = load(*_runtime(name))
+            library.hs_workspace.restype = ctypes.c_int64
+            library.hs_simulate.restype = None
+            library.hs_sample.restype = ctypes.c_int64
+    return _loaded[name]
+
+
+def begin(scheme: str) -> None:
+    """Compile the runtime for a scheme in another thread, where that has not been done."""
+
+    def compile_runtime() -> None:
+        with suppress(NoCompiler):  # who needs it will be told
+            runtime(scheme)
+
+    with suppress(NoCompiler):
+        if not is_kept(_runtime(scheme)[0]):
+            Thread(target=compile_runtime, daemon=True).start()
+
+
+def _runtime(scheme: str) -> tuple[str, Callable[[], str]]:
+    text = f'#define HS_HAS_LOCATED {int(scheme == "located")}\n#include "hs.c"\n'
+    return text, lambda: text
 
 
 class CompiledModel:
@@ -60,11 +87,11 @@ class CompiledModel:
     def workspace(self, method: tables.Method, scheme: str) -> int:
         """How many numbers a run needs for itself."""
         number = tables.SCHEMES.index(scheme)
-        return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
+        return runtime(scheme).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""
-        runtime().hs_simulate(ctypes.byref(task))
+        runtime(tables.SCHEMES[int(task.settings.scheme)]).hs_simulate(ctypes.byref(task))
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""

@@ -26,7 +26,7 @@ def load(content: str, source: Callable[[], str]) -> ctypes.CDLL:
         There is no compiler, or it fails.
     """
     compiler = find_compiler()
-    key = key_of(content, _our_text(), compiler.identity, " ".join(FLAGS), _processor())
+    key = _key(content, compiler)
     path = find(KIND, key)
     if path is not None:
         try:
@@ -37,6 +37,21 @@ def load(content: str, source: Callable[[], str]) -> ctypes.CDLL:
         return ctypes.CDLL(str(keep(KIND, key, ".so", lambda target: _compile(compiler, source(), target))))
     except OSError as refusal:
         return _load_unkept(compiler, source(), refusal)
+
+
+def is_kept(content: str) -> bool:
+    """Whether the library that ``content`` stands for was compiled before.
+
+    Raises
+    ------
+    NoCompiler
+        There is no compiler.
+    """
+    return find(KIND, _key(content, find_compiler())) is not None
+
+
+def _key(content: str, compiler: Compiler) -> str:
+    return key_of(content, _our_text(), compiler.identity, " ".join(FLAGS), _processor())
 
 
 @cache

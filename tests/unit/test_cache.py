@@ -15,8 +15,8 @@ import hsdsl
 from hsdsl import cache
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
-from hsdsl.model import seen
-from hsdsl.runtime import library
+from hsdsl.model import engines, seen
+from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
 
 ROOT = Path(__file__).parents[2]
@@ -161,3 +161,25 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
     command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
     said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
     assert "sympy" in said[0][-1] and said[1][-1] == "[]"
+
+
+@needs_compiler
+def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(engines.kernel, "begin", asked.append)
+    path = tmp_path / "m.yaml"
+    for text, scheme in (("{scheme: located}", None), ("{until: 1}", "located"), ("scheme: nothing", None)):
+        path.write_text(text)
+        engines.begin("auto", None, scheme, path)
+    engines.begin("python", None, "located", path)
+    engines.begin("auto", 50, "located", path)
+    engines.begin("auto", None, None, tmp_path / "none.yaml")
+    assert asked == [scheme for scheme in ("located", "located") if scheme in engines.SCHEMES]
+
+
+@needs_compiler
+def test_each_scheme_has_a_runtime_that_serves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel, "_loaded", {})
+    kernel.begin("relaxed")
+    assert kernel.runtime("relaxed") is kernel.runtime() is kernel.runtime("relaxed")
+    assert not kernel.is_kept("nothing") and kernel.is_kept(kernel._runtime("relaxed")[0])

@@ -5,6 +5,10 @@
 #include <time.h>
 
 #include "run.h"
+
+#ifndef HS_HAS_LOCATED /* a caller that needs only the other scheme can do without, and compile in half the time */
+#define HS_HAS_LOCATED 1
+#endif
 #include "hs_sample.h"
 
 #include "table.c"
@@ -181,7 +185,7 @@ void hs_simulate(hs_task *task) {
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0);
-  if (task->settings.scheme == HS_LOCATED)
+  if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else
     relaxed(&run, entered);
