@@ -114,4 +114,5 @@ def _prune(kind: Path) -> None:
 
 
 def _used(entry: str) -> float:
-    return max((file.stat().st_mtime for file in os.scandir(entry)), default=0.0)
+    """When an entry was last used; one that is being made has no file yet."""
+    return max((file.stat().st_mtime for file in os.scandir(entry)), default=os.stat(entry).st_mtime)

@@ -85,7 +85,7 @@ def _simulate(
 ) -> Execution:
     from hsdsl.model import engines, load, split_overrides
 
-    engines.begin(asked["engine"], asked["precision"], asked["scheme"], path)
+    engines.begin(path, *(asked[key] for key in ("engine", "precision", "scheme", "method")))
     model = load(path)
     names = _names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)

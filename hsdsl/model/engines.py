@@ -39,21 +39,22 @@ def check(engine: str) -> None:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
 
 
-def begin(engine: str, precision: int | None, scheme: str | None, path: Path) -> None:
+def begin(path: Path, engine: str, precision: int | None, scheme: str | None, method: str | None) -> None:
     """Compile the runtime while a model is read, where a run of it will need that and nobody has done it.
 
-    What the file seems to say of the scheme is taken for what it says; where that is wrong the right runtime is
-    compiled when it is needed.
+    What the file seems to say of its scheme and method is taken for what it says; where that is wrong the right runtime
+    is compiled when it is needed.
     """
     if engine == "python" or precision is not None:
         return
     try:
-        said = re.search(r"\bscheme: *(\w+)", path.read_text(encoding="utf-8", errors="replace"))
+        text = path.read_text(encoding="utf-8", errors="replace")
     except (OSError, ValueError):
         return  # who reads it next says what is wrong
-    scheme = scheme or (said[1] if said else DEFAULTS["scheme"])
+    said = {key: value for key, value in re.findall(r"\b(scheme|method): *(\w+)", text)}
+    scheme = scheme or said.get("scheme", DEFAULTS["scheme"])
     if scheme in SCHEMES:
-        kernel.begin(scheme)
+        kernel.begin(scheme, method or said.get("method", DEFAULTS["method"]))
 
 
 def choose(

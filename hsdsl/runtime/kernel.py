@@ -28,45 +28,51 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-_loaded: dict[str, ctypes.CDLL] = {}
+Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
+_loaded: dict[Parts, ctypes.CDLL] = {}
 _loading = Lock()
 
 
-def runtime(scheme: str | None = None) -> ctypes.CDLL:
-    """The hand-written runtime, compiled for a scheme, or for any.
+def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
+    """The hand-written runtime, compiled with what a scheme and a method need; whichever there is where none is named.
 
-    Without the scheme `located` it compiles in half the time, which the first run of all waits for.
+    The part of a large scheme or method takes longer to compile than all the rest, and the first run waits for it.
 
     Raises
     ------
     NoCompiler
         There is no compiler, or it fails.
     """
-    name = scheme or next(iter(_loaded), tables.SCHEMES[-1])
+    parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
     with _loading:  # another thread may be at it: see `begin`
-        if name not in _loaded:
-            _loaded[name] = library = load(*_runtime(name))
+        if parts not in _loaded:
+            library = load(_text(parts), lambda: _text(parts))
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.restype = None
             library.hs_sample.restype = ctypes.c_int64
-    return _loaded[name]
+            _loaded[parts] = library
+    return _loaded[parts]
 
 
-def begin(scheme: str) -> None:
-    """Compile the runtime for a scheme in another thread, where that has not been done."""
+def begin(scheme: str, method: str) -> None:
+    """Compile the runtime for a scheme and a method in another thread, where that has not been done."""
 
     def compile_runtime() -> None:
         with suppress(NoCompiler):  # who needs it will be told
-            runtime(scheme)
+            runtime(scheme, method)
 
     with suppress(NoCompiler):
-        if not is_kept(_runtime(scheme)[0]):
+        if not is_kept(_text(_parts(scheme, method))):
             Thread(target=compile_runtime, daemon=True).start()
 
 
-def _runtime(scheme: str) -> tuple[str, Callable[[], str]]:
-    text = f'#define HS_HAS_LOCATED {int(scheme == "located")}\n#include "hs.c"\n'
-    return text, lambda: text
+def _parts(scheme: str, method: str) -> Parts:
+    return scheme == "located", method == "radau"
+
+
+def _text(parts: Parts) -> str:
+    located, radau = map(int, parts)
+    return f'#define HS_HAS_LOCATED {located}\n#define HS_HAS_RADAU {radau}\n#include "hs.c"\n'
 
 
 class CompiledModel:
@@ -87,15 +93,19 @@ class CompiledModel:
     def workspace(self, method: tables.Method, scheme: str) -> int:
         """How many numbers a run needs for itself."""
         number = tables.SCHEMES.index(scheme)
-        return runtime(scheme).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
+        return _runtime(method, number).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""
-        runtime(tables.SCHEMES[int(task.settings.scheme)]).hs_simulate(ctypes.byref(task))
+        _runtime(task.method.contents, task.settings.scheme).hs_simulate(ctypes.byref(task))
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
+
+
+def _runtime(method: tables.Method, scheme: int) -> ctypes.CDLL:
+    return runtime(tables.SCHEMES[scheme], tables.METHOD_KINDS[int(method.kind)])
 
 
 def _source(program: Program) -> str:

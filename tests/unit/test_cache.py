@@ -79,6 +79,18 @@ def test_only_so_many_entries_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [cache.find("words", f"k{k}") is not None for k in range(6)] == [False] * 3 + [True] * 3
 
 
+def test_an_entry_that_is_being_made_stays(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setattr(cache, "MOST_ENTRIES", 1)
+    os.utime(cache.keep("words", "old", ".txt", write("word")), (1, 1))
+
+    def made_beside(path: Path) -> None:
+        cache.keep("words", "other", ".txt", write("other"))
+        path.write_text("new")
+
+    cache.keep("words", "new", ".txt", made_beside)
+    assert cache.find("words", "new") is not None and cache.find("words", "old") is None
+
+
 @needs_compiler
 def test_compiled_code_is_kept_and_made_again_where_damaged(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     program, made = hsdsl.load(MODELS[0]).program, []
@@ -165,21 +177,26 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
 
 @needs_compiler
 def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    asked: list[str] = []
-    monkeypatch.setattr(engines.kernel, "begin", asked.append)
+    asked: list[tuple[str, str]] = []
+    monkeypatch.setattr(engines.kernel, "begin", lambda *parts: asked.append(parts))
     path = tmp_path / "m.yaml"
-    for text, scheme in (("{scheme: located}", None), ("{until: 1}", "located"), ("scheme: nothing", None)):
+    for text, scheme, method in (
+        ("experiment: {scheme: located, method: radau}", None, None),
+        ("experiment: {until: 1, method: rk4}", "located", None),
+        ("experiment: {scheme: relaxed, method: rk4}", None, "taylor"),
+        ("experiment: {scheme: nothing}", None, None),
+    ):
         path.write_text(text)
-        engines.begin("auto", None, scheme, path)
-    engines.begin("python", None, "located", path)
-    engines.begin("auto", 50, "located", path)
-    engines.begin("auto", None, None, tmp_path / "none.yaml")
-    assert asked == [scheme for scheme in ("located", "located") if scheme in engines.SCHEMES]
+        engines.begin(path, "auto", None, scheme, method)
+    engines.begin(path, "python", None, "located", None)
+    engines.begin(path, "auto", 50, "located", None)
+    engines.begin(tmp_path / "none.yaml", "auto", None, None, None)
+    assert asked == [("located", "radau"), ("located", "rk4"), ("relaxed", "taylor")]
 
 
 @needs_compiler
-def test_each_scheme_has_a_runtime_that_serves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_runtime_has_the_parts_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel, "_loaded", {})
-    kernel.begin("relaxed")
-    assert kernel.runtime("relaxed") is kernel.runtime() is kernel.runtime("relaxed")
-    assert not kernel.is_kept("nothing") and kernel.is_kept(kernel._runtime("relaxed")[0])
+    kernel.begin("relaxed", "rk4")
+    assert kernel.runtime("relaxed", "rk4") is kernel.runtime() is kernel.runtime("relaxed", "taylor")
+    assert not kernel.is_kept("nothing") and kernel.is_kept(kernel._text((False, False)))
