@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -156,6 +157,7 @@ def _nearest(name: str) -> str | None:
     return f"did you mean '{best}'?" if best else None
 
 
+@lru_cache(maxsize=10_000)
 def symbol(name: str) -> sp.Symbol:
     """The symbol of a state, parameter or sampled input: real, and never a thing of SymPy's own."""
     return sp.Symbol(name, real=True)

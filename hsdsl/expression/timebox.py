@@ -86,13 +86,31 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
     finally:
         with lock:
             done.set()
-        if (
-            sent.is_set()
-        ):  # and perhaps has not arrived; to ask for none without need leaves CPython looking for it for ever
-            _raise_in(thread, None)
+        if sent.is_set():
+            _receive_last(thread)
         watcher.join()
 
 
-def _raise_in(thread: int, exception: type[BaseException] | None) -> None:
+class _Last(BaseException):
+    """Sent after :class:`OutOfTime`, in its place if that has not arrived."""
+
+
+def _receive_last(thread: int) -> None:
+    """Wait until no exception is on its way to this thread.
+
+    To take one back (to send none) would leave CPython 3.11 looking for it at every instruction, and for ever where a
+    profiler or a debugger is on.
+    """
+    if _send is None:
+        return
+    try:
+        _raise_in(thread, _Last)
+        while True:
+            time.sleep(0)
+    except _Last:
+        pass
+
+
+def _raise_in(thread: int, exception: type[BaseException]) -> None:
     if _send is not None:
-        _send(ctypes.c_ulong(thread), ctypes.py_object(exception) if exception else ctypes.c_void_p())
+        _send(ctypes.c_ulong(thread), ctypes.py_object(exception))

@@ -49,12 +49,13 @@ class Dynamics:
             self._values[symbol(parameter.name)] = replaced(parameter.value, self._values, {})
         self._done: dict[Any, Any] = {}
         self._rates: dict[Any, Any] = {}
+        self._slopes: dict[tuple[Any, Any], Any] = {}
         self._ranges: dict[tuple[str, ...], dict[Any, Range]] = {}
         self._remembered: dict[Any, Any] = {}
 
     def placed(self, expr: Any) -> Any:
         """An expression with the parameters' values."""
-        return replaced(sp.sympify(expr), self._values, self._done)
+        return replaced(expr if isinstance(expr, sp.Basic) else sp.sympify(expr), self._values, self._done)
 
     def residual(self, surface: Surface) -> Any:
         """The surface function r."""
@@ -79,14 +80,22 @@ class Dynamics:
             return None
         flow = self.flow(mode)
         present = sorted(expr.free_symbols & flow.keys(), key=lambda s: s.name)
-        parts = [expr.diff(s) * flow[s] for s in present]
-        return sp.Add(expr.diff(TIME), *parts) if TIME in expr.free_symbols else sp.Add(*parts)
+        parts = [self.slope(expr, s) * flow[s] for s in present]
+        return sp.Add(self.slope(expr, TIME), *parts) if TIME in expr.free_symbols else sp.Add(*parts)
 
     def gradient(self, mode: Mode, expr: Any) -> list[Any] | None:
         """The derivatives of an expression by time and the mode's states; None where it is too large."""
         if too_large([expr], MOST_PARTS):
             return None
-        return [expr.diff(s) for s in (TIME, *map(symbol, mode.states))]
+        return [self.slope(expr, s) for s in (TIME, *map(symbol, mode.states))]
+
+    def slope(self, expr: Any, by: Any) -> Any:
+        """The derivative of an expression by a name."""
+        if by not in expr.free_symbols:
+            return sp.S.Zero
+        if (expr, by) not in self._slopes:
+            self._slopes[expr, by] = expr.diff(by)
+        return self._slopes[expr, by]
 
     def domain(self, mode: Mode, without: Edge | None = None) -> Clause:
         """Where a mode's states belong (M1): every edge without `if`, and every wall."""
@@ -136,9 +145,12 @@ class Dynamics:
 
     def carried(self, expr: Any, edge: Edge) -> Any:
         """An expression of the target's states, in the states before the reset (M7)."""
-        moves = {symbol(s): self.placed(r) for s, r in zip(edge.target_states, edge.reset, strict=True)}
-        moves = {s: r for s, r in moves.items() if s != r}
+        moves = self.remembered(("moves", edge.source, edge.name), lambda: self._moves(edge))
         return replaced(expr, moves, {}) if expr.free_symbols & moves.keys() else expr
+
+    def _moves(self, edge: Edge) -> dict[Any, Any]:
+        moves = {symbol(s): self.placed(r) for s, r in zip(edge.target_states, edge.reset, strict=True)}
+        return {s: r for s, r in moves.items() if s != r}
 
     def remembered(self, key: Any, work: Callable[[], T]) -> T:
         """What was worked out under a key before, for rules that need the same."""

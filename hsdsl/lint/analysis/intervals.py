@@ -104,9 +104,10 @@ def integer_power(a: Intervals, exponent: int) -> Intervals:
         inside = (a.low < 0) & (a.high > 0)
         low, high = np.where(inside, 0.0, np.minimum(low, high)), np.maximum(low, high)
         wide = _widened(low, high)
-        return Intervals(np.where(low == 0, 0.0, np.maximum(wide.low, 0.0)), np.where(high == 0, 0.0, wide.high))
+        nothing = (a.low == 0) & (a.high == 0)  # not so where the power alone underflows to 0
+        return Intervals(np.where(low == 0, 0.0, np.maximum(wide.low, 0.0)), np.where(nothing, 0.0, wide.high))
     wide = _widened(low, high)
-    return Intervals(np.where(low == 0, 0.0, wide.low), np.where(high == 0, 0.0, wide.high))
+    return Intervals(np.where(a.low == 0, 0.0, wide.low), np.where(a.high == 0, 0.0, wide.high))
 
 
 def real_power(a: Intervals, b: Intervals) -> Intervals:

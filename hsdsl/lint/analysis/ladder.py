@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from hsdsl.errors import Decided
-from hsdsl.lint.analysis import boxes, exact
+from hsdsl.lint.analysis import boxes, exact, trial
 from hsdsl.lint.analysis.exact import Reduced
 from hsdsl.lint.analysis.intervals import Array
 from hsdsl.lint.analysis.points import ROUNDS, STARTS, Search
-from hsdsl.lint.analysis.polynomial import Polynomial, Ring, expression
+from hsdsl.lint.analysis.polynomial import Polynomial
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Range
+from hsdsl.lint.analysis.ring import Ring, expression
 from hsdsl.lint.analysis.tape import Tape, too_large
 from hsdsl.lower.straight import replaced
 
@@ -63,7 +64,7 @@ class Ladder:
         reduced = self._reduced(constraints, ranges)
         if reduced is None:
             return NEVER
-        point = exact.point(reduced, ranges)
+        point = trial.point(reduced, ranges)
         if point is not None:
             return Answer("somewhere", "symbolic", point)
         return self._numerically(constraints, ranges, reduced, prove)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import mpmath
@@ -19,6 +20,7 @@ from hsdsl.lint.analysis.intervals import Array, Intervals
 
 _NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name != "sqrt"}
 _NAMES |= {sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor", sp.Min: "min", sp.Max: "max"}  # where SymPy makes its own
+_MANY = 10_000
 _NOTHING = (np.nan, -np.inf, np.inf)  # of what is no function of the language, nothing is known
 
 
@@ -178,6 +180,9 @@ def _double(value: Fraction) -> float:
 
 def too_large(expressions: Iterable[Any], most: int) -> bool:
     """Whether expressions have more than ``most`` different parts."""
+    expressions = list(expressions)
+    if sum(map(_parts, expressions)) <= most:
+        return False
     seen: set[Any] = set()
     waiting = list(expressions)
     while waiting:
@@ -188,6 +193,16 @@ def too_large(expressions: Iterable[Any], most: int) -> bool:
                 return True
             waiting.extend(expr.args)
     return False
+
+
+@lru_cache(maxsize=20_000)
+def _parts(expr: Any) -> int:
+    """At least as many as an expression has different parts, counted as a tree; at most :data:`_MANY`."""
+    found, waiting = 0, [expr]
+    while waiting and found < _MANY:
+        found += 1
+        waiting.extend(waiting.pop().args)
+    return found
 
 
 def at_point(expr: Any, point: Mapping[Any, float]) -> float:
