@@ -8,7 +8,7 @@ piece is halved.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 
@@ -25,13 +25,15 @@ Function = Callable[[Number], Number]
 class Piece:
     """A surface on the part [start, start + width] of a step, by powers of the share of that part.
 
-    ``certain`` is False where the surface would not settle on a polynomial (a kink or jump inside a tiny part).
+    ``certain`` is False where the surface would not settle on a polynomial (a kink or jump inside a tiny part). ``off``
+    is how far an interpolation may be off: rises that are lower tell nothing.
     """
 
     start: Number
     width: Number
     coefficients: Coefficients
     certain: bool = True
+    off: Number = 0
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def deflated(pieces: list[Piece]) -> list[Piece]:
     """Take the first piece to begin at zero: the state stands on the surface, to round-off."""
     first = pieces[0]
     zero = first.coefficients[0] * 0
-    return [Piece(first.start, first.width, [zero, *first.coefficients[1:]], first.certain), *pieces[1:]]
+    return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
 
 
 def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Number) -> Iterator[Rise]:
@@ -60,7 +62,7 @@ def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Numbe
     outside = pieces[0].coefficients[0] > level
     for piece in pieces:
         c, at = piece.coefficients, piece.start * 0
-        zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at))
+        zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at), piece.off)
         while True:
             if outside:
                 below = rises([-a for a in c], zero, at, unit)
@@ -99,9 +101,10 @@ def interpolated(
     allowed: Callable[[int], Number],
     share: Number,
     arithmetic: Arithmetic,
+    far: bool = True,
 ) -> list[list[Piece]]:
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
-    their largest value, or ``allowed(k)`` more.
+    their largest value, or ``allowed(k)`` more; not ``far``, only to where the first of them is positive.
     """
     by, zero = interpolation(degree, arithmetic), arithmetic.zero
     nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
@@ -112,9 +115,10 @@ def interpolated(
         rows = list(zip(*(functions(start + width * s) for s in nodes), strict=True))
         checks = list(zip(*(functions(start + width * s) for s in tests), strict=True))
         pieces = [[total((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
+        off = [share * max(abs(r) for r in row) for row in rows]
         settled = [
-            settles(residual(c, tests, check), share * max(abs(r) for r in row), allowed, k)
-            for k, (c, row, check) in enumerate(zip(pieces, rows, checks, strict=True))
+            settles(residual(c, tests, check), enough, allowed, k)
+            for k, (c, check, enough) in enumerate(zip(pieces, checks, off, strict=True))
         ]
         if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < MOST_PIECES:
             half = width / 2
@@ -122,7 +126,9 @@ def interpolated(
             continue
         for k, row in enumerate(rows):
             c = pieces[k] if settled[k] else [row[0], row[-1] - row[0]]
-            found[k].append(Piece(start, width, c, settled[k]))
+            found[k].append(Piece(start, width, c, settled[k], off[k] if settled[k] else 0))
+        if not far and rows[0][-1] > 0:
+            break
     return found
 
 

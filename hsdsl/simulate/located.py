@@ -104,7 +104,7 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
     """Find the first point of a step where surface k is crossed and its condition holds."""
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
     pieces = deflated(span.curves[k]) if k in surfaces.stood_on else span.curves[k]
-    if span.ends[k] <= 0 and all(stays_below(piece.coefficients, zero) for piece in pieces):
+    if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
         return None
     first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
     for rise in rises_along(pieces, max(first, last), span.ends[k] > last, unit):

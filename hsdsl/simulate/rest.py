@@ -16,7 +16,7 @@ from hsdsl.simulate.run import Here, Run
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 PARALLEL = 1e-6
-OVER_TIME, CORRECTIONS = (6, 1e-12), 8  # degree and residual of the interpolation of a push; of its root
+OVER_TIME, CORRECTIONS = (8, 1e-9), 8  # degree and residual of the interpolation of a push; of its root
 
 
 def rests(run: Run, here: Here) -> int | None:
@@ -125,7 +125,7 @@ def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | 
         return (-push(run, here, k, order, t + s * span),)
 
     degree, share = OVER_TIME
-    pieces = interpolated(inward, 1, degree, lambda _: run.arithmetic.zero, share, run.arithmetic)[0]
+    pieces = interpolated(inward, 1, degree, lambda _: run.arithmetic.zero, share, run.arithmetic, far=False)[0]
     rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
     if rise is None:
         return None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from math import log2
 from typing import Protocol
 
@@ -246,22 +247,37 @@ class SeriesSteps:
         except DOMAIN_ERRORS:
             found = tuple(None for _ in ends)
         curves: list[list[Piece]] = []
+        half = (zero + 1) / 2
+
+        @cache
+        def middle() -> State:
+            return here.kernel.surfaces(t + half * h, *at(x, piece, half))
+
         for k, (row, end) in enumerate(zip(found, ends, strict=True)):
             scaled, power = list[Number](), zero + 1
             for c in row or ():
                 scaled.append(c * power)
                 power = power * h
-            if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k):
+            if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k, middle):
                 return interpolate(run, here, t, h, x, z, piece)
             curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
         return curves
 
-    def _converges(self, c: list[Number], end: Number, noise: Callable[[int], Number], k: int) -> bool:
-        """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step."""
+    def _converges(
+        self, c: list[Number], end: Number, noise: Callable[[int], Number], k: int, middle: Callable[[], State]
+    ) -> bool:
+        """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step.
+
+        One of a surface that is linear in the states need not run out: it is told by giving the surface to round-off.
+        """
         given, largest = self.run.control.tolerance, max(abs(a) for a in c)
         tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
         tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
-        return tail and settles(abs(value(c, end * 0 + 1) - end), tolerance * largest, noise, k)
+        one = end * 0 + 1
+        off = abs(value(c, one) - end)
+        if tail:
+            return settles(off, tolerance * largest, noise, k)
+        return off <= noise(k) and abs(value(c, one / 2) - middle()[k]) <= noise(k)
 
 
 def sizes_along(x: State, piece: Polynomial, s: Number) -> State:

@@ -4,7 +4,7 @@
 #define MOST_PIECES 1000
 #define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
 #define ROUNDING 8
-#define LEAST_MOST_DEGREE 6 /* of interpolation where a method asks for less */
+#define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
 
 typedef int hs_functions(hs_run *run, double s, double *values);
 typedef int hs_allowed(hs_run *run, int k, double *allowed);
@@ -24,6 +24,8 @@ typedef struct {
 static double *coefficients_of(const hs_curves *curves, int part, int k) {
   return curves->c + ((int64_t)part * curves->count + k) * curves->room;
 }
+
+static double *off_of(const hs_curves *curves, int part, int k) { return &curves->off[part * curves->count + k]; }
 
 static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
 
@@ -53,7 +55,8 @@ static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
     const int n = *degree_of(curves, walk->part, walk->k);
     double sizes = 0.0, high;
     for (int i = 0; i <= n; i++) sizes = sizes + fabs(c[i]);
-    const double above = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
+    const double least = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
+    const double above = hs_max(least, *off_of(curves, walk->part, walk->k));
     if (walk->outside) {
       if (!rises(run, c, n, -1.0, 0.0, walk->at, &walk->at)) continue;
       walk->outside = 0;
@@ -111,7 +114,8 @@ static int interpolate_part(hs_run *run, hs_functions *functions, const hs_inter
     }
     for (int i = 1; i < nodes; i++) largest = hs_max(largest, fabs(rows[i * count + k]));
     int *const certain = &curves->certain[part * count + k];
-    if (settles(run, residual(c, by, checks + k, count), by->share * largest, allowed, k, certain)) return RAISED;
+    const double off = *off_of(curves, part, k) = by->share * largest;
+    if (settles(run, residual(c, by, checks + k, count), off, allowed, k, certain)) return RAISED;
     *settled &= *certain;
     *degree_of(curves, part, k) = by->degree;
   }
@@ -128,13 +132,14 @@ static void straighten(hs_run *run, int degree) {
     c[0] = run->rows[k];
     c[1] = run->rows[degree * count + k] - run->rows[k];
     *degree_of(curves, part, k) = 1;
+    *off_of(curves, part, k) = 0;
   }
 }
 
 /* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
-   `allowed` more: to run->curves. */
+   `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. */
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
-                        hs_allowed *allowed) {
+                        hs_allowed *allowed, int far) {
   struct {
     double start, width;
     int halvings;
@@ -156,6 +161,7 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     }
     if (!settled) straighten(run, by->degree);
     curves->parts++;
+    if (!far && run->rows[by->degree * count] > 0) break;
   }
   return 0;
 }

@@ -136,6 +136,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   }
   run->ends = numbers(store, m);
   run->starts = numbers(store, m);
+  run->middle = numbers(store, m);
   run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
   run->second = numbers(store, 4 * (int64_t)run->model->lines);
   run->left = numbers(store, most + 1);
@@ -152,6 +153,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->curves.start = numbers(store, MOST_PARTS);
   run->curves.width = numbers(store, MOST_PARTS);
   run->curves.c = numbers(store, (int64_t)MOST_PARTS * m * run->curves.room);
+  run->curves.off = numbers(store, (int64_t)MOST_PARTS * m);
   run->curves.degree = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
   run->curves.certain = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
 }

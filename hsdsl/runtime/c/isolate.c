@@ -27,14 +27,14 @@ HS_INLINE double largest_of(const double *b, int n) {
   return most;
 }
 
-/* Whether the polynomial is nowhere above 0 on [0, 1], by bounds that may not see it. */
-static int stays_below(hs_run *run, const double *c, int n) {
+/* Whether the polynomial is nowhere above `level` on [0, 1], by bounds that may not see it. */
+static int stays_below(hs_run *run, const double *c, int n, double level) {
   double bound = c[0];
   for (int k = 1; k <= n; k++)
     if (c[k] > 0) bound = bound + c[k];
-  if (bound <= 0.0) return 1;
+  if (bound <= level) return 1;
   bernstein(run, c, n, 1.0, 0.0, run->cuts[0].b);
-  return largest_of(run->cuts[0].b, n) <= 0.0;
+  return largest_of(run->cuts[0].b, n) <= level;
 }
 
 /* Cut an interval at the share s: `left` gets the coefficients before it, `b` those behind it (de Casteljau). */

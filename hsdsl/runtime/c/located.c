@@ -10,7 +10,7 @@ static int is_passed_by(hs_run *run, int k) {
   if (run->stood_on[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
   if (!(run->ends[k] <= 0)) return 0;
   for (int i = 0; i < curves->parts; i++)
-    if (!stays_below(run, coefficients_of(curves, i, k), *degree_of(curves, i, k))) return 0;
+    if (!stays_below(run, coefficients_of(curves, i, k), *degree_of(curves, i, k), *off_of(curves, i, k))) return 0;
   return 1;
 }
 

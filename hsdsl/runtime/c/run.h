@@ -106,7 +106,7 @@ typedef struct {
 /* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
 typedef struct {
   int parts, count, room; /* room: numbers for each polynomial */
-  double *start, *width, *c;
+  double *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
@@ -154,7 +154,8 @@ typedef struct {
   hs_curves curves;
   hs_cut *cuts;
   double *binomials, *left, *rows, *second; /* second: series of order 2 */
-  double *q, *ends, *starts, *other_end, **other_k;
+  double *q, *ends, *starts, *middle, *other_end, **other_k;
+  int has_middle;
   int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
   hs_made made[FREE];

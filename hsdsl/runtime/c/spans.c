@@ -76,7 +76,7 @@ static int noise_at_ends(hs_run *run, int k, double *allowed) {
 /* Interpolate all surfaces along the step's interpolant. */
 static int interpolate(hs_run *run) {
   const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
-  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends);
+  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1);
 }
 
 static void begin_span(hs_run *run, double h, double t1) {
@@ -171,15 +171,27 @@ static int noise_at_end(hs_run *run, int k, double *allowed) {
   return 0;
 }
 
-/* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step. */
+/* Whether the polynomial c gives surface k to round-off in the middle of the step, by its interpolant. */
+static int meets_middle(hs_run *run, const double *c, int n, int k, double noise, int *answer) {
+  if (!run->has_middle && surfaces_along(run, 0.5, run->middle)) return RAISED;
+  run->has_middle = 1;
+  *answer = fabs(value_of(c, n, 0.5) - run->middle[k]) <= noise;
+  return 0;
+}
+
+/* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step.
+   One of a surface that is linear in the states need not run out: it is told by giving the surface to round-off. */
 static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
   const double given = run->control.tolerance, end = run->ends[k];
   const double tolerance = given > 0 ? hs_max(given, HS_UNIT) : UNKNOWN_TOLERANCE;
   double most = fabs(c[0]);
   for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
   *answer = fabs(c[n]) <= LAST_TERM * tolerance * most && fabs(c[n - 1]) <= TERM_BEFORE * tolerance * most;
-  if (!*answer) return 0;
-  return settles(run, fabs(value_of(c, n, 1.0) - end), tolerance * most, noise_at_end, k, answer);
+  const double off = fabs(value_of(c, n, 1.0) - end);
+  double noise;
+  if (*answer) return settles(run, off, tolerance * most, noise_at_end, k, answer);
+  if (noise_at_end(run, k, &noise)) return RAISED;
+  return off <= noise ? meets_middle(run, c, n, k, noise, answer) : 0;
 }
 
 /* The surfaces' series where they meet the surfaces at the step's end, interpolation for all where one does not. */
@@ -193,6 +205,7 @@ static int curves(hs_run *run) {
   if (!mode->surfaces) return 0;
   copy(run->starts, run->values, mode->surfaces);
   known = !mode->surface_series(p, order, run->lines);
+  run->has_middle = 0;
   found->parts = 1;
   found->count = mode->surfaces;
   found->start[0] = 0.0, found->width[0] = 1.0;
@@ -209,6 +222,7 @@ static int curves(hs_run *run) {
     if (!met) return interpolate(run);
     c[0] = run->starts[k];
     *degree_of(found, 0, k) = order;
+    *off_of(found, 0, k) = 0;
     found->certain[k] = 1;
   }
   return 0;
