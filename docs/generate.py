@@ -91,7 +91,7 @@ is refused, and a run stops where a flow has a value but no series (the square r
 
 RADAU = """A step is implicit: its increments solve a system of equations, by Newton's method with the derivatives of
 the flow, which come from the model's expressions. Derivatives and factored matrices are kept from step to step as long
-as they do, and a step keeps its length where it could grow by less than a fifth. The method is L-stable, so that what
+as they do, and a step keeps its length where it would change by little. The method is L-stable, so that what
 decays fast does not bound the step once it has decayed. Inside a step: the collocation polynomial, of degree 3 and
 order 3 in general (its error is O(h^4)), exact to order 5 at the step's end. The error estimate falls as h^4 and holds
 for the curve between the samples too; right after a switch to a fast decay the steps are therefore short enough to

@@ -20,6 +20,8 @@ Increments = tuple[Vector, Vector, Vector]
 Iteration = tuple[Vector, Increments]  # the largest change of each state, and the increments after it
 
 MOST = 7  # iterations of a step that has a tolerance
+RENEWED = 1e-3  # an iteration that leaves more than this of the one before has old derivatives,
+FEW = 2  # which matters where a step takes more than these
 LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
 DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
 SLOW = 0.5  # likewise for iterations that go on to round-off
@@ -40,11 +42,14 @@ class Convergence:
         What the last iteration left of the one before it; 1 where that is not known, or they do not converge.
     left : Number
         What all that follow would have added to the last of a step, relative to it.
+    aged : bool
+        Whether the derivatives they use should be renewed for the next step.
     """
 
     def __init__(self, tolerance: Number | None, arithmetic: Arithmetic) -> None:
         self._tolerance, self._arithmetic = tolerance, arithmetic
         self.rate = self.left = arithmetic.zero + 1
+        self.aged = False
 
     def to_tolerance(self, x: State, iterations: Iterator[Iteration]) -> Increments:
         """Iterate until what is left is a small share of the tolerance.
@@ -68,6 +73,7 @@ class Convergence:
                         return z
                     break
                 self.rate, left = rate, rate / (1 - rate)
+            self.aged = count > FEW and self.rate > RENEWED
             ahead = left * size
             if size == 0 or ahead <= enough:
                 self.left = left
@@ -77,7 +83,7 @@ class Convergence:
             if count == MOST or (before is not None and ahead > enough and size > noise):
                 break
             before = size
-        self.rate = self.left = one
+        self.rate, self.left, self.aged = one, one, True
         raise NoConvergence("an iteration that does not settle")
 
     def to_roundoff(self, x: State, iterations: Iterator[Iteration]) -> Increments:
@@ -95,12 +101,12 @@ class Convergence:
             rate = SLOW if not before else size / before
             reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
             if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
-                self.rate = rate
+                self.rate, self.aged = rate, rate > RENEWED
                 return z
             if before and rate >= SLOW:
                 if size <= allowed:
                     return z
-                self.rate = self._arithmetic.zero + 1
+                self.rate, self.aged = self._arithmetic.zero + 1, True
                 raise NoConvergence("an iteration that does not settle")
             before = size
         assert z is not None

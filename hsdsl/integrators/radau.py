@@ -24,8 +24,6 @@ from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConve
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
 
-RENEWED = 1e-3  # where an iteration leaves more than this of the one before, derivatives are too old for the next step
-
 
 @dataclass(frozen=True)
 class RadauMethod:
@@ -99,7 +97,7 @@ class Steps:
 
     def _solved(self, flow: Flow, t: Number, h: Number, x: State, exactly: bool) -> Increments:
         """Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do."""
-        if self._rows is None or (self._convergence.rate > RENEWED and self._derived_at != t):
+        if self._rows is None or (self._convergence.aged and self._derived_at != t):
             self._derive(t, x)
         settle = self._convergence.to_roundoff if exactly else self._convergence.to_tolerance
         guess = self._guess(t, h, x)

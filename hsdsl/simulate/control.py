@@ -6,8 +6,8 @@ above 1 after a rejection), order being the power of h that the estimate falls w
 be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
 
 An implicit method pays for each change of the step. For one the factor is also held down by what the ratio did over
-the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and a factor from 1 to 1.2 counts as 1.
-A stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) (1 + |x|).
+the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and one from 0.9 to 1.2 counts as 1. A
+stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) (1 + |x|).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hsdsl.simulate.settings import Settings
 
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 10_000
-BAND = 1.2  # an implicit step is kept where it could grow by less
+BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN, LEAST_BEFORE = 1e-10, 0.01  # error ratios below these count as these, of a step and of the one before
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
@@ -83,7 +83,7 @@ class Control:
             ahead = SAFETY * (taken / length) * self.power(last / (now * now), 1 / (now * 0 + self.order))
             factor = min(factor, max(LEAST, ahead))
         self.before = taken, max(LEAST_BEFORE, ratio)
-        return 1 if 1 <= factor <= BAND else factor
+        return 1 if BAND[0] <= factor <= BAND[1] else factor
 
     def reject(self, taken: Number, ratio: Number | None) -> None:
         """Shrink after a rejected, unhalved step; without a ratio it has no end at all."""

@@ -53,7 +53,7 @@ def test_engines_agree(name: str) -> None:
 
 @pytest.mark.parametrize("rate", [-1e4, -1e6])
 def test_order_of_a_curve_that_a_decay_holds(rate: float) -> None:
-    """For x' = rate (x - cos t) - sin t, steps far above 1/rate: the curve has order 4, its ends gain a factor h rate."""
+    """For x' = rate (x - cos t) - sin t, steps far above 1/rate: the curve has order 4, its ends are better still."""
     made = model(f"{{x: {rate!r}*(x - cos(t)) - sin(t)}}", "x: 1")
     steps, times = [0.2 / 2**k for k in range(5)], np.linspace(0, 2, 1001)
     runs = [made.simulate(step=step, until=2) for step in steps]

@@ -4,7 +4,8 @@
 #define LEAST 0.2
 #define MOST 5.0
 #define MOST_REJECTIONS 10000
-#define BAND 1.2
+#define BAND_FROM 0.9
+#define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
 #define LEAST_BEFORE 0.01
 
@@ -44,7 +45,7 @@ static double predicted(hs_control *control, double taken, double ratio) {
   }
   control->before = taken;
   control->ratio_before = hs_max(LEAST_BEFORE, ratio);
-  return 1 <= found && found <= BAND ? 1.0 : found;
+  return BAND_FROM <= found && found <= BAND_TO ? 1.0 : found;
 }
 
 static void accept(hs_control *control, double taken, double ratio) {

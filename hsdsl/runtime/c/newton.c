@@ -2,6 +2,8 @@
 
 #define MOST_ITERATIONS 7
 #define MOST_TO_ROUNDOFF 122 /* 16 - 2 log2(u) */
+#define RENEWED 1e-3
+#define FEW 2
 #define LEAST_LEFT 1e-3
 #define MOST_LEFT 0.03
 #define DIVERGING 0.99
@@ -19,6 +21,7 @@ HS_INLINE double scaled(const hs_run *run, int n) {
 
 static int unsettled(hs_convergence *convergence) {
   convergence->rate = 1.0;
+  convergence->aged = 1;
   return NO_CONVERGENCE;
 }
 
@@ -41,6 +44,7 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
       convergence->rate = rate;
       left = rate / (1 - rate);
     }
+    convergence->aged = count > FEW && convergence->rate > RENEWED;
     double ahead = left * size;
     if (size == 0 || ahead <= enough) {
       convergence->left = left;
@@ -77,6 +81,7 @@ HS_INLINE int to_roundoff(hs_run *run, int n, double t, double h) {
     const double size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
     if (size == 0 || (rate < SLOW_RATE && below_digits(run, n, rate))) {
       convergence->rate = rate;
+      convergence->aged = rate > RENEWED;
       return 0;
     }
     if (before != 0 && rate >= SLOW_RATE) return size <= allowed ? 0 : unsettled(convergence);

@@ -1,7 +1,5 @@
 /* Steps by Radau IIA. See hsdsl/integrators/radau.py. */
 
-#define RENEWED 1e-3
-
 /* The weighted sum of three vectors. */
 HS_INLINE void weighted3(int n, const double *w, double *const v[3], double *out) {
   for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
@@ -44,6 +42,7 @@ HS_INLINE int iterate(hs_run *run, int n, double t, double h) {
 static void radau_forget(hs_radau *radau) {
   radau->derived = radau->factored = radau->stepped = 0;
   radau->convergence.rate = radau->convergence.left = 1.0;
+  radau->convergence.aged = 0;
 }
 
 HS_INLINE int derive(hs_run *run, double t) {
@@ -107,7 +106,7 @@ HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly) {
 /* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */
 HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
   hs_radau *const radau = &run->radau;
-  const int renew = radau->convergence.rate > RENEWED && radau->derived_at != t;
+  const int renew = radau->convergence.aged && radau->derived_at != t;
   if ((!radau->derived || renew) && derive(run, t)) return NO_VALUE;
   int status = settle(run, n, t, h, exactly);
   if (status != NO_CONVERGENCE || radau->derived_at == t) return status;
@@ -135,10 +134,16 @@ HS_INLINE int estimate(hs_run *run, int n, double t, double h) {
   return 0;
 }
 
+/* The same to round-off, for any number of states. */
+static int solved_exactly(hs_run *run, double t, double h) {
+  return run->here.dimension ? solved(run, run->here.dimension, t, h, 1) : 0;
+}
+
 HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
   hs_radau *const radau = &run->radau;
   if (!n) return 0;
-  const int adaptive = run->control.tolerance > 0, status = solved(run, n, t, h, !adaptive);
+  const int adaptive = run->control.tolerance > 0;
+  const int status = adaptive ? solved(run, n, t, h, 0) : solved_exactly(run, t, h);
   if (status) return status;
   radau->stepped = 1;
   radau->start = t;
@@ -149,22 +154,20 @@ HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
   return 0;
 }
 
-/* Try a step, solved as well as its tolerance asks for; for a few states the compiler is told how many. */
+/* Try a step, solved as well as its tolerance asks for; for two or three states the compiler is told how many. */
 static int radau_step(hs_run *run, double t, double h) {
   switch (run->here.dimension) {
-    case 1: return radau_step_in(run, 1, t, h);
     case 2: return radau_step_in(run, 2, t, h);
     case 3: return radau_step_in(run, 3, t, h);
-    case 4: return radau_step_in(run, 4, t, h);
     default: return radau_step_in(run, run->here.dimension, t, h);
   }
 }
 
 /* Make a part of the last step, solved to round-off: its end, run->z, is a smooth function of its length. */
 static int radau_landing(hs_run *run, double t, double h) {
-  const int n = run->here.dimension, status = n ? solved(run, n, t, h, 1) : 0;
+  const int status = solved_exactly(run, t, h);
   if (status) return status;
-  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + run->radau.z[2][s];
+  for (int s = 0; s < run->here.dimension; s++) run->z[s] = run->x[s] + run->radau.z[2][s];
   return 0;
 }
 

@@ -68,9 +68,11 @@ typedef struct {
   int64_t accepted, rejected;
 } hs_control;
 
-/* How iterations converge: what the last one left of the one before, and what all that follow would have added. */
+/* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
+   the derivatives should be renewed for the next step. */
 typedef struct {
   double rate, left;
+  int aged;
 } hs_convergence;
 
 /* What Radau IIA knows from one step to the next, and what it works with: vectors of `width`, matrices of its square. */

@@ -1,0 +1,102 @@
+"""What the stiff method needs on known stiff problems, beside SciPy's Radau, which is the same method.
+
+For each problem of `tests/convergence/stiff` and tolerance: the error at the end relative to 1 + |x|, steps accepted,
+derivatives, factorings of the pair of matrices, iterations (three flows each), and time by the compiled engine, warm.
+SciPy counts evaluations of the flow, and factorings one matrix at a time. Its tolerances are the same numbers; the two
+do not mean the same by them, so errors are to be compared as well.
+
+    python benchmarks/stiff.py [--repetitions 20]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import hsdsl
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.backends.python import PythonKernel
+from hsdsl.integrators import radau
+
+PROBLEMS = sorted((Path(__file__).parents[1] / "tests" / "convergence" / "stiff").glob("*.yaml"))
+TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-11)
+
+
+def counted(model: Any, tolerance: float) -> tuple[int, int, int]:
+    """What one run asks for: derivatives, factorings, iterations. The engines take the same steps; Python's count."""
+    made: list[radau.Steps] = []
+    plain = radau.Steps.__init__
+
+    def init(self: radau.Steps, *arguments: Any) -> None:
+        plain(self, *arguments)
+        made.append(self)
+
+    radau.Steps.__init__ = init  # type: ignore[method-assign]
+    try:
+        model.simulate(tolerance=tolerance, engine="python")
+    finally:
+        radau.Steps.__init__ = plain  # type: ignore[method-assign]
+    return sum(s.derived for s in made), sum(s.factorings for s in made), sum(s.iterations for s in made)
+
+
+def fastest(run: Any, repetitions: int) -> float:
+    """Seconds of the fastest of several runs."""
+    times: list[float] = []
+    for _ in range(repetitions):
+        began = perf_counter()
+        run()
+        times.append(perf_counter() - began)
+    return min(times)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repetitions", type=int, default=20)
+    repetitions = parser.parse_args().repetitions
+    for path in PROBLEMS:
+        model = hsdsl.load(path)
+        kernel = PythonKernel(model.program, FLOAT64)
+        known = model.system.reference[0]["states"][0]
+        field, slopes = kernel.bind(0, ()).flow, kernel.jacobian(0, ())
+        first = model.simulate(tolerance=1e-6)
+        start, n, until = first.values[0], len(first.values[0]), first.stop.time
+        wanted = np.array([float(known[name]) for name in first.final.state])
+        print(f"{path.stem}: {n} states, to t = {until:g}")
+        for tolerance in TOLERANCES:
+            run = model.simulate(tolerance=tolerance, engine="c")
+            error = np.max(np.abs(run.values[-1] - wanted) / (1 + np.abs(wanted)))
+            derived, factored, iterations = counted(model, tolerance)
+            spent = fastest(lambda: model.simulate(tolerance=tolerance, engine="c"), repetitions)  # noqa: B023
+            print(
+                f"  {tolerance:.0e}  ours   error {error:.1e}  steps {len(run.times) - 1:6}  J {derived:5}  "
+                f"LU {factored:5}  iterations {iterations:6}  {1e6 * spent:9.0f} us"
+            )
+
+            def theirs() -> Any:
+                return solve_ivp(
+                    lambda t, x: field(t, *x),  # noqa: B023
+                    (0, until),  # noqa: B023
+                    start,  # noqa: B023
+                    "Radau",
+                    jac=lambda t, x: np.reshape(slopes(t, *x), (n, n)),  # noqa: B023
+                    rtol=tolerance,  # noqa: B023
+                    atol=tolerance,  # noqa: B023
+                )
+
+            began = perf_counter()
+            found = theirs()
+            spent = perf_counter() - began
+            error = np.max(np.abs(found.y[:, -1] - wanted) / (1 + np.abs(wanted)))
+            print(
+                f"         SciPy  error {error:.1e}  steps {len(found.t) - 1:6}  J {found.njev:5}  "
+                f"LU {found.nlu // 2:5}  iterations {found.nfev // 3:6}  {1e6 * spent:9.0f} us"
+            )
+
+
+if __name__ == "__main__":
+    main()
