@@ -211,9 +211,8 @@ def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float], t
     run = model(tmp_path, "{x: -sign(x)}", "x: 1", 2).simulate(scheme=scheme, **size)
     assert run.stop.reason == "step_underflow"
     assert abs(run.final.state["x"]) <= size.get("tolerance", 1e-8)
-    assert (
-        1 - 1e-8 <= run.stop.time <= 1 + 1e-2
-    )  # it gives up after ten thousand rejections, each of a step about as long as the tolerance
+    most = 1e4 * 1e-6  # it gives up after ten thousand rejections, of steps about as long as the tolerance
+    assert 1 - 1e-8 <= run.stop.time <= 1 + most
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
