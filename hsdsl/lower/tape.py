@@ -4,8 +4,8 @@
 
 A function of one argument u is a line of the kind z' = g u', with its derivative g a line of its own (which may use z:
 the coefficient k of z needs g up to k - 1 only), and u' another, which all functions of u share. Other kinds have the
-recurrences of products, quotients and powers. What is a polynomial of time alone is known as such, so that sums along it
-are short. Equal operations are one line.
+recurrences of products, quotients and powers. What is a polynomial of time alone is known as such, so that sums along
+it are short. Equal operations are one line.
 
 See A. Griewank and A. Walther, *Evaluating Derivatives*, Sec. 13.2 (doi:10.1137/1.9780898717761).
 """
