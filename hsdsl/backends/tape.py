@@ -1,7 +1,9 @@
 """A tape's lines as text: what coefficient 0 of each is, and what coefficient k > 0 is, in Python and in C.
 
 Coefficient 0 is the operation itself, in the language of routines (`hsdsl.program`). The others are the recurrences of
-`recurrences.py`, in C those of `runtime/c/hs_series.h`; the text of both is the same up to how things are named.
+`recurrences.py`, in C those of `runtime/c/hs_series.h`; the text of both is the same up to how things are named. A
+division by k is a product with ``inverse[k]``, which is 1/k rounded: coefficients wait for each other, and a division
+takes long.
 """
 
 from __future__ import annotations
@@ -42,16 +44,16 @@ COEFFICIENTS = {
     "under": "-{call}behind(k, {U}, {Z}) / {U}[0]",
     "sqrt": "{call}root(k, {Z}, {u}{bad})",
     "pow": "{call}power(k, {Z}, {U}, {c}{bad})",
-    "atan2": "({call}behind(k, {A}, {G}) + {call}behind(k, {B}, {W})) / k",
+    "atan2": "({call}behind(k, {A}, {G}) + {call}behind(k, {B}, {W})) * {call}inverse[k]",
 }
-COEFFICIENT = "{call}behind(k, {V}, {G}) / k"
+COEFFICIENT = "{call}behind(k, {V}, {G}) * {call}inverse[k]"
 # where a sum goes along a polynomial of time
 SHORT = {
     "mul": "{call}few(k, {U}, {V}, {last}) + {U}[0]*{v}",
     "div": "({u} - {call}few(k, {V}, {Z}, {last})) / {V}[0]",
     "under": "-{call}few(k, {U}, {Z}, {last}) / {U}[0]",
 }
-SHORT_COEFFICIENT = "{call}few(k, {V}, {G}, {last}) / k"
+SHORT_COEFFICIENT = "{call}few(k, {V}, {G}, {last}) * {call}inverse[k]"
 
 
 @dataclass(frozen=True)

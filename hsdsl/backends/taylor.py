@@ -24,6 +24,7 @@ HELPERS: dict[str, Any] = {
     "root": root,
     "square": square,
 }
+INVERSE = "    inverse = [zero, *(one/m for m in range(1, order + 2))]"
 PYTHON = Language(
     series="l{}".format,
     value="l{}[0]".format,
@@ -70,16 +71,16 @@ def text_of(tape: Tape, dimension: int) -> str:
     """Write ``flow_of(constants)`` and ``surfaces_of(constants)``, which return the functions of a `Taylor`."""
     states, first, count = range(1, dimension + 1), dimension + 1, tape.constant_count
     own, after = range(first, first + tape.needed), range(first + tape.needed, first + len(tape.operations))
-    body = [f"def flow_of({_names('c', range(count))}):", "  def flow(order, t, x):"]
+    body = [f"def flow_of({_names('c', range(count))}):", "  def flow(order, t, x):", INVERSE]
     body += ["    l0 = [t, one] + [zero]*order", *(f"    l{i} = [x[{i - 1}]]" for i in states)]
     body += _values(tape, own, first)
     body += [f"    l{i}.append(l{tape.flow[i - 1]}[0])" for i in states]
     body += ["    for k in range(1, order + 1):", "      m = k + 1", *_coefficients(tape, own, first)]
-    body += [f"      l{i}.append(l{tape.flow[i - 1]}[k]/m)" for i in states]
+    body += [f"      l{i}.append(l{tape.flow[i - 1]}[k]*inverse[m])" for i in states]
     every = _names("l", range(first + tape.needed))
     body += [f"    return ({every})", "  return flow"]
     body += [f"def surfaces_of({_names('c', range(count + tape.surface_constant_count))}):"]
-    body += ["  def surfaces(order, lines):", f"    ({every}) = lines", *_values(tape, after, first)]
+    body += ["  def surfaces(order, lines):", f"    ({every}) = lines", INVERSE, *_values(tape, after, first)]
     body += ["    for k in range(1, order + 1):", "      pass", *_coefficients(tape, after, first)]
     found = "".join("None, " if line is None else f"l{line}[:order + 1], " for line in tape.surfaces)
     return "\n".join([*body, f"    return ({found})", "  return surfaces", ""])

@@ -66,7 +66,7 @@ def flow_lines(tape: Tape, dimension: int) -> str:
     values = [f"l{i}[0] = {value(i)};" for i in states] + _values(tape, own, first, value)
     values += [f"l{i}[1] = {value(tape.flow[i - 1])};" for i in states]
     coefficients = _coefficients(tape, own, first, newest)
-    coefficients += [f"l{i}[k + 1] = {newest(tape.flow[i - 1])} / (k + 1);" for i in states]
+    coefficients += [f"l{i}[k + 1] = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
     return _filled(_FLOW, values, coefficients)
 
 

@@ -10,6 +10,11 @@
 
 #define HS_INTEGER_POWERS 64
 
+static const double hs_inverse[HS_MOST_ORDER + 2] = {
+  0.0, 1.0 / 1, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10, 1.0 / 11, 1.0
+  / 12, 1.0 / 13, 1.0 / 14, 1.0 / 15, 1.0 / 16, 1.0 / 17, 1.0 / 18, 1.0 / 19, 1.0 / 20, 1.0 / 21, 1.0 / 22, 1.0
+  / 23, 1.0 / 24, 1.0 / 25, 1.0 / 26, 1.0 / 27, 1.0 / 28, 1.0 / 29, 1.0 / 30, 1.0 / 31};
+
 static inline double hs_pairs(int k, const double *a, const double *b, int first) {
   double low = 0.0, high = k % 2 ? 0.0 : a[k / 2] * b[k / 2];
   for (int j = (k - 1) / 2; j >= first; j--) {
