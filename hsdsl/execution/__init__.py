@@ -23,6 +23,7 @@ arcs           A x Arc        first and last row (inclusive), mode, states, kind
 Numbers are float64, or objects (mpmath) for a run at higher precision.
 """
 
+from hsdsl.execution.ensemble import Ensemble, Failure
 from hsdsl.execution.parts import REASONS, Arc, Kind, Point, Stop, Transition, Verdict
 from hsdsl.execution.run import Execution, OutputFunction
 from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
@@ -33,8 +34,10 @@ __all__ = [
     "REASONS",
     "Arc",
     "Array",
+    "Ensemble",
     "Evaluated",
     "Execution",
+    "Failure",
     "Kind",
     "OutputFunction",
     "Point",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.backends.python import PythonKernel
 from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
+from hsdsl.execution import Ensemble, Execution
 from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.limits import Limits, applied
 from hsdsl.model import engines, seen
@@ -224,6 +224,56 @@ class Model:
             chosen = replace(chosen, one_stop=one_stop(values, x))
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
+
+    def ensemble(
+        self,
+        *,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        samples: Any = None,
+        transition_times: int = 0,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **asked: Any,
+    ) -> Ensemble:
+        """Run many instances of the model, on all cores where there is a compiler.
+
+        Every instance gives what :meth:`simulate` gives, to the last bit. Ctrl-C keeps those that are done.
+
+        Parameters
+        ----------
+        parameters, initial : mapping, optional
+            Overrides by name: numbers, expressions, or arrays of numbers. Arrays are brought to a common shape, as
+            NumPy does; each of its elements is an instance.
+        samples : int or sequence of float, optional
+            Sample every run: at so many equally spaced times from 0 to its ``until``, or at these times.
+        transition_times : int
+            Keep the times of so many first transitions of each run.
+        threads : int, optional
+            How many; left out, as many as there are cores for this process.
+        progress : callable, optional
+            Called now and then with how many instances are done and how many there are.
+        **asked
+            What else :meth:`simulate` takes for every instance: ``until``, ``scheme``, ``method``, ``step``,
+            ``tolerance``, ``relaxation``, ``max_transitions``, ``settings``, ``engine``.
+
+        Raises
+        ------
+        UsageError
+            What cannot be served: a name, arrays of different shapes, no instance that can be run.
+        """
+        from hsdsl.model.ensemble import Asked, check, cores, ready
+
+        check(asked, threads, transition_times)
+        sorted_out = Asked.of(parameters or {}, initial or {}, samples, transition_times, asked)
+        values = self._values(FLOAT64)
+        return ready(self, values, sorted_out, self._prepare_single).run(threads or cores(), progress)
+
+    def _prepare_single(self, asked: dict[str, Any]) -> Prepared:
+        """Prepare what :meth:`simulate` would run."""
+        settings = {key: asked.get(key) for key in KEYS}
+        engine = asked.get("engine", "auto")
+        return self._prepare(asked.get("settings"), settings, asked["parameters"], asked["initial"], engine, None)
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""

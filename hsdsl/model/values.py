@@ -61,14 +61,7 @@ class Values:
         if isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
             return arithmetic.constant(Fraction(value.strip()))
         if isinstance(value, str):
-            from hsdsl.elaborate import parameter_expression
-            from hsdsl.lower import lower_expressions
-
-            known = self.program.parameters[: len(self.parameters)]
-            expression = parameter_expression(self.system, value, where, allowed=known)
-            routine = compile_routines(lower_expressions(self.system, {"value": expression}), arithmetic, where)()[0]
-            missing = len(self.program.parameters) - len(self.parameters)
-            return routine(*self.parameters, *(arithmetic.zero,) * missing)[0]
+            return self.routine(value, where, len(self.parameters))(*self.parameters)[0]
         if isinstance(value, bool) or value is None:
             raise UsageError(f"{where}: a number or an expression is wanted, not {value}")
         if hasattr(value, "_mpf_"):
@@ -77,6 +70,20 @@ class Values:
             return arithmetic.constant(Fraction(value))
         except (TypeError, ValueError, OverflowError):
             raise UsageError(f"{where}: a finite number or an expression is wanted, not {value!r}") from None
+
+    def routine(self, value: Any, where: str, known: int) -> Callable[..., Sequence[Number]]:
+        """Return a function of the first ``known`` parameters for a number or an expression of them."""
+        if not isinstance(value, str) or _NUMBER.fullmatch(value.strip()):
+            number = self.number(value, where)
+            return lambda *_: (number,)
+        from hsdsl.elaborate import parameter_expression
+        from hsdsl.lower import lower_expressions
+
+        arithmetic, names = self.kernel.arithmetic, self.program.parameters
+        expression = parameter_expression(self.system, value, where, allowed=names[:known])
+        routine = compile_routines(lower_expressions(self.system, {"value": expression}), arithmetic, where)()[0]
+        missing = (arithmetic.zero,) * (len(names) - known)
+        return lambda *parameters: routine(*parameters, *missing)
 
     def constant(self, name: str) -> tuple[Number, ...]:
         """Evaluate one of the program's constants; its numbers must be finite."""

@@ -50,6 +50,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.restype = None
             library.hs_sample.restype = ctypes.c_int64
+            library.hs_run_ensemble.restype = None
             _loaded[parts] = library
     return _loaded[parts]
 
@@ -98,6 +99,11 @@ class CompiledModel:
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""
         _runtime(task.method.contents, task.settings.scheme).hs_simulate(ctypes.byref(task))
+
+    def run_ensemble(self, ensemble: tables.Ensemble) -> None:
+        """Run instances to their end; the interpreter is free meanwhile."""
+        task = ensemble.task
+        _runtime(task.method.contents, task.settings.scheme).hs_run_ensemble(ctypes.byref(ensemble))
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""

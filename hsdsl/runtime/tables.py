@@ -271,6 +271,12 @@ class Task(ctypes.Structure):
     )
 
 
+ENSEMBLE_COLUMNS = (
+    "timeline", "settings", "start", "time", "layout_of", "stop", "reason", "mode", "kind", "transitions", "ended",
+    "final", "outputs", "crossed", "states", "results",
+)  # fmt: skip
+
+
 class Sampling(ctypes.Structure):
     """``hs_sampling``."""
 
@@ -296,9 +302,27 @@ class Sampling(ctypes.Structure):
     )
 
 
+class Ensemble(ctypes.Structure):
+    """``hs_ensemble``."""
+
+    task: Task
+    sampling: Sampling
+    done: int
+
+    _fields_ = (
+        ("task", Task),
+        ("sampling", Sampling),
+        *((name, c_int64) for name in ("instances", "samples", "most_transitions")),
+        *((name, c_void_p) for name in ENSEMBLE_COLUMNS),
+        *((name, c_int64) for name in ("done", "base", "made", "next")),
+        ("layout", c_int32),
+        ("layouts", c_void_p),
+    )
+
+
 STRUCTURES = (  # as in hs_sizes
     Edge, Mode, Model, Row, Collocation, Method, Timeline, Interpolation, Settings,
-    Chunk, Visited, Stop, Task, Sampling,
+    Chunk, Visited, Stop, Task, Sampling, Ensemble,
 )  # fmt: skip
 
 

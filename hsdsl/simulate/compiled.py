@@ -67,21 +67,12 @@ class CompiledPlan:
         assert settings.method is not None
         method, model = tables.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
-        self.compiled, self.states = compiled, states
+        self.program, self.compiled, self.states = program, compiled, states
         self.one_layout = all(m.states == states or (m.final and not m.states) for m in program.modes)
         scheme = settings.scheme
         key = settings.method, scheme, shape
         self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))
-        control = make_control(settings, FLOAT64)
-        self._settings = tables.Settings(
-            control.h,
-            control.tolerance or 0.0,
-            control.largest,
-            settings.relaxation,
-            settings.until,
-            min(settings.max_transitions, 2**62),
-            tables.SCHEMES.index(scheme),
-        )
+        self._settings = task_settings(settings)
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(timeline)
         self.timeline = self._columns.pointer
@@ -97,6 +88,20 @@ class CompiledPlan:
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
         task.mode, (task.dimension, task.x) = self._mode, self._start
+
+
+def task_settings(settings: Settings) -> tables.Settings:
+    """Write settings as the runtime takes them."""
+    control = make_control(settings, FLOAT64)
+    return tables.Settings(
+        control.h,
+        control.tolerance or 0.0,
+        control.largest,
+        settings.relaxation,
+        settings.until,
+        min(settings.max_transitions, 2**62),
+        tables.SCHEMES.index(settings.scheme),
+    )
 
 
 def _interpolations(settings: Settings) -> Any:

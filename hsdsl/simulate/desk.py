@@ -24,9 +24,11 @@ MOST_KEPT = 4  # desks of one model and method
 class Desk:
     """One task with its memory. One run works there at a time."""
 
-    def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
+    def __init__(
+        self, task: tables.Task, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape
+    ) -> None:
         model = compiled.table
-        self.task = tables.Task()
+        self.task, self.degree = task, shape.degree
         self.pressed, self.failed = False, list[BaseException]()
         self.chunks = Chunks(self.task.chunk, shape)
         self._width = model.width
@@ -91,7 +93,11 @@ class Desks:
         try:
             return self._free.pop()
         except IndexError:
-            return Desk(*self._made_of)
+            return self.new(tables.Task())
+
+    def new(self, task: tables.Task) -> Desk:
+        """Make a desk for a task."""
+        return Desk(task, *self._made_of)
 
     def leave(self, desk: Desk) -> None:
         """Let the next run have a desk."""

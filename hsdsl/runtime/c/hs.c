@@ -14,7 +14,7 @@
 #define HS_HAS_RADAU 1
 #endif
 
-#include "hs_sample.h"
+#include "hs_ensemble.h"
 
 #include "table.c"
 #include "taylor.c"
@@ -198,9 +198,11 @@ void hs_simulate(hs_task *task) {
     relaxed(&run, entered);
 }
 
+#include "ensemble.c"
+
 /* Sizes of the structures a caller fills, so that it can check its own idea of them. */
 HS_EXPORT const int64_t hs_sizes[] = {
     sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_collocation),
     sizeof(hs_method), sizeof(hs_timeline),
     sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task),
-    sizeof(hs_sampling)};
+    sizeof(hs_sampling), sizeof(hs_ensemble)};

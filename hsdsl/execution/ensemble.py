@@ -1,0 +1,117 @@
+"""Many runs of one model at once: what is kept of each, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hsdsl.execution.run import Execution
+from hsdsl.execution.samples import Array
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An instance that did not get to where it was going.
+
+    ``reason`` is one of :data:`hsdsl.execution.REASONS`, or ``refused``: it could not be started. ``message`` is the
+    sentence for a person.
+    """
+
+    index: tuple[int, ...]
+    reason: str
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """The runs of an ensemble. Every array begins with :attr:`shape`, the common shape of what was varied.
+
+    Attributes
+    ----------
+    varied : dict
+        Values of the parameters, and of initial states as ``initial.NAME``, that were varied.
+    stop : array of str
+        Why each run ended: one of :data:`hsdsl.execution.REASONS`; ``refused`` where an instance could not be started,
+        ``interrupted`` where Ctrl-C came first.
+    time : array of float
+        When it ended (not-a-number where it was not run).
+    mode : array of str
+        The mode at the end; empty where it was not run.
+    state, outputs : dict of array
+        Values at the end by name, not-a-number where the mode lacks the state.
+    transitions : array of int
+        How many were made.
+    transition_times : array, shape (..., n)
+        Times of the first n transitions, if they were asked for; not-a-number where fewer were made.
+    sample_times : array, shape (..., n)
+    samples : dict of array, shape (..., n)
+        States and outputs at these times by name, not-a-number beyond a run's end; empty where none were asked for.
+    """
+
+    model: str
+    digest: str
+    engine: str
+    scheme: str
+    method: str
+    shape: tuple[int, ...]
+    varied: dict[str, Array]
+    stop: Array
+    time: Array
+    mode: Array
+    state: dict[str, Array]
+    outputs: dict[str, Array]
+    transitions: Array
+    transition_times: Array
+    sample_times: Array
+    samples: dict[str, Array]
+    seconds: dict[str, float]
+    refusals: Mapping[tuple[int, ...], str]
+    again: Callable[[tuple[int, ...]], Execution] = field(repr=False)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
+        return f"<Ensemble of {self.model}: {self.scheme} {self.method}, shape {self.shape}, stops: {counts or 'none'}>"
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """How many instances ended for which reason."""
+        found, counts = np.unique(self.stop, return_counts=True)
+        return dict(zip(found.tolist(), counts.tolist(), strict=True))
+
+    @property
+    def failed(self) -> Array:
+        """Which instances did not get to where they were going: array of bool."""
+        return ~np.isin(self.stop, ("until", "final"))
+
+    def failures(self, most: int = 100) -> tuple[Failure, ...]:
+        """Name the first failed instances; each is run again for its message.
+
+        Parameters
+        ----------
+        most : int
+            How many to name.
+        """
+        places = [tuple(map(int, place)) for place in np.argwhere(self.failed)[:most]]
+        return tuple(self._failure(place) for place in places)
+
+    def _failure(self, place: tuple[int, ...]) -> Failure:
+        reason = str(self.stop[place])
+        if reason == "refused":
+            return Failure(place, reason, self.refusals[place])
+        if reason == "interrupted":
+            return Failure(place, reason, "the ensemble was interrupted before this instance was run to its end")
+        return Failure(place, reason, self.run(*place).stop.message)
+
+    def run(self, *index: int) -> Execution:
+        """Run one instance by itself: the whole execution.
+
+        Raises
+        ------
+        IndexError
+            There is no such instance.
+        """
+        if len(index) != len(self.shape) or any(not -n <= i < n for i, n in zip(index, self.shape, strict=True)):
+            raise IndexError(f"an index of an ensemble of shape {self.shape} is wanted, not {index}")
+        return self.again(tuple(i % n for i, n in zip(index, self.shape, strict=True)))

@@ -1,0 +1,98 @@
+/* Many instances of one model, of which little is kept. See hsdsl/simulate/ensemble.py. */
+
+/* Evaluate the samples that fall into the chunk; at its last time a later row may still follow, unless it is the end. */
+static void sample_chunk(hs_ensemble *e, int at_end) {
+  const hs_chunk *chunk = &e->task.chunk;
+  hs_sampling *s = &e->sampling;
+  for (int64_t k = 0; e->layout_of && k < chunk->arcs; k++) {
+    const int32_t layout = e->layout_of[chunk->arc[k].mode];
+    e->layouts[k] = e->layout = layout >= 0 ? layout : e->layout;
+  }
+  const int64_t instance = e->done, rows = chunk->rows;
+  const double *time = e->time + instance * e->samples, last = chunk->times[rows - 1];
+  const double reach = at_end ? last + HS_TIE * hs_max(1.0, fabs(last)) : last;
+  int64_t count = 0;
+  while (e->next + count < e->samples && (at_end ? time[e->next + count] <= reach : time[e->next + count] < reach)) count++;
+  if (!count) return;
+  for (int64_t k = 0; k < chunk->arcs; k++) chunk->arc[k].first -= e->base;
+  s->timeline = e->task.timeline;
+  s->rows = rows, s->arcs = chunk->arcs, s->samples = count;
+  s->times = chunk->times, s->values = chunk->values, s->recorded = chunk->outputs, s->arc = chunk->arc;
+  s->pieces = chunk->pieces + (int64_t)s->degree * s->width;
+  s->layout = e->layout_of ? e->layouts : 0;
+  s->results = e->results + (instance * e->samples + e->next) * s->outputs;
+  for (int64_t i = 0; i < count + HS_BLOCK; i++) s->time[i] = i < count ? time[e->next + i] : 0.0;
+  hs_sample(s);
+  for (int k = 0; k < s->columns; k++)
+    for (int64_t i = 0; i < count; i++)
+      e->states[(instance * s->columns + k) * e->samples + e->next + i] = s->states[k * (count + HS_BLOCK) + i];
+  for (int64_t k = 0; k < chunk->arcs; k++) chunk->arc[k].first += e->base;
+  e->next += count;
+}
+
+static void note_transitions(hs_ensemble *e) {
+  const hs_chunk *chunk = &e->task.chunk;
+  for (int64_t i = 0; i < chunk->transitions && e->made + i < e->most_transitions; i++)
+    e->crossed[e->done * e->most_transitions + e->made + i] = chunk->transition[i].time;
+  e->made += chunk->transitions;
+}
+
+/* Let go of all rows of a full chunk but the last one, which the next piece begins at. */
+static int let_go(hs_task *task) {
+  hs_ensemble *e = (hs_ensemble *)task;
+  hs_chunk *chunk = &task->chunk;
+  const int64_t last = chunk->rows - 1, w = task->model->width, m = task->model->outputs;
+  if (last >= 0) {
+    int64_t kept = chunk->arcs - 1;
+    sample_chunk(e, 0);
+    while (kept > 0 && chunk->arc[kept].first > e->base + last) kept--;
+    for (int64_t k = kept; k < chunk->arcs; k++) chunk->arc[k - kept] = chunk->arc[k];
+    chunk->arcs -= kept;
+    chunk->times[0] = chunk->times[last];
+    chunk->depth[0] = chunk->depth[last];
+    copy(chunk->values, chunk->values + last * w, (int)w);
+    copy(chunk->outputs, chunk->outputs + last * m, (int)m);
+    chunk->rows = 1;
+    e->base += last;
+  }
+  note_transitions(e);
+  chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
+  return *e->stop != 0;
+}
+
+static int asked_to_stop(hs_task *task) { return *((const hs_ensemble *)task)->stop != 0; }
+
+/* What is kept of a run. */
+static void keep(hs_ensemble *e) {
+  const hs_chunk *chunk = &e->task.chunk;
+  const int64_t i = e->done, last = chunk->rows - 1, w = e->task.model->width, m = e->task.model->outputs;
+  int64_t arc = chunk->arcs - 1;
+  sample_chunk(e, 1);
+  note_transitions(e);
+  while (arc > 0 && chunk->arc[arc].first > e->base + last) arc--;
+  e->reason[i] = e->task.stop.reason;
+  e->mode[i] = chunk->arc[arc].mode;
+  e->kind[i] = e->layout;
+  e->transitions[i] = e->made;
+  e->ended[i] = chunk->times[last];
+  copy(e->final + i * w, chunk->values + last * w, (int)w);
+  copy(e->outputs + i * m, chunk->outputs + last * m, (int)m);
+}
+
+void hs_run_ensemble(hs_ensemble *e) {
+  hs_task *task = &e->task;
+  task->flush = let_go;
+  task->poll = asked_to_stop;
+  for (; e->done < e->instances && !*e->stop; e->done++) {
+    hs_chunk *chunk = &task->chunk;
+    chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
+    e->base = e->made = e->next = e->layout = 0;
+    task->made = 0;
+    task->timeline = &e->timeline[e->done];
+    task->settings = e->settings[e->done];
+    task->x = e->start + e->done * task->dimension;
+    hs_simulate(task);
+    if (*e->stop && task->stop.reason == HS_INTERRUPTED) return;
+    if (chunk->rows) keep(e);
+  }
+}

@@ -1,0 +1,172 @@
+"""Many instances of one model by the compiled loop: slices of them, each by whichever thread is free."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsdsl.execution import REASONS, Array
+from hsdsl.program import Program
+from hsdsl.runtime import tables
+from hsdsl.runtime.sampling import BLOCK
+from hsdsl.simulate.compiled import CompiledPlan, task_settings
+from hsdsl.simulate.settings import Settings
+from hsdsl.simulate.timeline import Timeline
+
+TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
+# why a run ends, by what the loop calls it; where it is stuck only its sentence tells
+ENDED = {
+    "until in strip": "until", "until on guard": "until", "limit": "transition_limit", "reset not finite": "not_finite",
+    "here not finite": "not_finite", "step not finite": "not_finite", "entered outside": "left_domain",
+    "left": "left_domain", "accumulated": "zeno",
+}  # fmt: skip
+
+
+LONGEST = f"U{max(map(len, REASONS))}"
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """What differs between instances.
+
+    ``start`` has shape (instances, states), ``time`` (the samples, never decreasing) shape (instances, samples).
+    """
+
+    settings: Sequence[Settings]
+    timelines: Sequence[Timeline]
+    start: Array
+    time: Array
+
+
+class Kept:
+    """What is kept of each instance, to be filled in place; ``columns`` states and all outputs are sampled."""
+
+    def __init__(self, instances: int, width: int, outputs: int, columns: int, samples: int, crossings: int) -> None:
+        nan = float("nan")
+        self.stop = np.full(instances, "interrupted", LONGEST)  # until it is run to its end
+        self.reason = np.full(instances, -1, np.int32)  # as the compiled loop says it; -1 where it was not run
+        self.mode = np.full(instances, -1, np.int32)
+        self.kind = np.zeros(instances, np.int32)  # of the last arc's states
+        self.transitions = np.zeros(instances, np.int64)
+        self.ended = np.full(instances, nan)
+        self.final = np.full((instances, width), nan)
+        self.outputs = np.full((instances, outputs), nan)
+        self.crossed = np.full((instances, crossings), nan)
+        self.states = np.full((instances, columns, samples), nan)
+        self.results = np.full((instances, samples, outputs), nan)
+
+
+BY_INSTANCE = ("reason", "mode", "kind", "transitions", "ended", "final", "outputs", "crossed", "states", "results")
+
+
+class CompiledEnsemble:
+    """Instances of one plan's model and method, and the arrays that are filled."""
+
+    def __init__(self, plan: CompiledPlan, instances: Instances, kept: Kept, names: tuple[str, ...]) -> None:
+        self._plan, self._kept = plan, kept
+        self._start = np.ascontiguousarray(instances.start, np.float64)
+        self._time = np.ascontiguousarray(instances.time, np.float64)
+        self._settings = (tables.Settings * len(instances.settings))(*map(task_settings, instances.settings))
+        self._timelines, self._numbers = _timelines(instances.timelines)
+        self._names, self._layouts = names, kinds_of(plan.program, plan.states)
+        self._layout_of = _layout_of_modes(plan, self._layouts)
+        self._stop = np.zeros(1, np.int32)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether :meth:`stop` was called."""
+        return bool(self._stop[0])
+
+    def stop(self) -> None:
+        """Let every thread end as soon as it can."""
+        self._stop[0] = 1
+
+    def work(self, first: int, last: int, place: Place) -> None:
+        """Run the instances from ``first`` up to ``last``."""
+        table, kept = place.table, self._kept
+        table.done, table.instances = 0, last - first
+        table.samples, table.most_transitions = self._time.shape[1], kept.crossed.shape[1]
+        table.timeline, table.start, table.time = (
+            _row(self._timelines, first),
+            _row(self._start, first),
+            _row(self._time, first),
+        )
+        table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(tables.Settings)
+        table.stop = self._stop.ctypes.data
+        for name in BY_INSTANCE:
+            setattr(table, name, _row(getattr(kept, name), first))
+        self._plan.compiled.run_ensemble(table)
+        if place.desk.failed:
+            raise place.desk.failed[0]
+        known = np.array([*(ENDED.get(reason, reason) for reason in tables.REASONS), "interrupted"], LONGEST)
+        kept.stop[first:last] = known[kept.reason[first:last]]
+
+    def place(self) -> Place:
+        """Make a place to work at."""
+        return Place(self._plan, self._names, self._layouts, self._layout_of, self._time.shape[1])
+
+
+class Place:
+    """One thread's memory."""
+
+    def __init__(
+        self,
+        plan: CompiledPlan,
+        names: tuple[str, ...],
+        layouts: Sequence[tuple[str, ...]],
+        layout_of: Array | None,
+        samples: int,
+    ) -> None:
+        self.table = tables.Ensemble()
+        self.desk = plan.desks.new(self.table.task)
+        plan.lay(self.desk)
+        model, chunk, room = plan.compiled.table, self.table.task.chunk, samples + BLOCK
+        self._memory = np.zeros(room * (2 + len(names)) + 2 * model.width)
+        self._arcs = np.zeros(chunk.arc_room, np.int32)
+        sampling, start = self.table.sampling, self._memory.ctypes.data
+        ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
+        sampling.width, sampling.degree = model.width, self.desk.degree
+        sampling.columns, sampling.outputs = len(names), model.outputs
+        sampling.dimension, sampling.column = plan.sampled.columns(layouts, names)
+        sampling.time, sampling.row, sampling.states = start, start + 8 * room, start + 16 * room
+        sampling.scratch = start + 8 * room * (2 + len(names))
+        self.table.layouts = self._arcs.ctypes.data
+        self._layout_of = layout_of
+        self.table.layout_of = None if layout_of is None else layout_of.ctypes.data
+
+
+def kinds_of(program: Program, states: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """The states of each kind of arcs of runs that begin with ``states``, which are the first."""
+    return list(dict.fromkeys((states, *(mode.states for mode in program.modes if mode.states or not mode.final))))
+
+
+def _layout_of_modes(plan: CompiledPlan, kinds: Sequence[tuple[str, ...]]) -> Array | None:
+    if len(kinds) == 1:
+        return None
+    of = [-1 if mode.final and not mode.states else kinds.index(mode.states) for mode in plan.program.modes]
+    return np.array(of, np.int32)
+
+
+def _row(array: Any, row: int) -> int:
+    return array.ctypes.data + row * array.strides[0] if len(array) else array.ctypes.data
+
+
+def _timelines(timelines: Sequence[Timeline]) -> tuple[Array, tuple[Array, ...]]:
+    """All timelines as ``hs_timeline``, and the columns they point into."""
+    counts = np.array([len(timeline.segments) for timeline in timelines])
+    segments = [segment for timeline in timelines for segment in timeline.segments]
+    columns = (
+        np.array([s.start for s in segments]),
+        np.array([s.end for s in segments]),
+        np.array([s.jump for s in segments], np.int32),
+        np.array([s.data for s in segments], np.float64).reshape(len(segments), -1),
+    )
+    table, first = np.empty(len(timelines), TIMELINE), np.cumsum(counts) - counts
+    table["segments"] = counts
+    for name, column in zip(("start", "end", "jump", "data"), columns, strict=True):
+        table[name] = column.ctypes.data + first * column.strides[0]
+    return table, columns

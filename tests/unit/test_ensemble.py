@@ -1,0 +1,163 @@
+"""Ensembles: every instance is what a single run gives, whoever runs it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from engines import COMPILER, needs_compiler
+
+import hsdsl
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import UsageError
+from hsdsl.execution.same import same
+from hsdsl.model import Model
+from hsdsl.simulate import chunks
+
+MODELS = Path(__file__).parents[2] / "models"
+OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
+ENGINES = ("python", "c") if COMPILER else ("python",)
+FAST = {"method": "dopri5", "tolerance": 1e-6, "until": 12}
+
+
+def model(text: str) -> Model:
+    return Model(elaborate("model.yaml", text=text.encode()))
+
+
+def assert_as_single_runs(ensemble):
+    """Compare everything that is kept with runs one by one."""
+    for place in np.ndindex(ensemble.shape):
+        run = ensemble.run(*place)
+        assert (run.stop.reason, run.final.mode) == (ensemble.stop[place], ensemble.mode[place])
+        assert run.times[-1] == ensemble.time[place] and len(run.transitions) == ensemble.transitions[place]
+        for kept, own in ((ensemble.state, run.final.state), (ensemble.outputs, run.final.outputs)):
+            assert all(same(float(kept[name][place]), own.get(name, float("nan"))) for name in kept), place
+        found = ensemble.transition_times[place]
+        times = [t.time for t in run.transitions[: len(found)]]
+        assert found[: len(times)].tolist() == times and np.isnan(found[len(times) :]).all()
+        asked = ensemble.sample_times[place]
+        inside = asked <= run.times[-1] + 1e-12 * max(1, run.times[-1])
+        samples = run.sample(asked[inside])
+        for name, column in ensemble.samples.items():
+            assert np.isnan(column[place][~inside]).all()
+            if name in samples.names:
+                assert same(column[place][inside], np.array(samples[name])), (place, name)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scheme", ["relaxed", "located"])
+def test_instances_are_single_runs(engine, scheme):
+    ensemble = hsdsl.load(OSCILLATOR).ensemble(
+        parameters={"c": [0.3, 0.6, 0.9], "a": "1/20"},
+        initial={"v": np.array([[31.4], [20.0]])},
+        samples=40,
+        transition_times=6,
+        **FAST,
+        scheme=scheme,
+        engine=engine,
+    )
+    assert ensemble.shape == (2, 3) and ensemble.engine == engine and not ensemble.failed.any()
+    assert ensemble.varied["c"].tolist() == [[0.3, 0.6, 0.9]] * 2 and ensemble.failures() == ()
+    assert_as_single_runs(ensemble)
+
+
+MODES = """
+hsdsl: 1
+parameters: {a: 1, twice: {value: 2*a, max: 12}, stop: {value: 1/a}}
+inputs: {u: {times: [0, 0.3, 1], values: [0, 1, 0], hold: linear}}
+modes:
+  one:
+    flow: {x: a + u/10}
+    transitions: [{when: x >= 1, to: two, reset: {y: x, z: 0}}]
+  two:
+    flow: {y: -y, z: 1/(z - 5 + stop)}
+    transitions: [{when: y <= 1/2, to: one, reset: {x: y - 1}}, {when: z >= 3/2, to: over}]
+  over: {final: true}
+outputs: {energy: a*t}
+initial: {mode: one, x: 0}
+experiment: {until: 3*a, relaxation: 1e-6}
+"""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_modes_of_several_sizes_inputs_and_failures(engine):
+    several, a = model(MODES), [0.25, 0.5, 1, 2, 4, 0, 7, float("nan"), -1]
+    ensemble = several.ensemble(parameters={"a": a}, samples=[0.0, 0.1, 0.7, 2.0, 6.5], engine=engine, tolerance=1e-6)
+    assert ensemble.reasons["refused"] == 4 and ensemble.stop[:5].tolist().count("refused") == 0
+    refused = {failure.index: failure.message for failure in ensemble.failures() if failure.reason == "refused"}
+    assert refused[5,] == "parameter stop has no finite value with these parameters"
+    assert refused[6,] == "parameter twice = 14 is beyond its maximum 12"
+    assert "has no finite value" in refused[7,] and "until" in refused[8,]
+    assert np.isnan(ensemble.time[5:]).all() and set(ensemble.mode[5:]) == {""}
+    kept = several.ensemble(parameters={"a": a[:5]}, samples=[0.0, 0.1, 0.7, 2.0, 6.5], engine=engine, tolerance=1e-6)
+    assert_as_single_runs(kept)
+    assert all(same(kept.state[name], ensemble.state[name][:5]) for name in kept.state)
+
+
+@needs_compiler
+def test_small_chunks_give_the_same(monkeypatch):
+    monkeypatch.setattr(chunks, "LEAST_ROWS", 16)
+    for loaded in (hsdsl.load(OSCILLATOR), model(MODES)):
+        name = "a" if "a" in loaded.program.parameters and "c" not in loaded.program.parameters else "c"
+        values = np.linspace(0.3, 0.9, 5)
+        assert_as_single_runs(
+            loaded.ensemble(parameters={name: values}, samples=50, transition_times=3, tolerance=1e-7, engine="c")
+        )
+
+
+@needs_compiler
+def test_engines_and_numbers_of_threads_agree():
+    arguments = {"parameters": {"c": np.linspace(0.3, 0.9, 70)}, "samples": 5, **FAST, "until": 3}
+    runs = [hsdsl.load(OSCILLATOR).ensemble(**arguments, engine="c", threads=threads) for threads in (1, 3)]
+    runs.append(hsdsl.load(OSCILLATOR).ensemble(**arguments, engine="python"))
+    for run in runs[1:]:
+        assert (run.stop == runs[0].stop).all() and (run.transitions == runs[0].transitions).all()
+        assert all((run.samples[name] == runs[0].samples[name]).all() for name in ("x", "v"))
+
+
+@needs_compiler
+def test_control_c_keeps_what_is_done_and_progress_is_told():
+    told = []
+
+    def progress(done, count):
+        told.append((done, count))
+        if done:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    ensemble = hsdsl.load(OSCILLATOR).ensemble(
+        parameters={"c": np.linspace(0.3, 0.9, 400)}, method="rk4", step=1e-4, threads=1, progress=progress, engine="c"
+    )
+    assert ensemble.reasons["interrupted"] > 0 and told[0][1] == 400 and threading.active_count() < 5
+    done = int(np.argmax(ensemble.stop == "interrupted"))
+    assert (ensemble.stop[:done] == "until").all() and np.isnan(ensemble.time[done:]).all()
+    assert "interrupted" in ensemble.failures(1)[0].message
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_what_cannot_be_served_is_refused():
+    oscillator = hsdsl.load(OSCILLATOR)
+    for arguments, sentence in (
+        ({"parameters": {"c": [1, 2], "a": [1, 2, 3]}}, "no common shape"),
+        ({"parameters": {"d": [1, 2]}}, "the model has no parameter 'd'"),
+        ({"initial": {"w": [1, 2]}}, "mode free has no state 'w'"),
+        ({"parameters": {"c": ["x", "y"]}}, "an array of numbers is wanted"),
+        ({"parameters": {"c": [float("nan")]}}, "no instance of the ensemble can be run"),
+        ({"samples": 1}, "samples of an ensemble"),
+        ({"steps": 1}, "an ensemble has no argument 'steps'"),
+        ({"threads": 0}, "threads must be at least 1"),
+        ({"parameters": {"a": [1, 2]}, "step": "a"}, "step differs between the instances"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            oscillator.ensemble(**arguments)
+    with pytest.raises(IndexError, match="an index of an ensemble of shape"):
+        oscillator.ensemble(parameters={"c": [0.5, 0.6]}, **FAST).run(2)
+
+
+def test_nothing_varied_is_one_run():
+    ensemble = hsdsl.load(OSCILLATOR).ensemble(**FAST)
+    assert ensemble.shape == () and ensemble.run().final.state["x"] == float(ensemble.state["x"])
+    assert "shape ()" in repr(ensemble)
