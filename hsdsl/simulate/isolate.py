@@ -69,6 +69,16 @@ def value(c: Coefficients, s: Number) -> Number:
     return total
 
 
+def value_and_slope(c: Coefficients, s: Number) -> tuple[Number, Number]:
+    """Evaluate a polynomial and its derivative (Horner)."""
+    total = c[-1]
+    slope = total * 0
+    for k in range(len(c) - 2, -1, -1):
+        slope = total + s * slope
+        total = c[k] + s * total
+    return total, slope
+
+
 def changes(b: list[Number]) -> int:
     """Count the changes of sign of a list of numbers, zeros left out."""
     signs = [x > 0 for x in b if x != 0]
@@ -114,7 +124,7 @@ def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Numb
         if min(b) > 0:
             continue
         if b[0] <= 0 < b[-1] and changes(b) <= 1:
-            return _refined(c, low, high)
+            return _refined(c, low, high, tiny)
         if high - low <= tiny:
             return low
         left, right = split(b, one / 2)
@@ -123,27 +133,26 @@ def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Numb
     return None
 
 
-def _refined(c: Coefficients, a: Number, b: Number) -> Number:
-    """Close a bracket P(a) <= 0 < P(b) of one root to the last bits (Illinois; bisection where that creeps)."""
+def _refined(c: Coefficients, a: Number, b: Number, tiny: Number) -> Number:
+    """Solve for the root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket)."""
     fa, fb = value(c, a), value(c, b)
     if not fa < 0:
         return a
     if not fb > 0:
         return b
-    weight_a, weight_b, side = fa, fb, 0
-    for count in range(MOST_REFINEMENTS):
-        s = a - weight_a * (b - a) / (weight_b - weight_a)
-        if not a < s < b or count % 8 == 7:
+    s = a - fa * (b - a) / (fb - fa)
+    for _ in range(MOST_REFINEMENTS):
+        if not a < s < b:
             s = (a + b) / 2
             if not a < s < b:
-                break
-        f = value(c, s)
-        if f == 0:
-            return s
+                return a
+        f, slope = value_and_slope(c, s)
         if f < 0:
-            weight_b = weight_b / 2 if side < 0 else weight_b
-            a, weight_a, side = s, f, -1
+            a = s
         else:
-            weight_a = weight_a / 2 if side > 0 else weight_a
-            b, weight_b, side = s, f, 1
+            b = s
+        after = s - f / slope if slope > 0 else a
+        if slope > 0 and a <= after <= b and (after - s) * (after - s) <= tiny * after * after:
+            return after
+        s = after
     return a

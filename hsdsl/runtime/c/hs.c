@@ -140,6 +140,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
   run->second = numbers(store, 4 * (int64_t)run->model->lines);
   run->left = numbers(store, most + 1);
+  run->bernstein = numbers(store, most + 1);
   run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
   if (store->numbers) fill_binomials(run->binomials, most);
   run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));

@@ -12,13 +12,19 @@ static void fill_binomials(double *row, int most) {
     for (int k = 0; k <= n; k++) row[k] = k == 0 || k == n ? 1.0 : (row - n)[k - 1] + (row - n)[k];
 }
 
-/* Bernstein coefficients on [0, 1] of `sign` times a polynomial, less `level`. */
-HS_INLINE void bernstein(const hs_run *run, const double *c, int n, double sign, double level, double *b) {
+/* Bernstein coefficients on [0, 1] of a polynomial. */
+HS_INLINE void fill_bernstein(const hs_run *run, const double *c, int n, double *b) {
   const double *choose = binomials(run, n);
-  for (int k = 0; k <= n; k++) b[k] = sign * c[k] / choose[k];
+  for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
   for (int k = 1; k <= n; k++)
     for (int i = n; i >= k; i--) b[i] = b[i] + b[i - 1];
-  for (int i = 0; i <= n; i++) b[i] = b[i] - level;
+}
+
+/* Those of a polynomial of the step's curves, made once for each. */
+HS_INLINE const double *bernstein_of(hs_run *run, const double *c, int n) {
+  if (run->bernstein_of != c) fill_bernstein(run, c, n, run->bernstein);
+  run->bernstein_of = c;
+  return run->bernstein;
 }
 
 HS_INLINE double largest_of(const double *b, int n) {
@@ -33,8 +39,7 @@ static int stays_below(hs_run *run, const double *c, int n, double level) {
   for (int k = 1; k <= n; k++)
     if (c[k] > 0) bound = bound + c[k];
   if (bound <= level) return 1;
-  bernstein(run, c, n, 1.0, 0.0, run->cuts[0].b);
-  return largest_of(run->cuts[0].b, n) <= level;
+  return largest_of(bernstein_of(run, c, n), n) <= level;
 }
 
 /* Cut an interval at the share s: `left` gets the coefficients before it, `b` those behind it (de Casteljau). */
@@ -70,7 +75,8 @@ static int changes(const double *b, int n) {
 static int rises(hs_run *run, const double *c, int n, double sign, double level, double start, double *point) {
   hs_cut *const cuts = run->cuts;
   int open = 1;
-  bernstein(run, c, n, sign, level, cuts[0].b);
+  const double *const own = bernstein_of(run, c, n);
+  for (int i = 0; i <= n; i++) cuts[0].b[i] = sign * own[i] - level;
   if (start > 0) split(cuts[0].b, n, start, run->left);
   cuts[0].low = start, cuts[0].high = 1.0;
   while (open) {
@@ -91,28 +97,37 @@ static int rises(hs_run *run, const double *c, int n, double sign, double level,
   return 0;
 }
 
-/* Close a bracket P(a) <= 0 < P(b) of one root to the last bits (Illinois; bisection where that creeps). */
+/* A polynomial and its derivative (Horner). */
+HS_INLINE double value_and_slope(const double *c, int n, double s, double *slope) {
+  double total = c[n];
+  *slope = total * 0;
+  for (int k = n - 1; k >= 0; k--) {
+    *slope = total + s * *slope;
+    total = c[k] + s * total;
+  }
+  return total;
+}
+
+/* Solve for the one root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket). */
 static double refined(const double *c, int n, double a, double b) {
   const double fa = value_of(c, n, a), fb = value_of(c, n, b);
   if (!(fa < 0)) return a;
   if (!(fb > 0)) return b;
-  double weight_a = fa, weight_b = fb;
-  int side = 0;
+  double s = a - fa * (b - a) / (fb - fa);
   for (int count = 0; count < MOST_REFINEMENTS; count++) {
-    double s = a - weight_a * (b - a) / (weight_b - weight_a);
-    if (!(a < s && s < b) || count % 8 == 7) {
+    if (!(a < s && s < b)) {
       s = (a + b) / 2;
-      if (!(a < s && s < b)) break;
+      if (!(a < s && s < b)) return a;
     }
-    const double f = value_of(c, n, s);
-    if (f == 0) return s;
-    if (f < 0) {
-      if (side < 0) weight_b = weight_b / 2;
-      a = s, weight_a = f, side = -1;
-    } else {
-      if (side > 0) weight_a = weight_a / 2;
-      b = s, weight_b = f, side = 1;
-    }
+    double slope;
+    const double f = value_and_slope(c, n, s, &slope);
+    if (f < 0)
+      a = s;
+    else
+      b = s;
+    const double after = slope > 0 ? s - f / slope : a;
+    if (slope > 0 && a <= after && after <= b && (after - s) * (after - s) <= HS_UNIT * after * after) return after;
+    s = after;
   }
   return a;
 }
@@ -122,7 +137,7 @@ static double refined(const double *c, int n, double a, double b) {
 static int last_root(hs_run *run, const double *c, int n, double start, double end, double *root) {
   hs_cut *const cuts = run->cuts;
   int open = 1;
-  bernstein(run, c, n, 1.0, 0.0, cuts[0].b);
+  copy(cuts[0].b, bernstein_of(run, c, n), n + 1);
   if (end < 1) {
     split(cuts[0].b, n, end, run->left);
     copy(cuts[0].b, run->left, n + 1);

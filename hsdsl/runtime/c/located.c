@@ -7,6 +7,7 @@ enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON,
 /* Whether the polynomials of surface k say that it is not crossed. */
 static int is_passed_by(hs_run *run, int k) {
   const hs_curves *curves = &run->curves;
+  run->bernstein_of = 0;
   if (run->stood_on[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
   if (!(run->ends[k] <= 0)) return 0;
   for (int i = 0; i < curves->parts; i++)

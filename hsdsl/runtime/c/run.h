@@ -155,7 +155,8 @@ typedef struct {
   double ratio;                     /* of the last error estimate */
   hs_curves curves;
   hs_cut *cuts;
-  double *binomials, *left, *rows, *second; /* second: series of order 2 */
+  const double *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
+  double *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
   double *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
   int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
