@@ -83,11 +83,12 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     if refusal := private(folder()):
         raise PermissionError(refusal)
     entry = folder() / kind / key
-    entry.mkdir(mode=0o700, parents=True, exist_ok=True)
-    part = entry / f"{secrets.token_hex(8)}.part"
+    entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    part = entry.parent / f"{secrets.token_hex(8)}.part"  # beside the entry, which another process may prune
     try:
         write(part)
         path = entry / f"{_checksum(part.read_bytes())}{suffix}"
+        entry.mkdir(mode=0o700, exist_ok=True)
         os.replace(part, path)
         for other in entry.iterdir():
             if other != path and other.suffix != ".part":

@@ -37,6 +37,6 @@ class _Named(Mapping[str, M]):
 
 INTEGRATORS = _Named[ButcherTableau]("euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853")
 METHODS = _Named[Method](*INTEGRATORS, "taylor", "radau")
-AUTO = "dopri5"  # what `method: auto` means while there is no fast engine for the others
+AUTO = "dopri5"  # what `method: auto` is where nothing is known of a flow but its values
 
 __all__ = ["AUTO", "INTEGRATORS", "METHODS", "RADAU", "ButcherTableau", "Method", "RadauMethod", "TaylorMethod"]

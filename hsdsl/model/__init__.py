@@ -16,7 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.integrators import METHODS, TaylorMethod
 from hsdsl.limits import Limits, applied
-from hsdsl.model import engines, seen
+from hsdsl.model import automatic, engines, seen
 from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import FILE, KEYS, Request, Source, check_digits, check_smooth, resolve
 from hsdsl.model.values import Values, initial_state, with_parameters
@@ -26,6 +26,7 @@ from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Settings, prepare
 from hsdsl.simulate.recorder import Progress
+from hsdsl.simulate.timeline import make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.metrics.points import Place, PointDistance
@@ -222,6 +223,9 @@ class Model:
             from hsdsl.model.mechanical import one_stop
 
             chosen = replace(chosen, one_stop=one_stop(values, x))
+        if request.automatic:
+            timeline = make_timeline(self.program, values.kernel, values.parameters, chosen.until)
+            chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
 

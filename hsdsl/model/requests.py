@@ -52,13 +52,15 @@ class Source:
 class Request:
     """What the places agree on: ``size`` is ``step`` or ``tolerance``, and ``values`` holds it with the rest.
 
-    ``method`` is None for a scheme with its own formula.
+    ``method`` is None for a scheme with its own formula; with ``automatic`` it is what serves where nothing better is
+    known (see `hsdsl.model.automatic`).
     """
 
     scheme: str
     method: Method | None
     size: str
     values: dict[str, Asked]
+    automatic: bool = False
 
 
 def resolve(sources: Sequence[Source]) -> Request:
@@ -91,7 +93,8 @@ def resolve(sources: Sequence[Source]) -> Request:
     if scheme in OWN_FORMULA:
         _own_formula(scheme, values)
         return Request(scheme, None, size, values)
-    return Request(scheme, _method(values["method"], values[size], size), size, values)
+    method = _method(values["method"], values[size], size)
+    return Request(scheme, method or METHODS[AUTO], size, values, automatic=method is None)
 
 
 def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:
@@ -113,9 +116,10 @@ def _method_meant(name: str) -> str | None:
     return f"did you mean '{meant}'?" if meant in METHODS else did_you_mean(name, ["auto", *METHODS])
 
 
-def _method(asked: Asked, size_asked: Asked, size: str) -> Method:
+def _method(asked: Asked, size_asked: Asked, size: str) -> Method | None:
+    """The method that is named, None where that is left to us."""
     if asked.value == "auto":
-        return METHODS[AUTO]
+        return None
     if asked.value not in METHODS:
         hint = _method_meant(str(asked.value))
         from hsdsl.source import Key
@@ -127,7 +131,7 @@ def _method(asked: Asked, size_asked: Asked, size: str) -> Method:
     if size == "step" or table.adaptive:
         return table
     if asked.place == FILE and size_asked.place not in (FILE, "default"):
-        return METHODS[AUTO]
+        return None
     raise UsageError(
         f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",
         "give a step, or use method 'auto'",

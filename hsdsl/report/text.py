@@ -31,7 +31,10 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
     lines = [*_wrapped(words.heading(execution), columns)]
     if execution.title:
         lines += _wrapped(execution.model, columns)
-    lines += [*_wrapped(", ".join(words.settings(execution)), columns), ""]
+    lines += _wrapped(", ".join(words.settings(execution)), columns)
+    if "method_chosen" in execution.settings:
+        lines += _wrapped(f"method auto is {execution.settings['method_chosen']}", columns)
+    lines += [""]
     lines += [*_transitions(execution, limit, columns), ""]
     lines += _labelled("stop", words.stop(execution), columns)
     lines += _labelled("final", words.final(execution.final), columns)

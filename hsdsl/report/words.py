@@ -24,7 +24,7 @@ def heading(execution: Execution) -> str:
 def settings(execution: Execution) -> list[str]:
     """List what the run was done with."""
     chosen = [f"{execution.scheme} {execution.method}"]
-    shown = {"scheme", "method", "engine"}
+    shown = {"scheme", "method", "engine", "method_chosen"}
     for name, value in execution.settings.items():
         if name not in shown and value is not None and not isinstance(value, (Mapping, list, tuple)):
             chosen.append(f"{name} {number(value)}")

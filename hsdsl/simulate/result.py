@@ -146,6 +146,7 @@ def described(settings: Settings) -> dict[str, Any]:
         **({"relaxation": settings.relaxation} if settings.method else {}),
         "max_transitions": settings.max_transitions,
         **({} if samples is None else {"samples": samples}),
+        **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
     }
 
 

@@ -31,6 +31,7 @@ class Settings:
     Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to 1 + |x|) is given.
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
+    ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -43,6 +44,7 @@ class Settings:
     max_transitions: int
     samples: int | tuple[Number, ...] | None = None
     one_stop: OneStop | None = None
+    method_chosen: str | None = None
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):
