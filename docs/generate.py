@@ -80,8 +80,8 @@ LINT_RULES = """# Lint rules
 INTEGRATORS = """# Integrators
 
 The values of `method` and `--method`. `auto` is chosen for each run, and the run says why: `radau` where the start is
-stiff, else `taylor` where every flow is smooth, else `{auto}`, and `{auto}` with a fixed step. A method with an embedded error
-estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`.
+stiff, else `taylor` where every flow is smooth, else `{auto}`, and `{auto}` with a fixed step. A method with an
+embedded error estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`.
 
 """
 

@@ -35,7 +35,7 @@ def test_json_is_the_contract(command, model):
     run = answer.json
     assert list(run) == KEYS
     assert [list(t) for t in run["transitions"]] == [TRANSITION] * 2
-    assert run["engine"] in ("c", "python") and run["scheme"] == "relaxed" and run["method"] == "dopri5"
+    assert run["engine"] in ("c", "python") and run["scheme"] == "relaxed" and run["method"] == "taylor"
     assert set(run["stop"]) == {"reason", "time", "message"} and run["stop"]["reason"] == "until"
     assert set(run["final"]) == {"time", "mode", "state", "outputs"}
     assert run["verdict"]["theorem"] == "holds" and run["verdict"]["reasons"]

@@ -39,7 +39,11 @@ def test_rows_in_many_chunks_are_the_same_rows(monkeypatch):
     monkeypatch.setattr(chunks, "LEAST_ROWS", 16)
     monkeypatch.setattr(chunks, "MOST_ROWS", 64)
     oscillator = hsdsl.load(OSCILLATOR)
-    for settings in ({"tolerance": 1e-6}, {"method": "rk4", "step": 0.02}, {"method": "midpoint", "step": 0.02}):
+    for settings in (
+        {"method": "dopri5", "tolerance": 1e-6},
+        {"method": "rk4", "step": 0.02},
+        {"method": "midpoint", "step": 0.02},
+    ):
         run = assert_engines_agree(oscillator, kernel=False, until=40, **settings)
         assert len(run.times) > 500
 
