@@ -23,7 +23,8 @@ from hsdsl.simulate.settings import Settings
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 10_000
 BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
-LEAST_SEEN, LEAST_BEFORE = 1e-10, 0.01  # error ratios below these count as these, of a step and of the one before
+LEAST_SEEN = 1e-10  # an error ratio below this counts as this
+LEAST_BEFORE = 0.3  # a root of the one before likewise
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
 
@@ -31,7 +32,7 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
-    ``before`` has the step last accepted and its error ratio, for an ``implicit`` method.
+    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method.
     """
 
     h: Number
@@ -76,13 +77,13 @@ class Control:
 
     def predicted(self, taken: Number, ratio: Number) -> Number:
         """Factor from one step to the next for an implicit method."""
-        factor = self.factor(ratio)
-        if self.before is not None and self.power is not None:
+        assert self.power is not None
+        root = self.power(max(LEAST_SEEN, ratio), 1 / (ratio * 0 + self.order))
+        factor = min(MOST, max(LEAST, SAFETY / root))
+        if self.before is not None:
             length, last = self.before
-            now = max(LEAST_SEEN, ratio)
-            ahead = SAFETY * (taken / length) * self.power(last / (now * now), 1 / (now * 0 + self.order))
-            factor = min(factor, max(LEAST, ahead))
-        self.before = taken, max(LEAST_BEFORE, ratio)
+            factor = min(factor, max(LEAST, SAFETY * (taken / length) * (last / (root * root))))
+        self.before = taken, max(LEAST_BEFORE, root)
         return 1 if BAND[0] <= factor <= BAND[1] else factor
 
     def reject(self, taken: Number, ratio: Number | None) -> None:

@@ -7,7 +7,7 @@
 #define BAND_FROM 0.9
 #define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
-#define LEAST_BEFORE 0.01
+#define LEAST_BEFORE 0.3
 
 static double error_ratio(const hs_run *run) {
   double worst = run->control.h * 0;
@@ -37,14 +37,14 @@ static void begin_steps(hs_run *run) {
 
 /* Factor from one step to the next for an implicit method. */
 static double predicted(hs_control *control, double taken, double ratio) {
-  double found = factor(control, ratio);
+  const double root = pow(hs_max(LEAST_SEEN, ratio), 1 / (ratio * 0 + control->order));
+  double found = hs_min(MOST, hs_max(LEAST, SAFETY / root));
   if (control->before > 0) {
-    const double now = hs_max(LEAST_SEEN, ratio), power = 1 / (now * 0 + control->order);
-    const double ahead = SAFETY * (taken / control->before) * pow(control->ratio_before / (now * now), power);
+    const double ahead = SAFETY * (taken / control->before) * (control->root_before / (root * root));
     found = hs_min(found, hs_max(LEAST, ahead));
   }
   control->before = taken;
-  control->ratio_before = hs_max(LEAST_BEFORE, ratio);
+  control->root_before = hs_max(LEAST_BEFORE, root);
   return BAND_FROM <= found && found <= BAND_TO ? 1.0 : found;
 }
 

@@ -64,7 +64,7 @@ typedef struct {
   double h, tolerance, largest;
   int order;
   int implicit;
-  double before, ratio_before; /* the step last accepted, 0 for none, and its error ratio */
+  double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
   int64_t accepted, rejected;
 } hs_control;
 
