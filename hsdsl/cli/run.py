@@ -41,6 +41,12 @@ OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".h
 @click.option("--outputs", metavar="A,B", help="Only these states and outputs in files and final outputs.")
 @click.option("--estimate", is_flag=True, help="Run again, finer, and say how far apart the two runs are.")
 @click.option("--out", type=FILE, metavar="FILE", help="Save the execution: .csv, .parquet or .npz.")
+@click.option(
+    "--every",
+    type=int,
+    metavar="K",
+    help="Write every K-th step to --out (.csv) while the run goes on, in constant memory; jumps are always written.",
+)
 @click.option("--plot", type=FILE, metavar="FILE", help="Draw it: .png, .svg or .html.")
 @click.option("--json", is_flag=True, help="Print one JSON object instead of the summary.")
 @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress.")
@@ -52,6 +58,7 @@ def run(
     outputs: str | None,
     estimate: bool,
     out: Path | None,
+    every: int | None,
     plot: Path | None,
     json: bool,
     quiet: bool,
@@ -65,10 +72,17 @@ def run(
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         _check_target(plot, "--plot", PLOT_SUFFIXES)
-        execution = _simulate(model, overrides, asked, outputs, estimate, out, plot, json, quiet)
-    if execution.stop.reason == "interrupted":
+        if every is None:
+            stop = _simulate(model, overrides, asked, outputs, estimate, out, plot, json, quiet).stop
+        else:
+            from hsdsl.cli.streamed import streamed
+
+            if out is None or plot is not None or estimate or precision is not None:
+                raise UsageError("--every streams to --out FILE.csv, without --plot, --estimate or --precision")
+            stop = streamed(model, overrides, asked, outputs, out, every, json, quiet)
+    if stop.reason == "interrupted":
         raise Exit(INTERRUPTED)
-    if not execution.stop.complete:
+    if not stop.complete:
         raise Exit(STOPPED)
 
 
@@ -87,7 +101,7 @@ def _simulate(
 
     engines.begin(path, *(asked[key] for key in ("engine", "precision", "scheme", "method")))
     model = load(path)
-    names = _names(outputs, model.columns)
+    names = chosen_names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)
     asked |= {"parameters": parameters, "initial": initial, "settings": settings}
     with progress(quiet or json) as watch:
@@ -120,7 +134,8 @@ def _report(execution: Execution, names: list[str] | None, found: Any, json: boo
         say(f"hsdsl: stopped ({execution.stop.reason}): {execution.stop.message}")
 
 
-def _names(outputs: str | None, known: list[str]) -> list[str] | None:
+def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
+    """Return the names that ``--outputs`` gives, None where it is left out."""
     from hsdsl.names import did_you_mean
 
     if outputs is None:

@@ -31,6 +31,7 @@ from hsdsl.simulate.timeline import make_timeline
 if TYPE_CHECKING:
     from hsdsl.metrics.points import Place, PointDistance
     from hsdsl.model.estimate import Estimate
+    from hsdsl.model.stream import Streamed
     from hsdsl.system import HybridSystem
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
@@ -228,6 +229,56 @@ class Model:
             chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
+
+    def stream(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        every: int = 1,
+        columns: Sequence[str] | None = None,
+        watch: Callable[[Progress], None] | None = None,
+        **asked: Any,
+    ) -> Streamed:
+        """Run the model with its rows going to a CSV file while it runs, in constant memory.
+
+        The file has the first row, every k-th, both rows of each jump and the last; it holds whole lines at any moment,
+        so that what a run that was killed has written can be read. A file of this name is written over.
+
+        Parameters
+        ----------
+        path : path
+            A name ending in .csv.
+        every : int
+            k.
+        columns : names, optional
+            Which states and outputs; left out, all of them.
+        watch : callable, optional
+            As for :meth:`simulate`.
+        **asked
+            What else :meth:`simulate` takes, but ``precision`` and ``samples``.
+
+        Raises
+        ------
+        UsageError
+            What cannot be served: no compiled engine, a file that cannot be written, a full disk.
+        """
+        from hsdsl.execution.samples import split
+        from hsdsl.model.stream import stream
+
+        known = (*KEYS, "settings", "parameters", "initial", "engine")
+        for name in asked:
+            if name == "samples" or name not in known:
+                raise UsageError(f"a streamed run has no argument '{name}'", did_you_mean(name, known))
+        target = Path(path)
+        if target.suffix.lower() != ".csv":
+            raise UsageError(f"{target} should end in .csv: only such a file can be written while a run goes on")
+        if every < 1:
+            raise UsageError(f"every must be at least 1, not {every}")
+        plain: dict[str, Any] = {"parameters": {}, "initial": {}}
+        prepared = self._prepare_single(plain | asked | {"engine": "c"})
+        if columns is not None:
+            split(columns, tuple(self.columns), self.program.outputs)
+        return stream(prepared, target, every, columns, watch)
 
     def ensemble(
         self,

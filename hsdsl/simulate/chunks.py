@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,9 @@ LEAST_ROWS, MOST_ROWS = 2048, 2**20
 MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
 BY_ROW = ("times", "values", "outputs", "depth")
 BY_TRANSITION = ("transition", "before", "after")
+
+
+Sink = Callable[[dict[str, Array]], Any]
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ class Chunks:
         self._full: list[dict[str, Array]] = []
         self._rows = 0  # of the chunk that is there
         self._before = 0  # rows of a run that needed more than one chunk
+        self.sink: Sink | None = None  # takes what is written, which then is not kept
 
     def clear(self, rows: float) -> None:
         """Make ready for a run that may write about so many rows."""
@@ -55,8 +60,15 @@ class Chunks:
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large."""
+        if self.sink is not None:
+            self.sink(self._written())
+            return self._reset()
         self._full.append(self._written())
         self._open(min(2 * self._rows, MOST_ROWS))
+
+    def rest(self) -> dict[str, Array]:
+        """What is in the chunk that is being written."""
+        return self._written()
 
     def _open(self, rows: int) -> None:
         shape = self._shape

@@ -21,7 +21,7 @@ from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import notes, stops
 from hsdsl.simulate.along import interpolation
-from hsdsl.simulate.chunks import Shape
+from hsdsl.simulate.chunks import Shape, Sink
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.diagnosis import not_finite
@@ -83,7 +83,7 @@ class CompiledPlan:
 
     def lay(self, desk: Desk) -> None:
         """Put everything on a desk."""
-        desk.clear(self._rows)
+        desk.clear(0 if desk.chunks.sink else self._rows)
         task = desk.task
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
@@ -153,17 +153,35 @@ class CompiledRun:
 
     def follow(self) -> tuple[Stop, dict[str, Array]]:
         """Run to the end: why it stopped, and the columns that were written."""
-        desk = self.desk
-        self.plan.lay(desk)
-        with noted(desk.press):
-            self.plan.compiled.simulate(desk.task)
-        if desk.failed:
-            raise desk.failed[0]
-        whole = desk.chunks.whole()
-        said: list[tuple[int, int, int, int, float, float]] = whole["note"].tolist()
+        self._run()
+        whole = self.desk.chunks.whole()
+        self._notes(whole)
+        return self._stop(), whole
+
+    def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
+        """Run to the end, handing over every chunk as soon as it is full: why it stopped, and the last chunk."""
+
+        def take(chunk: dict[str, Array]) -> None:
+            self._notes(chunk)
+            sink(chunk)
+
+        self.desk.chunks.sink = take
+        self._run()
+        rest = self.desk.chunks.rest()
+        self._notes(rest)
+        return self._stop(), rest
+
+    def _run(self) -> None:
+        self.plan.lay(self.desk)
+        with noted(self.desk.press):
+            self.plan.compiled.simulate(self.desk.task)
+        if self.desk.failed:
+            raise self.desk.failed[0]
+
+    def _notes(self, chunk: dict[str, Array]) -> None:
+        said: list[tuple[int, int, int, int, float, float]] = chunk["note"].tolist()
         for note in said:
             self._note(*note)
-        return self._stop(), whole
 
     def _note(self, number: int, index: int, k: int, count: int, time: float, other: float) -> None:
         """Say what the loop has noted, as the Python loop does."""

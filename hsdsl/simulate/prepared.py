@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
-from hsdsl.execution import Execution, Stop
+from hsdsl.execution import Array, Execution, Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
+from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.entry import enter
@@ -64,14 +66,29 @@ class Prepared:
         ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
         An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
         """
-        settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
-        degree = settings.method.degree if settings.method else 0
-        recorder = Recorder(arithmetic, settings.until, degree, len(program.outputs))
-        control = make_control(settings, arithmetic)
-        run, spent = Run(program, self.kernel, self.timeline, settings, control, recorder), dict(seconds or {})
+        run, spent = self._fresh(), dict(seconds or {})
         if self.plan is not None:
             return self._by_compiled_loop(run, self.plan, watch, spent)
         return self._by_python_loop(run, watch, spent)
+
+    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, int, dict[str, Array]]:
+        """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
+
+        Returns why it stopped, how many transitions it made, and the last chunk.
+        """
+        assert self.plan is not None
+        under_way = CompiledRun(self._fresh(), self.plan, self.plan.desks.new(tables.Task()))
+        if watch is not None:
+            watch(under_way)
+        stop, rest = under_way.stream(sink)
+        return stop, under_way.made, rest
+
+    def _fresh(self) -> Run:
+        """A run that nothing is recorded of yet."""
+        settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
+        degree = settings.method.degree if settings.method else 0
+        recorder = Recorder(arithmetic, settings.until, degree, len(program.outputs))
+        return Run(program, self.kernel, self.timeline, settings, make_control(settings, arithmetic), recorder)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
         if watch is not None:

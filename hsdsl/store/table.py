@@ -34,7 +34,7 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
     return evaluate(execution, np.array([row for row, _ in ordered], dtype=int), instants)
 
 
-def write_csv(samples: Samples, file: BinaryIO) -> None:
+def write_csv(samples: Samples, file: BinaryIO, header: bool = True) -> None:
     """Write CSV (UTF-8): ``time,mode,j``, states, outputs; numbers such that they read back exactly.
 
     A cell is empty where the mode lacks the state, or a state that the output needs; a state that is not a number
@@ -42,7 +42,8 @@ def write_csv(samples: Samples, file: BinaryIO) -> None:
     """
     text = io.TextIOWrapper(file, encoding="utf-8", newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(samples.labels)
+    if header:
+        writer.writerow(samples.labels)
     number = _writer_of(samples)
     cells = [_cells(values, present, number) for _, values, present in samples.columns()]
     writer.writerows(zip(*cells, strict=True))

@@ -1,0 +1,161 @@
+"""``Model.stream``: a run of any length whose rows go to a file while it runs, in constant memory."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Array, Samples, Stop
+from hsdsl.program import Program
+from hsdsl.simulate.chunks import states_of_arcs
+from hsdsl.simulate.prepared import Prepared, Watch
+from hsdsl.store.table import write_csv
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """What is known of a run whose rows are in a file.
+
+    Attributes
+    ----------
+    path : Path
+    rows, steps : int
+        How many rows were written, and how many there were.
+    transitions : int
+    stop : Stop
+    final : Samples
+        The last row.
+    """
+
+    path: Path
+    rows: int
+    steps: int
+    transitions: int
+    stop: Stop
+    final: Samples
+    engine: str
+    scheme: str
+    method: str
+    seconds: float
+
+
+class Rows:
+    """Takes the chunks of a run, and writes the first row, every k-th, both rows of each jump and the last."""
+
+    def __init__(
+        self,
+        program: Program,
+        states: tuple[str, ...],
+        every: int,
+        columns: Sequence[str] | None,
+        write: Callable[[bytes], None],
+    ) -> None:
+        self._program, self._every, self._columns, self._write = program, every, columns, write
+        self._names = tuple(dict.fromkeys((*states, *(name for mode in program.modes for name in mode.states))))
+        self._layouts = [states]
+        self._arc = 0, 0, 0  # the last one's mode, jump and layout
+        self._held: dict[str, Array] | None = None  # the last row: whether a jump follows it is not known yet
+        self.written = self.steps = 0
+
+    def take(self, chunk: dict[str, Array], at_end: bool = False) -> Samples | None:
+        """Write what is due of a chunk; at the end of the run returns its last row."""
+        rows = self._rows(chunk)
+        if self._held is not None:
+            rows = {name: np.concatenate([self._held[name], column]) for name, column in rows.items()}
+        if not len(rows["times"]):
+            return None
+        due, jumps = rows["due"], np.flatnonzero(np.diff(rows["jump"]))
+        due[jumps] = due[jumps + 1] = True
+        self._held = {name: column[-1:].copy() for name, column in rows.items()}
+        due[-1] = at_end
+        table = self._table({name: column[due] for name, column in rows.items()}).only(self._columns)
+        text = io.BytesIO()
+        write_csv(table, text, header=self.written == 0)
+        self._write(text.getvalue())
+        self.written += len(table)
+        return self._table(self._held) if at_end else None
+
+    def _rows(self, chunk: dict[str, Array]) -> dict[str, Array]:
+        """The rows of a chunk with mode, jump, layout and whether they are due; its first ones may be of the arc before."""
+        arcs, count = chunk["arc"], len(chunk["times"])
+        number = self.steps + np.arange(count)
+        self.steps += count
+        known = [*states_of_arcs(arcs["mode"].tolist(), self._program, self._layouts[self._arc[2]])]
+        self._layouts += [layout for layout in dict.fromkeys(known) if layout not in self._layouts]
+        layout = np.array([self._layouts.index(states) for states in known], int)
+        which = np.searchsorted(arcs["first"], number, side="right")
+        columns = (arcs["mode"].astype(int), arcs["jump"].astype(int), layout)
+        mode, jump, kind = (np.append(last, own) for last, own in zip(self._arc, columns, strict=True))
+        self._arc = int(mode[-1]), int(jump[-1]), int(kind[-1])
+        places = {"mode": mode[which], "jump": jump[which], "kind": kind[which], "due": number % self._every == 0}
+        return {name: chunk[name].copy() for name in ("times", "values", "outputs")} | places
+
+    def _table(self, rows: dict[str, Array]) -> Samples:
+        columns = np.full((len(rows["times"]), len(self._names)), float("nan"))
+        present = np.zeros(columns.shape, dtype=bool)
+        for number, layout in enumerate(self._layouts):
+            here = rows["kind"] == number
+            for i, name in enumerate(layout):
+                columns[here, self._names.index(name)] = rows["values"][here, i]
+                present[here, self._names.index(name)] = True
+        return Samples(
+            time=rows["times"],
+            mode=np.array([mode.name for mode in self._program.modes])[rows["mode"]],
+            jump=rows["jump"],
+            kind=np.full(len(columns), "flow"),
+            states=self._names,
+            outputs=self._program.outputs,
+            state_columns=columns,
+            output_columns=rows["outputs"],
+            present=present,
+        )
+
+
+def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:
+    """Run to the end, rows going to a CSV file.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be written, or not on to its end (a full disk); what was written stays.
+    """
+    plan, settings = prepared.plan, prepared.settings
+    assert plan is not None and settings.method is not None
+    began = time.perf_counter()
+    try:
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
+        try:
+            rows = Rows(prepared.program, prepared.states, every, columns, lambda text: _write_all(file, text))
+            stop, made, rest = prepared.stream(rows.take, watch)
+            final = rows.take(rest, at_end=True)
+        finally:
+            os.close(file)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from None
+    assert final is not None
+    return Streamed(
+        path=path,
+        rows=rows.written,
+        steps=rows.steps,
+        transitions=made,
+        stop=stop,
+        final=final,
+        engine="c",
+        scheme=settings.scheme,
+        method=settings.method.name,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _write_all(file: int, text: bytes) -> None:
+    """Write whole lines in one call where the system takes them so: a process that is killed leaves no half of one."""
+    left = memoryview(text)
+    while left:
+        left = left[os.write(file, left) :]
