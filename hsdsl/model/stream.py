@@ -83,7 +83,7 @@ class Rows:
         return self._table(self._held) if at_end else None
 
     def _rows(self, chunk: dict[str, Array]) -> dict[str, Array]:
-        """The rows of a chunk with mode, jump, layout and whether they are due; its first ones may be of the arc before."""
+        """The rows of a chunk with mode, jump, layout and whether they are due; the first may be of the arc before."""
         arcs, count = chunk["arc"], len(chunk["times"])
         number = self.steps + np.arange(count)
         self.steps += count
