@@ -19,6 +19,7 @@
 `result`            what was recorded or written, as an execution
 `compiled`          the same loop in C: what it is given and what it says
 `desk`, `chunks`    where the compiled loop works, and what it writes to
+`ensemble`          many instances by the compiled loop
 `interrupt`         Ctrl-C while it runs
 `verdict`           do the theorem's hypotheses hold for a run?
 ==================  ===========================================================================================
