@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from pydantic import ValidationError
@@ -18,6 +19,7 @@ from hsdsl.schema.repair import descend, repair
 from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
 
 _MOST_REPAIRS = 8
+_TAG = re.compile(r"<(?:expression|mapping|list|samples|file)>|function-\w+\[.*")  # of a union; no key in the file
 _PLACE: dict[tuple[str, ...], str] = {
     (): "a model",
     ("parameters", "*"): "a parameter",
@@ -164,7 +166,7 @@ def _missing(root: Node, location: Location) -> Diagnostic:
 
 
 def _names(location: Location) -> Location:
-    return tuple(step for step in location if isinstance(step, int) or not step.startswith(("<", "function-")))
+    return tuple(step for step in location if isinstance(step, int) or not _TAG.fullmatch(step))
 
 
 def _trimmed(pattern: tuple[str, ...]) -> tuple[str, ...]:

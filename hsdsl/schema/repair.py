@@ -74,7 +74,7 @@ def descend(root: Node, location: Location) -> Node | None:
 
 
 def _renamed(parent: Node | None, key: str, meant: str | None) -> bool:
-    if not isinstance(parent, Mapping) or meant is None or meant in parent.entries:
+    if not isinstance(parent, Mapping) or key not in parent.entries or meant is None or meant in parent.entries:
         return False
     found, value = parent.entries.pop(key)
     parent.entries[meant] = (Key.at(meant, found.place), value)
@@ -84,7 +84,12 @@ def _renamed(parent: Node | None, key: str, meant: str | None) -> bool:
 def _equated(parent: Node | None, key: str) -> bool:
     """Take the key ``x = 1``, which has no value, for the key x with the value 1."""
     equation = assigned(key)
-    if equation is None or not isinstance(parent, Mapping) or equation[0] in parent.entries:
+    if (
+        not isinstance(parent, Mapping)
+        or key not in parent.entries
+        or equation is None
+        or equation[0] in parent.entries
+    ):
         return False
     found, value = parent.entries.pop(key)
     name, text = equation
@@ -110,7 +115,9 @@ def _moved(root: Node, parent: Node | None, key: str, belongs: Location) -> bool
         name = str(belongs[0])
         above = Mapping({}, above.place)
         root.entries[name] = (root.entries[name][0], above)
-    if not (isinstance(above, Mapping) and isinstance(parent, Mapping)) or key in above.entries:
+    if not (isinstance(above, Mapping) and isinstance(parent, Mapping) and key in parent.entries):
+        return False
+    if key in above.entries:
         return False
     above.entries[key] = parent.entries.pop(key)
     return True

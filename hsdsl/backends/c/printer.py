@@ -75,7 +75,7 @@ def expression(text: str, names: Mapping[str, str]) -> str:
     ValueError
         It is none.
     """
-    return _Printer(names).expression(ast.parse(text, mode="eval").body)
+    return _Printer(names).expression(ast.parse(text, "<hsdsl tape>", mode="eval").body)
 
 
 class _Printer:

@@ -9,6 +9,7 @@ from typing import Literal
 
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.rules import (
+    adding_delays,
     after_the_end,
     argument_units,
     condition_beyond_surface,
@@ -159,6 +160,7 @@ RULES: dict[str, Rule] = {
     "HS466": Rule(odd_samples),
     "HS467": Rule(odd_step),
     "HS468": Rule(late_reference),
+    "HS469": Rule(adding_delays, severity="note"),
     # comments
     "HS490": Rule(unused_ignore),
     "HS491": Rule(unknown_ignore),

@@ -3,7 +3,8 @@
 ## What it does
 
 Finds resets that give a state, which the source does not have, a value without any state, input or time in it. States
-whose flow is a number are left alone: clocks begin at 0.
+whose flow is a number are left alone: clocks begin at 0. A note where the value is 0, as of a current that begins to
+flow.
 
 ## Why it is bad
 
@@ -50,7 +51,7 @@ from collections.abc import Iterator
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.subject import Subject
+from hsdsl.lint.subject import ModePart, Subject
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -64,4 +65,16 @@ def check(subject: Subject) -> Iterator[Finding]:
                 if invented and not flows[item.edge.target].get(name, value).is_number:
                     place = next(key.place for key in item.document.reset if key == name)
                     message = f"the state '{name}' begins in '{item.edge.target}' with the same value every time"
-                    yield Finding(place.span, message, f"compute it from the states of '{part.key}'")
+                    yield Finding(place.span, message, _hint(part, value), severity="note" if value == 0 else None)
+
+
+def _hint(part: ModePart, value: object) -> str:
+    """What to do about it: a current that begins at 0 is often meant so."""
+    ignore = "ignore this where it always begins so"
+    if not part.mode.states:
+        return ignore
+    return (
+        f"{ignore}, else compute it from the states of '{part.key}'"
+        if value == 0
+        else (f"compute it from the states of '{part.key}', or {ignore}")
+    )
