@@ -113,14 +113,17 @@ def terms(series: Taylor, order: int, t: Number, x: State) -> Stages:
 def proposed_step(stages: Stages, x: State, tolerance: Number, arithmetic: Arithmetic) -> Number | None:
     """The step at which the first terms that are left out stay below the tolerance; None where all of them vanish.
 
-    Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap.
+    Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap. With l
+    the largest coefficient of order m relative to the tolerance, h = l**(-1/m); one more of order m + 1 asks for less
+    only where it exceeds l/h.
     """
-    power, least = arithmetic.functions["pow"], None
+    power, least, before = arithmetic.functions["pow"], None, arithmetic.zero
     for m in (len(stages) - 1, len(stages)):
         largest = arithmetic.zero
         for c, a in zip(stages[m - 1], x, strict=True):
             largest = max(largest, abs(c) / (tolerance * (1 + abs(a))))
-        if largest > 0:
+        if largest > 0 and (least is None or largest * least > before):
             h = power(1 / largest, (arithmetic.zero + 1) / m)
             least = h if least is None else min(h, least)
+        before = largest
     return least

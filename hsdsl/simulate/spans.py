@@ -260,6 +260,8 @@ class SeriesSteps:
                 power = power * h
             if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k, middle):
                 return interpolate(run, here, t, h, x, z, piece)
+            while len(scaled) > 2 and scaled[-1] == 0:  # a polynomial solution is of lower degree
+                scaled.pop()
             curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
         return curves
 

@@ -72,6 +72,16 @@ def test_example_2_through_both_zeno_points(method: str, within: float) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("tolerance", "within"), [(1e-3, 2e-2), (1e-6, 1e-4)])
+def test_a_release_from_rest_is_no_impact_at_loose_tolerances(method: str, tolerance: float, within: float) -> None:
+    """What an interpolation may be off by must not count as a rise where the flow leaves the guard tangentially."""
+    run, exact = located("oscillator-with-stop-2", method, tolerance), exact_example_2()
+    assert [reason.split()[0] for reason in run.verdict.reasons[:5]] == ["at", "Zeno", "at", "Zeno", "at"]
+    assert abs(run.transitions[0].time - float(exact.impacts[0].time)) <= within
+    assert len(run.transitions) < 60
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_ball_comes_to_rest(method: str) -> None:
     run = located("bouncing-ball", method, 1e-12, until=14)
     assert run.stop.reason == "until" and run.verdict.theorem == "left"

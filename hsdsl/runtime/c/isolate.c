@@ -52,7 +52,7 @@ static void split(double *b, int n, double s, double *left) {
   }
 }
 
-static double value_of(const double *c, int n, double s) {
+HS_INLINE double value_of(const double *c, int n, double s) {
   double total = c[n];
   for (int k = n - 1; k >= 0; k--) total = c[k] + s * total;
   return total;
@@ -110,7 +110,7 @@ HS_INLINE double value_and_slope(const double *c, int n, double s, double *slope
 
 /* Solve for the one root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket). */
 static double refined(const double *c, int n, double a, double b) {
-  const double fa = value_of(c, n, a), fb = value_of(c, n, b);
+  const double fa = a == 0 ? c[0] : value_of(c, n, a), fb = value_of(c, n, b);
   if (!(fa < 0)) return a;
   if (!(fb > 0)) return b;
   double s = a - fa * (b - a) / (fb - fa);

@@ -49,7 +49,7 @@ static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
 }
 
 /* The sums of the absolute terms that the state at the share s of a step is computed from. */
-static double span_size(const hs_run *run, const hs_span *span, double s, int state) {
+HS_INLINE double span_size(const hs_run *run, const hs_span *span, double s, int state) {
   if (run->method->kind == HS_TABLE)
     return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
   const int w = run->width, last = span->piece.degree - 1;
@@ -144,15 +144,16 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
    See hsdsl/integrators/taylor.py. */
 static double proposed_step(const hs_run *run, int n, double tolerance) {
   const int order = run->method->order;
-  double least = NAN;
+  double least = NAN, before = 0.0;
   for (int m = order; m <= order + 1; m++) {
     double largest = 0.0;
     for (int s = 0; s < n; s++)
       largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * (1 + fabs(run->x[s]))));
-    if (largest > 0) {
+    if (largest > 0 && (least != least || largest * least > before)) {
       const double h = pow(1 / largest, 1.0 / m);
       least = least != least ? h : hs_min(h, least);
     }
+    before = largest;
   }
   return least;
 }
@@ -221,7 +222,9 @@ static int curves(hs_run *run) {
     if (converges(run, c, order, k, &met)) return RAISED;
     if (!met) return interpolate(run);
     c[0] = run->starts[k];
-    *degree_of(found, 0, k) = order;
+    int degree = order; /* of a polynomial solution it is lower */
+    while (degree > 1 && c[degree] == 0) degree--;
+    *degree_of(found, 0, k) = degree;
     *off_of(found, 0, k) = 0;
     found->certain[k] = 1;
   }

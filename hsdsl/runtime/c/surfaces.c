@@ -17,7 +17,7 @@ static hs_found obstacle(hs_obstacle kind, int surface) {
 }
 
 /* Evaluate a step's interpolant at s = theta, to `value`. */
-static void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
+HS_INLINE void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
   const int w = run->width, last = piece->degree - 1;
   for (int s = 0; s < run->here.dimension; s++) {
     double v = piece->c[last * w + s] * theta;
