@@ -154,6 +154,8 @@ class Program:
     where the file bounds it, ``initial``, ``input_i`` (times, then values; where they are not plain numbers), ``until``
     and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions`` and ``sample_count`` or
     ``sample_times``.
+
+    ``left_out`` names the states of the file that are not here, since nothing that was asked for depends on them.
     """
 
     path: str
@@ -170,3 +172,4 @@ class Program:
     scheme: str | None
     method: str | None
     constants: Routines
+    left_out: tuple[str, ...] = ()

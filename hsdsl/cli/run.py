@@ -103,7 +103,7 @@ def _simulate(
     model = load(path)
     names = chosen_names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)
-    asked |= {"parameters": parameters, "initial": initial, "settings": settings}
+    asked |= {"parameters": parameters, "initial": initial, "settings": settings, "outputs": names}
     with progress(quiet or json) as watch:
         execution = model.simulate(**asked, watch=watch)
     found = model.estimate(execution, **asked) if estimate else None

@@ -60,7 +60,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
     key = None if data is None else seen.key_of(data, limits)
     program = None if key is None else seen.find(Path(path), key)
     if program is not None:
-        return Model(None, time.perf_counter() - began, limits, program)
+        return Model(None, time.perf_counter() - began, limits, program, key)
     system = _elaborate(path, limits)
     return Model(system, time.perf_counter() - began, limits, key=key)
 
@@ -90,12 +90,14 @@ class Model:
         limits: Limits | None = None,
         program: Program | None = None,
         key: str | None = None,
+        left_out: tuple[str, ...] = (),
     ) -> None:
         if system is not None:
             self.system = system
         if program is not None:
             self.program = program
-        self._key = key
+        self._key, self._left_out = key, left_out
+        self._smaller: dict[tuple[str, ...], Model] = {}
         self._limits = limits
         self._seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | None = None
@@ -127,7 +129,7 @@ class Model:
 
         began = time.perf_counter()
         with applied(self._limits):
-            program = lower(self.system)
+            program = replace(lower(self.system), left_out=self._left_out)
         self._seconds["compile"] += time.perf_counter() - began
         if self._key is not None and program.method in (None, "auto", *METHODS):  # else it is refused, with its place
             seen.keep(Path(program.path), self._key, program, self.system.files)
@@ -149,6 +151,7 @@ class Model:
         settings: Mapping[str, Any] | None = None,
         engine: str = "auto",
         precision: int | None = None,
+        outputs: Sequence[str] | None = None,
         watch: Callable[[Progress], None] | None = None,
     ) -> Execution:
         """Run the model from t = 0.
@@ -177,6 +180,9 @@ class Model:
             What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
+        outputs : sequence of str, optional
+            States and outputs that are asked for; states that none of them depends on are not integrated. The run is
+            that of :meth:`only`.
         watch : callable, optional
             Given the recorder before the run starts.
 
@@ -189,6 +195,16 @@ class Model:
         UsageError
             A name, value or combination that cannot be served.
         """
+        if outputs is not None:
+            smaller = self.only(outputs)
+            given = {
+                k: v for k, v in (initial or {}).items() if k in ("mode", *smaller.columns) or k not in self.columns
+            }
+            return smaller.simulate(
+                until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
+                samples=samples, max_transitions=max_transitions, parameters=parameters, initial=given,
+                settings=settings, engine=engine, precision=precision, watch=watch,
+            )  # fmt: skip
         asked = dict(
             until=until,
             scheme=scheme,
@@ -329,6 +345,47 @@ class Model:
         settings = {key: asked.get(key) for key in KEYS}
         engine = asked.get("engine", "auto")
         return self._prepare(asked.get("settings"), settings, asked["parameters"], asked["initial"], engine, None)
+
+    def only(self, asked: Sequence[str]) -> Model:
+        """Return the model with the states and outputs asked for and those they, or any transition, depend on.
+
+        What stays runs as a model written without the rest: adaptive steps follow what stays alone, and a state that
+        is left out can neither stop a run nor keep one from coming to rest.
+
+        Parameters
+        ----------
+        asked : sequence of str
+            Names of states and outputs.
+
+        Raises
+        ------
+        UsageError
+            A name that the model does not have.
+        """
+        names = tuple(sorted(set(asked)))
+        for name in names:
+            if name not in self.columns:
+                raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))
+        if names not in self._smaller:
+            self._smaller[names] = self._without_the_rest(names)
+        return self._smaller[names]
+
+    def _without_the_rest(self, names: tuple[str, ...]) -> Model:
+        began = time.perf_counter()
+        key = None if self._key is None else seen.key_of_part(self._key, names)
+        program = None if key is None else seen.find(Path(self.program.path), key)
+        if program is not None:
+            whole = program.left_out == ()
+            return self if whole else Model(None, self._seconds["load"], self._limits, program, key)
+        from hsdsl.elaborate.needed import left_out, only
+
+        system = only(self.system, names)
+        if system is self.system:
+            if key is not None:
+                seen.keep(Path(self.program.path), key, self.program, system.files)
+            return self
+        spent = self._seconds["load"] + time.perf_counter() - began
+        return Model(system, spent, self._limits, key=key, left_out=left_out(self.system, system))
 
     def estimate(self, execution: Execution, **asked: Any) -> Estimate:
         """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""

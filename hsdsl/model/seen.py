@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -37,6 +37,11 @@ Row = list[Any]
 def key_of(model: bytes, limits: Limits | None) -> str:
     """Return the name of the entry of a model file with these bytes."""
     return store.key_of(model, _fingerprint(), repr(limits or current()))
+
+
+def key_of_part(key: str, names: Sequence[str]) -> str:
+    """Return the name of the entry of a part of a model: what is left of it for states and outputs with these names."""
+    return store.key_of(key, *names)
 
 
 @cache

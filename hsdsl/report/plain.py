@@ -21,7 +21,7 @@ def as_json(execution: Execution) -> dict[str, Any]:
     """Return the object of `run --json`; numbers that are not finite are None, multiprecision ones stay as they are.
 
     Its keys, in this order: ``model``, ``engine``, ``scheme``, ``method``, ``settings``, ``stop``, ``transitions``,
-    ``final``, ``verdict``, ``seconds``. Print it with :func:`dumps`.
+    ``final``, ``verdict``, ``seconds``, and ``left_out`` where states were not integrated. Print it with :func:`dumps`.
     """
     stop, final, verdict = execution.stop, execution.final, execution.verdict
     run = {
@@ -29,13 +29,15 @@ def as_json(execution: Execution) -> dict[str, Any]:
         "engine": execution.engine,
         "scheme": execution.scheme,
         "method": execution.method,
-        "settings": execution.settings,
+        "settings": {name: value for name, value in execution.settings.items() if name != "left_out"},
         "stop": {"reason": stop.reason, "time": stop.time, "message": stop.message},
         "transitions": [_transition(transition) for transition in execution.transitions],
         "final": {"time": final.time, "mode": final.mode, "state": final.state, "outputs": final.outputs},
         "verdict": {"theorem": verdict.theorem, "reasons": verdict.reasons},
         "seconds": {stage: execution.seconds.get(stage) for stage in STAGES},
     }
+    if "left_out" in execution.settings:
+        run["left_out"] = execution.settings["left_out"]
     return cast("dict[str, Any]", plain(run))
 
 

@@ -40,6 +40,7 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
     lines += _labelled("final", words.final(execution.final), columns)
     for line in (words.values(execution.final.state), words.outputs(execution.final)):
         lines += _labelled("", line, columns)
+    lines += _labelled("left out", words.left_out(execution), columns) if "left_out" in execution.settings else []
     lines += _labelled("verdict", words.verdict(execution), columns)
     lines += _labelled("time", words.seconds(execution), columns)
     return "\n".join(lines)

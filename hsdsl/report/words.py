@@ -33,6 +33,12 @@ def settings(execution: Execution) -> list[str]:
     return [*chosen, f"engine {execution.engine}"]
 
 
+def left_out(execution: Execution) -> str:
+    """Say which states were not integrated, and why that cannot matter."""
+    found = execution.settings["left_out"]
+    return f"{', '.join(found['states'])}: {found['reason']}"
+
+
 def times(values: Sequence[Any]) -> list[str]:
     """Write times with one number of decimals, about ten significant digits for the largest."""
     finite = [float(t) for t in values if decimals.is_finite(t)]

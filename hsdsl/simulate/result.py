@@ -29,7 +29,7 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     execution = Execution.deferred(
         {"verdict": _verdict},
         **_about(run, stop, seconds, "python"),
-        settings=described(run.settings),
+        settings=described(run.settings, run.program.left_out),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs),
         **columns,
@@ -61,7 +61,7 @@ class Written:
 
     def _later(self) -> dict[str, Callable[[Execution], Any]]:
         return {
-            "settings": lambda _: described(self.run.settings),
+            "settings": lambda _: described(self.run.settings, self.run.program.left_out),
             "transitions": lambda _: tuple(transitions_of(self.whole, self.run.program)),
             "arcs": lambda _: self._arcs(),
             "final": self._final,
@@ -136,8 +136,8 @@ def output_values(run: Run, mode: str, t: Number, x: State) -> State:
     return run.kernel.bind(index, run.timeline.at(t).data).outputs(t, *x)
 
 
-def described(settings: Settings) -> dict[str, Any]:
-    """Return the settings that governed the run, by the names of the model file."""
+def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the settings that governed the run, by the names of the model file, and what was left out of it."""
     samples = settings.samples if isinstance(settings.samples, int | None) else list(settings.samples)
     size = {"step": settings.step} if settings.tolerance is None else {"tolerance": settings.tolerance}
     return {
@@ -147,6 +147,7 @@ def described(settings: Settings) -> dict[str, Any]:
         "max_transitions": settings.max_transitions,
         **({} if samples is None else {"samples": samples}),
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
+        **({"left_out": {"states": list(left_out), "reason": notes.LEFT_OUT}} if left_out else {}),
     }
 
 
