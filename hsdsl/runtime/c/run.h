@@ -8,7 +8,8 @@
 #include "hs_math.h"
 #include "hs_simulate.h"
 
-#if defined(__GNUC__)
+#if defined(HS_INLINE) /* given by who compiles: sanitizers take minutes over code that is inlined everywhere */
+#elif defined(__GNUC__)
 #define HS_INLINE static inline __attribute__((always_inline))
 #else
 #define HS_INLINE static inline
