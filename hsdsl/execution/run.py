@@ -68,6 +68,7 @@ class Execution(Deferred):
     assessment: Assessment | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
         self.check()
 
     def check(self) -> None:

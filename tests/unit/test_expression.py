@@ -161,9 +161,9 @@ LARGE = {
 
 @pytest.mark.parametrize("text", LARGE.values(), ids=LARGE.keys())
 def test_large_expressions_work(text):
-    began = time.perf_counter()
+    began = time.process_time()
     number(text)
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 REFUSED = {
@@ -191,9 +191,9 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "code"), REFUSED.values(), ids=REFUSED.keys())
 def test_what_would_fill_the_memory_is_refused_at_once(text, code):
-    began = time.perf_counter()
+    began = time.process_time()
     assert fault(text).code == code
-    assert time.perf_counter() - began < 2
+    assert time.process_time() - began < 2
 
 
 def test_nothing_in_the_scope_is_reached_but_names():
