@@ -218,11 +218,12 @@ def _outputs(execution: Execution, at: _Places, values: Array) -> Array:
         change = execution.outputs[at.follower[at.between]] - execution.outputs[at.row[at.between]]
         outputs[at.between] += at.fraction[at.between][:, None] * change
         return outputs
+    times = at.time.tolist()  # NumPy's own numbers go on where Python's have no value
     for i in np.flatnonzero(at.between):
         arc = execution.arcs[int(at.arc[i])]
         state = tuple(values[i, : len(arc.states)].tolist())
         try:
-            outputs[i] = execution.output_function(arc.mode, at.time[i], state)
+            outputs[i] = execution.output_function(arc.mode, times[i], state)
         except DOMAIN_ERRORS:
             outputs[i] = float("nan")
     return outputs

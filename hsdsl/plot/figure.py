@@ -78,7 +78,8 @@ def _headings(figure: Figure, top: Axes, execution: Execution, data: Curves, tit
     count = len(execution.transitions)
     facts = f"{execution.scheme} {execution.method}, {count:,} transition{'' if count == 1 else 's'}, "
     if execution.stop.complete:
-        facts += f"{execution.stop.reason} at t = {words.number(execution.stop.time, 8)}"
+        how = "until" if execution.stop.reason == "until" else "final mode entered at"
+        facts += f"{how} t = {words.number(execution.stop.time, 8)}"
     else:
         facts += f"stopped: {words.stop(execution)}"
     top.set_title(
