@@ -108,7 +108,7 @@ class _Source:
                 f"{given.system.path} is not the model that the run is of, or was edited since",
                 "run it again, or give the model as it was",
             )
-        return with_parameters(given._values(FLOAT64), self.parameters)  # pyright: ignore[reportPrivateUsage]
+        return with_parameters(given.parts.values(FLOAT64), self.parameters)
 
     def number(self, relaxation: Any) -> float:
         number = float(self.values.number(relaxation, "relaxation") if isinstance(relaxation, str) else relaxation)

@@ -5,18 +5,25 @@ from __future__ import annotations
 import io
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Samples, Stop
+from hsdsl.execution.samples import split
+from hsdsl.model.requests import KEYS
+from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.chunks import states_of_arcs
 from hsdsl.simulate.prepared import Prepared, Watch
 from hsdsl.store.table import write_csv
+
+if TYPE_CHECKING:
+    from hsdsl.model.model import Model
 
 
 @dataclass(frozen=True)
@@ -116,6 +123,30 @@ class Rows:
             output_columns=rows["outputs"],
             present=present,
         )
+
+
+def check(
+    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, asked: Mapping[str, Any], model: Model
+) -> Path:
+    """Refuse what no streamed run can be asked, and return where its rows go.
+
+    Raises
+    ------
+    UsageError
+        An argument there is not, a name that does not end in .csv, a column the model does not have.
+    """
+    known = (*KEYS, "settings", "parameters", "initial", "engine")
+    for name in asked:
+        if name == "samples" or name not in known:
+            raise UsageError(f"a streamed run has no argument '{name}'", did_you_mean(name, known))
+    target = Path(path)
+    if target.suffix.lower() != ".csv":
+        raise UsageError(f"{target} should end in .csv: only such a file can be written while a run goes on")
+    if every < 1:
+        raise UsageError(f"every must be at least 1, not {every}")
+    if columns is not None:
+        split(columns, tuple(model.columns), model.program.outputs)
+    return target
 
 
 def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:

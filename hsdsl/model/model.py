@@ -1,0 +1,354 @@
+"""``Model``: what can be done with a model, by name; what it is made of is in `hsdsl.model.parts`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.execution import Ensemble, Execution
+from hsdsl.integrators import METHODS
+from hsdsl.limits import Limits
+from hsdsl.model.parts import Parts, parts_of
+from hsdsl.model.remembered import Remembered, key_of
+from hsdsl.model.requests import Request
+from hsdsl.model.values import with_parameters
+from hsdsl.names import did_you_mean
+from hsdsl.program import Program
+from hsdsl.simulate import Prepared
+from hsdsl.simulate.recorder import Progress
+
+if TYPE_CHECKING:
+    from hsdsl.metrics.points import Place, PointDistance
+    from hsdsl.model.estimate import Estimate
+    from hsdsl.model.stream import Streamed
+    from hsdsl.system import HybridSystem
+
+MOST_PREPARED = 16
+
+
+def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path
+        A YAML file in the language.
+    limits : Limits, optional
+        What the file may ask for, and where its data may lie, where the defaults are not to hold.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; all of them are carried.
+    UsageError
+        The file cannot be read.
+    """
+    return Model(parts_of(path, limits))
+
+
+class Model:
+    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both."""
+
+    def __init__(self, of: HybridSystem | Parts) -> None:
+        self.parts = of if isinstance(of, Parts) else Parts(of)
+        self._smaller: dict[tuple[str, ...], Model] = {}
+        self._prepared: Remembered[Prepared] = Remembered(MOST_PREPARED)
+
+    def __repr__(self) -> str:
+        modes = ", ".join(mode.name for mode in self.program.modes[:8])
+        return f"<hsdsl model {Path(self.program.path).name}: modes {modes}{', ...' * (len(self.program.modes) > 8)}>"
+
+    @property
+    def system(self) -> HybridSystem:
+        """The mathematics; of a model seen before it is read when it is asked for.
+
+        Raises
+        ------
+        UsageError
+            The file has changed meanwhile.
+        """
+        return self.parts.system
+
+    @property
+    def program(self) -> Program:
+        """The model lowered to routines, free of SymPy."""
+        return self.parts.program
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of all states and outputs."""
+        return self.parts.columns
+
+    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
+        """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.requests`)."""
+        return self.parts.resolve(settings, asked)
+
+    def simulate(
+        self,
+        until: Any = None,
+        *,
+        scheme: str | None = None,
+        method: str | None = None,
+        step: Any = None,
+        tolerance: Any = None,
+        relaxation: Any = None,
+        samples: Any = None,
+        max_transitions: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        settings: Mapping[str, Any] | None = None,
+        engine: str = "auto",
+        precision: int | None = None,
+        outputs: Sequence[str] | None = None,
+        watch: Callable[[Progress], None] | None = None,
+    ) -> Execution:
+        """Run the model from t = 0.
+
+        Every number may be given as a number or as an expression of the model's parameters, such as ``"40*pi"``.
+
+        Parameters
+        ----------
+        until : number or str, optional
+            End of the run.
+        scheme, method : str, optional
+            A name of :data:`hsdsl.simulate.SCHEMES`; a name of :data:`hsdsl.integrators.METHODS`, or ``auto``.
+        step, tolerance : number or str, optional
+            Fixed step, or bound on the local error relative to 1 + |x|; they exclude each other.
+        relaxation : number or str, optional
+            The paper's epsilon: a depth in the model's own units, and a time.
+        samples : int, str or sequence, optional
+            How many equally spaced samples, or their times; what files are written at.
+        max_transitions : int or str, optional
+            Stop rather than make more.
+        parameters, initial : mapping, optional
+            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed anew.
+        settings : mapping, optional
+            Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
+        engine : {"auto", "c", "python"}
+            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
+        precision : int, optional
+            Decimal digits (mpmath numbers) instead of float64.
+        outputs : sequence of str, optional
+            States and outputs that are asked for; states that none of them depends on are not integrated. The run is
+            that of :meth:`only`.
+        watch : callable, optional
+            Given the recorder before the run starts.
+
+        Returns
+        -------
+        Execution
+
+        Raises
+        ------
+        UsageError
+            A name, value or combination that cannot be served.
+        """
+        if outputs is not None:
+            smaller = self.only(outputs)
+            given = {
+                k: v for k, v in (initial or {}).items() if k in ("mode", *smaller.columns) or k not in self.columns
+            }
+            return smaller.simulate(
+                until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
+                samples=samples, max_transitions=max_transitions, parameters=parameters, initial=given,
+                settings=settings, engine=engine, precision=precision, watch=watch,
+            )  # fmt: skip
+        asked = dict(
+            until=until,
+            scheme=scheme,
+            method=method,
+            step=step,
+            tolerance=tolerance,
+            relaxation=relaxation,
+            samples=samples,
+            max_transitions=max_transitions,
+        )
+        key = key_of(*asked.values(), parameters, initial, settings, engine, precision)
+        ready = self._prepared.find(key)
+        if ready is None:
+            ready = self.parts.prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
+            self._prepared.keep(key, ready)
+        return ready.simulate(watch, self.parts.seconds)
+
+    def stream(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        every: int = 1,
+        columns: Sequence[str] | None = None,
+        watch: Callable[[Progress], None] | None = None,
+        **asked: Any,
+    ) -> Streamed:
+        """Run the model with its rows going to a CSV file while it runs, in constant memory.
+
+        The file has the first row, every k-th, both rows of each jump and the last; it holds whole lines at any moment,
+        so that what a run that was killed has written can be read. A file of this name is written over.
+
+        Parameters
+        ----------
+        path : path
+            A name ending in .csv.
+        every : int
+            k.
+        columns : names, optional
+            Which states and outputs; left out, all of them.
+        watch : callable, optional
+            As for :meth:`simulate`.
+        **asked
+            What else :meth:`simulate` takes, but ``precision`` and ``samples``.
+
+        Raises
+        ------
+        UsageError
+            What cannot be served: no compiled engine, a file that cannot be written, a full disk.
+        """
+        from hsdsl.model.stream import check, stream
+
+        target = check(path, every, columns, asked, self)
+        plain: dict[str, Any] = {"parameters": {}, "initial": {}}
+        return stream(self.parts.prepare_single(plain | asked | {"engine": "c"}), target, every, columns, watch)
+
+    def ensemble(
+        self,
+        *,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        samples: Any = None,
+        transition_times: int = 0,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **asked: Any,
+    ) -> Ensemble:
+        """Run many instances of the model, on all cores where there is a compiler.
+
+        Every instance gives what :meth:`simulate` gives, to the last bit. Ctrl-C keeps those that are done.
+
+        Parameters
+        ----------
+        parameters, initial : mapping, optional
+            Overrides by name: numbers, expressions, or arrays of numbers. Arrays are brought to a common shape, as
+            NumPy does; each of its elements is an instance.
+        samples : int or sequence of float, optional
+            Sample every run: at so many equally spaced times from 0 to its ``until``, or at these times.
+        transition_times : int
+            Keep the times of so many first transitions of each run.
+        threads : int, optional
+            How many; left out, as many as there are cores for this process.
+        progress : callable, optional
+            Called now and then with how many instances are done and how many there are.
+        **asked
+            What else :meth:`simulate` takes for every instance: ``until``, ``scheme``, ``method``, ``step``,
+            ``tolerance``, ``relaxation``, ``max_transitions``, ``settings``, ``engine``.
+
+        Raises
+        ------
+        UsageError
+            What cannot be served: a name, arrays of different shapes, no instance that can be run.
+        """
+        from hsdsl.model.ensemble import Asked, check, cores, ready
+
+        check(asked, threads, transition_times)
+        sorted_out = Asked.of(parameters or {}, initial or {}, samples, transition_times, asked)
+        values = self.parts.values(FLOAT64)
+        return ready(self, values, sorted_out, self.parts.prepare_single).run(threads or cores(), progress)
+
+    def only(self, asked: Sequence[str]) -> Model:
+        """Return the model with the states and outputs asked for and those they, or any transition, depend on.
+
+        What stays runs as a model written without the rest: adaptive steps follow what stays alone, and a state that
+        is left out can neither stop a run nor keep one from coming to rest.
+
+        Parameters
+        ----------
+        asked : sequence of str
+            Names of states and outputs.
+
+        Raises
+        ------
+        UsageError
+            A name that the model does not have.
+        """
+        names = tuple(sorted(set(asked)))
+        for name in names:
+            if name not in self.columns:
+                raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))
+        if names not in self._smaller:
+            smaller = self.parts.only(names)
+            self._smaller[names] = self if smaller is self.parts else Model(smaller)
+        return self._smaller[names]
+
+    def estimate(self, execution: Execution, **asked: Any) -> Estimate:
+        """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
+        from hsdsl.model.estimate import compare, finer_settings
+
+        finer = finer_settings(execution)
+        asked |= {"step": None, "tolerance": None, "watch": None, **finer}
+        if execution.method in METHODS:
+            asked["method"] = execution.method
+        return compare(execution, self.simulate(**asked), finer)
+
+    def plot(
+        self, execution: Execution, path: str | os.PathLike[str], parameters: Mapping[str, Any] | None = None
+    ) -> None:
+        """Draw an execution of this model, with the levels of its guards; see `hsdsl.plot`.
+
+        Parameters
+        ----------
+        execution : Execution
+            What to draw.
+        path : path
+            A name ending in .png, .svg or .html.
+        parameters : mapping, optional
+            The overrides the execution was run with: guards' levels depend on them.
+        """
+        from hsdsl.model.guards import guard_lines
+        from hsdsl.plot import plot
+
+        values = with_parameters(self.parts.values(FLOAT64), parameters or {})
+        plot(execution, path, guards=guard_lines(values), units=self.program.units)
+
+    def distance(
+        self,
+        p: str | Place,
+        q: str | Place,
+        *,
+        metric: str = "quotient",
+        relaxation: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        hops: int | None = None,
+        seconds: float = 60.0,
+        plot: str | os.PathLike[str] | None = None,
+    ) -> PointDistance:
+        """Return how far apart two points are: the length of the shortest curve that may pass through guards.
+
+        Parameters
+        ----------
+        p, q : str or Place
+            A mode and all its states, as ``"free x=13 v=5"``; values are expressions of parameters.
+        metric : {"quotient", "relaxed"}
+            The paper's d_M (Def. 12), or that of the relaxed space (Def. 19).
+        relaxation : number or str, optional
+            The paper's epsilon; left out, the file's or 1e-6.
+        parameters : mapping, optional
+            Overrides by name.
+        hops : int, optional
+            The most passages of a path.
+        seconds : float
+            About how long the search may take; then the interval is what is known by then, and ``certified`` says so.
+        plot : path, optional
+            Draw the shortest path found there (.png or .svg), where its modes have two coordinates.
+
+        Raises
+        ------
+        UsageError
+            A point or a number that does not fit the model, or a point outside its mode's domain.
+        """
+        from hsdsl.model.between_runs import budget_of
+        from hsdsl.model.places import distance_of_points
+
+        values = with_parameters(self.parts.values(FLOAT64), parameters or {})
+        return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)

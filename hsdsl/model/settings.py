@@ -1,0 +1,86 @@
+"""The numbers of a run: what it is asked, evaluated with the parameters it has, and checked."""
+
+from __future__ import annotations
+
+from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
+from hsdsl.errors import UsageError
+from hsdsl.integrators import TaylorMethod
+from hsdsl.model.requests import FILE, Request, check_digits, check_smooth
+from hsdsl.model.values import Values, samples
+from hsdsl.simulate import Settings
+
+LEAST_DIGITS, MOST_DIGITS = 16, 10_000
+
+
+def settings_of(request: Request, values: Values) -> Settings:
+    """Turn what a run is asked into numbers, and refuse those that make no run.
+
+    Raises
+    ------
+    UsageError
+        A number that is out of its range, or a method that cannot serve this model.
+    """
+
+    def number(key: str) -> Number:
+        asked = request.values[key]
+        if asked.place == FILE:
+            return values.constant(key)[0]
+        return values.number(asked.value, key)
+
+    def positive(key: str) -> Number:
+        value = number(key)
+        if not value > 0:
+            raise UsageError(f"{key} must be positive, not {value}")
+        return value
+
+    until = number("until")
+    if until < 0:
+        raise UsageError(f"until must not be negative, not {until}")
+    most = number("max_transitions")
+    if most < 0 or most != int(most):
+        raise UsageError(f"max_transitions must be a whole number, not {most}")
+    step = positive("step") if request.size == "step" else None
+    if step is not None and until > 0 and until + step == until:
+        raise UsageError(f"a step of {step} is lost in round-off beside until = {until}", "take a larger step")
+    check_digits(request.method, values.kernel.arithmetic)
+    check_smooth(request.method, values.program)
+    tolerance = positive("tolerance") if request.size == "tolerance" else None
+    method = request.method
+    if isinstance(method, TaylorMethod):
+        method = method.for_tolerance(tolerance, values.kernel.arithmetic)
+    return Settings(
+        scheme=request.scheme,
+        method=method,
+        step=step,
+        tolerance=tolerance,
+        relaxation=positive("relaxation"),
+        until=until,
+        max_transitions=int(most),
+        samples=_samples(request, values),
+    )
+
+
+def _samples(request: Request, values: Values) -> int | tuple[Number, ...] | None:
+    asked = request.values.get("samples")
+    if asked is None:
+        return None
+    if asked.place != FILE:
+        return samples(values, asked.value)
+    if values.has("sample_times"):
+        return values.constant("sample_times")
+    return samples(values, values.constant("sample_count")[0])
+
+
+def arithmetic_of(precision: int | None) -> Arithmetic:
+    """Return the arithmetic of a run: float64, or mpmath's with so many decimal digits.
+
+    Raises
+    ------
+    UsageError
+        Too few digits, or too many.
+    """
+    if precision is None:
+        return FLOAT64
+    if not LEAST_DIGITS <= precision <= MOST_DIGITS:
+        raise UsageError(f"precision is {LEAST_DIGITS} to {MOST_DIGITS} decimal digits, not {precision}")
+    return multiprecision(precision)
