@@ -1,20 +1,12 @@
-"""The structures of ``hs.h`` and ``hs_simulate.h`` as ctypes sees them, and a method's table as one of them."""
+"""The structures of ``hs.h``, ``hs_simulate.h``, ``hs_sample.h`` and ``hs_ensemble.h`` as ctypes sees them."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_void_p
-from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import numpy as np
-
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.integrators import ButcherTableau, RadauMethod
-from hsdsl.integrators import Method as Integrator
-from hsdsl.integrators.collocation import coefficients
 
 ARC = np.dtype([("first", "i8"), ("jump", "i8"), ("mode", "i4"), ("kind", "i4")])
 TRANSITION = np.dtype(
@@ -324,86 +316,3 @@ STRUCTURES = (  # as in hs_sizes
     Edge, Mode, Model, Row, Collocation, Method, Timeline, Interpolation, Settings,
     Chunk, Visited, Stop, Task, Sampling, Ensemble,
 )  # fmt: skip
-
-
-def interpolation_table(
-    nodes: Sequence[float], tests: Sequence[float], matrix: Sequence[Sequence[float]], share: float
-) -> Interpolation:
-    """Write an interpolation as the runtime takes it."""
-    columns = (nodes, tests, [number for line in matrix for number in line])
-    return Interpolation(len(nodes) - 1, *((c_double * len(column))(*column) for column in columns), share)
-
-
-@cache
-def method_table(method: Integrator) -> Method:
-    """Write a method as the runtime takes it."""
-    if isinstance(method, ButcherTableau):
-        return _butcher_table(method)
-    return Method(
-        kind=METHOD_KINDS.index(method.name),
-        order=method.error_order,
-        interpolant=INTERPOLANTS.index("dense"),
-        degree=method.degree,
-        collocation=ctypes.pointer(_collocation()) if isinstance(method, RadauMethod) else None,
-    )
-
-
-def _collocation() -> Collocation:
-    """Write the coefficients of Radau IIA."""
-    known = coefficients(FLOAT64)
-
-    def square(rows: Sequence[Sequence[float]]) -> Any:
-        return (c_double * 3 * 3)(*((c_double * 3)(*row) for row in rows))
-
-    return Collocation(
-        (c_double * 3)(*known.nodes),
-        square(known.powers),
-        known.gamma,
-        known.alpha,
-        known.beta,
-        square(known.mix),
-        square(known.unmix),
-        (c_double * 3)(*known.estimate),
-        known.share,
-        (c_double * 3)(*known.values),
-        (c_double * 3)(*known.slope),
-    )
-
-
-def _butcher_table(table: ButcherTableau) -> Method:
-    """Write a tableau: numbers instead of fractions, rows without their zeros."""
-    stages = table.stages - table.last_is_next
-    end: tuple[Fraction, ...] = ()
-    rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
-    dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
-    return Method(
-        kind=METHOD_KINDS.index("table"),
-        stages=stages,
-        extra=len(table.extra),
-        order=table.order,
-        interpolant=INTERPOLANTS.index(table.interpolant),
-        degree=table.degree,
-        c=(c_double * len(rows))(*(_node(table, row) for row in rows)),
-        a=(Row * len(rows))(*map(_row, rows)),
-        b=_row(table.b),
-        error=_row(_difference(table.b, table.embedded)),
-        coarse=_row(_difference(table.b, table.coarse)),
-        dense=(Row * max(1, len(dense)))(*map(_row, dense)),
-        gain=float(sum(map(abs, table.b))),
-    )
-
-
-def _node(table: ButcherTableau, row: Sequence[Fraction]) -> float:
-    node = sum(row, Fraction(0))
-    at_end = abs(node - 1) <= (0 if table.digits is None else Fraction(1, 10**table.digits))
-    return 1.0 if at_end else FLOAT64.constant(node)
-
-
-def _difference(b: Sequence[Fraction], other: Sequence[Fraction] | None) -> Sequence[Fraction]:
-    return () if other is None else [v - w for v, w in zip(b, other, strict=True)]
-
-
-def _row(weights: Sequence[Fraction]) -> Row:
-    terms = [(i, FLOAT64.constant(w)) for i, w in enumerate(weights) if w]
-    count = max(1, len(terms))
-    return Row(len(terms), (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms)))

@@ -16,7 +16,7 @@ from hsdsl.execution import Array, Stop
 from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.program import Program
-from hsdsl.runtime import tables
+from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import notes, stops
@@ -65,7 +65,7 @@ class CompiledPlan:
         x: State,
     ) -> None:
         assert settings.method is not None
-        method, model = tables.method_table(settings.method), compiled.table
+        method, model = methods.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
         self.program, self.compiled, self.states = program, compiled, states
         self.one_layout = all(m.states == states or (m.final and not m.states) for m in program.modes)
@@ -107,7 +107,7 @@ def task_settings(settings: Settings) -> tables.Settings:
 def _interpolations(settings: Settings) -> Any:
     """Surfaces along steps, and a push over time."""
     pair = [(interpolation(degree, FLOAT64), share) for degree, share in (along_steps(settings), OVER_TIME)]
-    tables_of = [tables.interpolation_table(b.nodes, b.tests, b.matrix, share + b.rounding) for b, share in pair]
+    tables_of = [methods.interpolation_table(b.nodes, b.tests, b.matrix, share + b.rounding) for b, share in pair]
     return (tables.Interpolation * 2)(*tables_of)
 
 
