@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib
-import importlib.util
 import pkgutil
 import re
 import subprocess
@@ -13,8 +12,8 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from types import ModuleType
 
+import generate
 import pytest
 
 import hsdsl
@@ -24,14 +23,6 @@ from hsdsl.errors import CODES
 ROOT = Path(__file__).parent.parent.parent
 SOURCES = sorted((ROOT / "hsdsl").rglob("*.py"))
 HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "click", "pandas")
-
-
-def reference_pages() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def modules_after(statement: str) -> set[str]:
@@ -53,10 +44,9 @@ def test_the_probe_for_heavy_libraries_sees_them():
     assert "sympy" in modules_after("import hsdsl.system")
 
 
-@pytest.mark.parametrize("name", reference_pages().PAGES)
+@pytest.mark.parametrize("name", generate.PAGES)
 def test_reference_page_says_what_the_code_says(name):
-    pages = reference_pages()
-    assert pages.written(name) == pages.render(name), "run python docs/generate.py"
+    assert generate.written(name) == generate.render(name), "run python docs/generate.py"
 
 
 def test_every_integrator_is_registered():

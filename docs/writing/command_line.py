@@ -1,0 +1,45 @@
+"""The page of the command line, from the program itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+from writing.markdown import table
+
+from hsdsl import cli
+
+COMMAND_LINE = """# Command line
+
+Answers go to standard output, messages and progress to standard error.
+
+| exit code | meaning |
+| --- | --- |
+| 0 | the run reached `until` or a final mode; the model has no errors |
+| 1 | the model has errors |
+| 2 | wrong usage, or a file that cannot be read |
+| 3 | the run stopped for [another reason](../meaning.md#m10-stop) |
+| 130 | interrupted; what was computed is kept |
+
+"""
+
+
+def command_line() -> str:
+    """Document every verb and option from the program itself."""
+    parts = [COMMAND_LINE]
+    context = click.Context(cli.app)
+    for name in cli.VERBS:
+        command: Any = cli.app.get_command(context, name)
+        parts.append(f"## hsdsl {name}\n\n{(command.help or '').strip()}\n\n")
+        parameters = [p for p in command.params if p.name != "help"]
+        rows = [(as_typed(p), (getattr(p, "help", None) or "").strip()) for p in parameters]
+        parts.append(table(("argument or option", "meaning"), rows) if rows else "")
+    return "".join(parts)
+
+
+def as_typed(parameter: Any) -> str:
+    """Name a parameter as one would type it."""
+    if parameter.param_type_name == "argument":
+        return f"`{(parameter.metavar or parameter.name).upper()}`"
+    names = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts))
+    return names if parameter.is_flag else f"{names} `{parameter.metavar or parameter.type.name.upper()}`"

@@ -1,0 +1,105 @@
+"""The page of the language, from the JSON Schema of models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from writing.markdown import table
+
+from hsdsl import schema
+from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
+from hsdsl.functions import CONSTANTS, FUNCTIONS
+
+LANGUAGE = """# Language
+
+A model is one YAML document. `schemas/model.schema.json` is this page for editors. What a model *means* is on
+[its own page](../meaning.md), and how much it may ask for on [another](../security.md).
+
+An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers, names, `+ - * / **`,
+parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
+
+## Model
+
+"""
+
+DEFAULTS_OF_EXPERIMENT = """## Defaults of `experiment`
+
+A call or an option counts before `--set`, `--set` before the file, the file before these. `step` and `tolerance`
+exclude each other: the stronger one removes the other, and a method that only the file names and that cannot
+serve gives way to `auto`.
+
+"""
+
+SCALARS = {
+    frozenset({"number", "string"}): "expression",
+    frozenset({"string", "number", "boolean"}): "text",
+    frozenset({"string"}): "text",
+    frozenset({"boolean", "string"}): "condition",
+    frozenset({"boolean"}): "`true` or `false`",
+}
+
+
+def language() -> str:
+    """Document every key of a model from the JSON Schema."""
+    document = schema.json_schema()
+    parts = [LANGUAGE, keys_of(document)]
+    for name, node in document.get("$defs", document.get("definitions", {})).items():
+        parts.append(f"## {name}\n\n")
+        parts.append(f"{node['description']}\n\n" if "description" in node else "")
+        parts.append(keys_of(node) if "properties" in node else f"Value: {value_of(node)}.\n\n")
+    parts.append(DEFAULTS_OF_EXPERIMENT + table(("key", "default"), defaults()))
+    parts.append("## Functions and constants\n\n" + table(("name", "arguments"), callables()))
+    return "".join(parts)
+
+
+def keys_of(node: Mapping[str, Any]) -> str:
+    """Tabulate the keys of an object."""
+    required = node.get("required", ())
+    rows = [
+        (f"`{key}`", value_of(value), "yes" if key in required else "", value.get("description", ""))
+        for key, value in node["properties"].items()
+    ]
+    if isinstance(node.get("additionalProperties"), dict):
+        rows.append(("any name", value_of(node["additionalProperties"]), "", ""))
+    return table(("key", "value", "required", "meaning"), rows)
+
+
+def value_of(node: Mapping[str, Any]) -> str:
+    """Say in words what a JSON Schema node admits."""
+    if "$ref" in node:
+        name = node["$ref"].rsplit("/", 1)[1]
+        return f"[{name}](#{name.lower()})"
+    if "const" in node or "enum" in node:
+        return " or ".join(f"`{value}`" for value in node.get("enum", [node.get("const")]))
+    for union in ("anyOf", "oneOf", "allOf"):
+        if union in node:
+            words = (value_of(part) for part in node[union] if part != {"type": "null"})
+            return " or ".join(dict.fromkeys(words))
+    return typed(node)
+
+
+def typed(node: Mapping[str, Any]) -> str:
+    """Say in words what a node with a `type` admits; an empty value is legal wherever a list or a map is."""
+    given = node.get("type", "anything")
+    kinds = {given} if isinstance(given, str) else set(given) - {"null"}
+    if kinds == {"array"}:
+        return f"list of {value_of(node.get('items', {}))}"
+    if kinds == {"object"} and isinstance(node.get("additionalProperties"), dict):
+        return f"map from name to {value_of(node['additionalProperties'])}"
+    return SCALARS.get(frozenset(kinds)) or " or ".join(sorted(kinds))
+
+
+def defaults() -> Iterator[tuple[str, str]]:
+    """List what an experiment is when nothing is said."""
+    for key, value in (DEFAULTS | {"tolerance": DEFAULT_TOLERANCE}).items():
+        text = value if isinstance(value, str) else f"{float(value):g}".replace("e-0", "e-").replace("e+0", "e")
+        yield f"`{key}`", f"`{text}`"
+
+
+def callables() -> Iterator[tuple[str, str]]:
+    """List what an expression may name beside the model's own names."""
+    for name, (_, least, most) in FUNCTIONS.items():
+        yield f"`{name}`", f"{least}" if most == least else f"{least} to {most or 'any number'}"
+    for name in (*CONSTANTS, "t"):
+        yield f"`{name}`", "time" if name == "t" else "constant"
