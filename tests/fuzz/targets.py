@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import difflib  # noqa: F401 - it compiles a named tuple when it is imported, which hsdsl does late
 import re
 import signal
 import sys

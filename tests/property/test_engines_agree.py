@@ -42,7 +42,7 @@ def check_smooth(seeds: range) -> Counter[str]:
 
 
 def test_random_models_run_alike() -> None:
-    reasons = check(range(40))
+    reasons = check(range(20))
     assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain"}, reasons
 
 
@@ -54,6 +54,6 @@ def test_smooth_random_models_run_alike_by_taylor_series() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(6))
 def test_many_random_models_run_alike(block: int) -> None:
-    seeds = range(1000 + 100 * block, 1100 + 100 * block)
-    assert check(seeds).total() > 100
-    assert check_smooth(seeds).total() > 100
+    seeds = range(1000 + 10 * block, 1010 + 10 * block)
+    assert check(seeds).total() > 30
+    assert check_smooth(seeds).total() > 10
