@@ -13,11 +13,10 @@ from fractions import Fraction
 from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.simulate.isolate import Coefficients, last_root, rises, total, value
+from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, total, value
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_PIECES = 1000  # of a step, before what is left is taken as it is
-ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 Function = Callable[[Number], Number]
 
 

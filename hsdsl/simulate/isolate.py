@@ -17,6 +17,7 @@ from hsdsl.arithmetic import Number
 
 Coefficients = Sequence[Number]  # of 1, s, s**2, ...
 MOST_REFINEMENTS = 300
+ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 
 
 @cache
@@ -126,6 +127,8 @@ def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Numb
         if b[0] <= 0 < b[-1] and changes(b) <= 1:
             return _refined(c, low, high, tiny)
         if high - low <= tiny:
+            if b[0] > 0:  # what it rose through lies before
+                continue
             return low
         left, right = split(b, one / 2)
         middle = (low + high) / 2
@@ -133,13 +136,31 @@ def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Numb
     return None
 
 
+def _towards(c: Coefficients, end: Number, other: Number, sign: int) -> tuple[Number, Number]:
+    """Halve the way to an end of a bracket until the polynomial has the sign: a smaller bracket, or ``end`` twice.
+
+    An end that is a root up to round-off may be where the polynomial comes back, not where it rises.
+    """
+    while True:
+        middle = (end + other) / 2
+        if middle in (end, other):
+            return end, end
+        if sign * value(c, middle) > 0:
+            return middle, other
+        other = middle
+
+
 def _refined(c: Coefficients, a: Number, b: Number, tiny: Number) -> Number:
     """Solve for the root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket)."""
     fa, fb = value(c, a), value(c, b)
-    if not fa < 0:
+    noise = ROUNDING * tiny * total(map(abs, c), fa * 0)
+    if not fa < -noise:
+        a, b = _towards(c, a, b, -1)
+    if not fb > noise:
+        b, a = _towards(c, b, a, 1)
+    fa, fb = value(c, a), value(c, b)
+    if a == b or not fa < 0:
         return a
-    if not fb > 0:
-        return b
     s = a - fa * (b - a) / (fb - fa)
     for _ in range(MOST_REFINEMENTS):
         if not a < s < b:

@@ -3,7 +3,6 @@
 #define MOST_SPLITS 30 /* MOST_HALVINGS there */
 #define MOST_PIECES 1000
 #define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
-#define ROUNDING 8
 #define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
 
 typedef int hs_functions(hs_run *run, double s, double *values);

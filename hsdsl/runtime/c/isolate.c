@@ -2,6 +2,7 @@
    A polynomial of degree n is c[0] + c[1] s + ... + c[n] s**n. */
 
 #define MOST_REFINEMENTS 300
+#define ROUNDING 8
 #define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
 
 /* C(n, 0) to C(n, n). */
@@ -108,11 +109,33 @@ HS_INLINE double value_and_slope(const double *c, int n, double s, double *slope
   return total;
 }
 
+/* Halve the way to an end of a bracket until the polynomial has the sign; the end itself where it has not. */
+static void towards(const double *c, int n, double *end, double *other, double sign) {
+  for (;;) {
+    const double middle = (*end + *other) / 2;
+    if (middle == *end || middle == *other) {
+      *other = *end;
+      return;
+    }
+    if (sign * value_of(c, n, middle) > 0) {
+      *end = middle;
+      return;
+    }
+    *other = middle;
+  }
+}
+
 /* Solve for the one root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket). */
 static double refined(const double *c, int n, double a, double b) {
-  const double fa = a == 0 ? c[0] : value_of(c, n, a), fb = value_of(c, n, b);
-  if (!(fa < 0)) return a;
-  if (!(fb > 0)) return b;
+  double fa = a == 0 ? c[0] : value_of(c, n, a), fb = value_of(c, n, b);
+  double noise = 0.0;
+  for (int k = 0; k <= n; k++) noise = noise + fabs(c[k]);
+  noise = ROUNDING * HS_UNIT * noise;
+  const int falls = !(fa < -noise), stays = !(fb > noise);
+  if (falls) towards(c, n, &a, &b, -1.0);
+  if (stays) towards(c, n, &b, &a, 1.0);
+  if (falls || stays) fa = value_of(c, n, a), fb = value_of(c, n, b);
+  if (a == b || !(fa < 0)) return a;
   double s = a - fa * (b - a) / (fb - fa);
   for (int count = 0; count < MOST_REFINEMENTS; count++) {
     if (!(a < s && s < b)) {
@@ -152,7 +175,10 @@ static int last_root(hs_run *run, const double *c, int n, double start, double e
     for (int i = 1; i <= n; i++) least = hs_min(least, b[i]);
     if (least > 0) continue;
     if (b[0] <= 0 && 0 < b[n] && changes(b, n) <= 1) return *root = refined(c, n, low, high), 1;
-    if (high - low <= HS_UNIT) return *root = low, 1;
+    if (high - low <= HS_UNIT) {
+      if (b[0] > 0) continue; /* what it rose through lies before */
+      return *root = low, 1;
+    }
     const double middle = (low + high) / 2;
     copy(cuts[open + 1].b, b, n + 1);
     split(cuts[open + 1].b, n, 0.5, cut->b);
