@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import TypeVar
 
-from hsdsl.integrators.radau import RADAU, RadauMethod
+from hsdsl.integrators.implicit import RADAU, RadauMethod
 from hsdsl.integrators.tableau import ButcherTableau
 from hsdsl.integrators.taylor import TaylorMethod
 

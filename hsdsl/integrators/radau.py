@@ -15,31 +15,14 @@ E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 19
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators.collocation import coefficients
+from hsdsl.integrators.implicit import RADAU as RADAU
 from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
 from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConvergence
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
-
-
-@dataclass(frozen=True)
-class RadauMethod:
-    """The method; its coefficients are made in the number type of a run."""
-
-    name: str = "radau"
-    title: str = "Radau IIA, three stages, for stiff flows"
-    source: str = "Hairer and Wanner 1996, IV.5 and IV.8, doi:10.1007/978-3-642-05221-7"
-    order: int = 5
-    error_order: int = 4
-    adaptive: bool = True
-    digits: int | None = None
-    degree: int = 3
-
-
-RADAU = RadauMethod()
 
 
 def radau_stepper(jacobian: Routine, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:

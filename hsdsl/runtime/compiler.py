@@ -8,12 +8,13 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 NAMES = ("cc", "gcc", "clang")
+Effort = Literal["-O1", "-O2"]
 EXACT = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
 FLAGS = (
     "-std=c99",
-    "-O2",
     "-ffp-contract=off",  # no a*b + c in one rounding
     "-fno-math-errno",
     *(f"-fno-builtin-{name}" for name in (*EXACT, "exp", "log", "pow", "atan2")),  # those of the library, as Python's
@@ -34,8 +35,8 @@ class Compiler:
     command: tuple[str, ...]
     identity: str
 
-    def build(self, sources: Sequence[Path], includes: Sequence[Path], target: Path) -> None:
-        """Compile sources to a shared library.
+    def build(self, sources: Sequence[Path], includes: Sequence[Path], target: Path, effort: Effort) -> None:
+        """Compile sources to a shared library, with so much effort to make it fast.
 
         Raises
         ------
@@ -44,7 +45,7 @@ class Compiler:
         """
         import subprocess  # what is compiled already needs none
 
-        command = [*self.command, *FLAGS, *(f"-I{folder}" for folder in includes), "-o", str(target)]
+        command = [*self.command, effort, *FLAGS, *(f"-I{folder}" for folder in includes), "-o", str(target)]
         command += [*map(str, sources), "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)

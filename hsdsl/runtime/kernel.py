@@ -17,7 +17,7 @@ from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import tables
-from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.runtime.compiler import Effort, NoCompiler
 from hsdsl.runtime.library import is_kept, load
 
 Address = int | None
@@ -27,6 +27,10 @@ RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Double
 SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Doubles, Doubles)
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
+
+# More effort compiles the runtime in twice the time, while a first run waits, and makes it a twentieth faster.
+RUNTIME: Effort = "-O1"
+MODEL: Effort = "-O2"
 
 Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
 _loaded: dict[Parts, ctypes.CDLL] = {}
@@ -46,7 +50,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
     parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
     with _loading:  # another thread may be at it: see `begin`
         if parts not in _loaded:
-            library = load(_text(parts), lambda: _text(parts))
+            library = load(_text(parts), lambda: _text(parts), RUNTIME)
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.restype = None
             library.hs_sample.restype = ctypes.c_int64
@@ -63,7 +67,7 @@ def begin(scheme: str, method: str) -> None:
             runtime(scheme, method)
 
     with suppress(NoCompiler):
-        if not is_kept(_text(_parts(scheme, method))):
+        if not is_kept(_text(_parts(scheme, method)), RUNTIME):
             Thread(target=compile_runtime, daemon=True).start()
 
 
@@ -87,7 +91,7 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
-        self._library = load(repr((sizes, program.modes)), lambda: _source(program))
+        self._library = load(repr((sizes, program.modes)), lambda: _source(program), MODEL)
         self.table = tables.Model.in_dll(self._library, "hs_the_model")
         self._shared: dict[Hashable, Any] = {}
 

@@ -10,14 +10,14 @@ from functools import cache
 from pathlib import Path
 
 from hsdsl.cache import find, keep, key_of
-from hsdsl.runtime.compiler import FLAGS, Compiler, NoCompiler, find_compiler
+from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_compiler
 
 RUNTIME = Path(__file__).parent / "c"
 PRINTER = Path(__file__).parents[1] / "backends" / "c"
 KIND = "compiled"
 
 
-def load(content: str, source: Callable[[], str]) -> ctypes.CDLL:
+def load(content: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
     """Load the library that ``source`` compiles to; ``content`` stands for it in the cache, so it need not be written.
 
     Raises
@@ -26,7 +26,7 @@ def load(content: str, source: Callable[[], str]) -> ctypes.CDLL:
         There is no compiler, or it fails.
     """
     compiler = find_compiler()
-    key = _key(content, compiler)
+    key = _key(content, compiler, effort)
     path = find(KIND, key)
     if path is not None:
         try:
@@ -34,12 +34,12 @@ def load(content: str, source: Callable[[], str]) -> ctypes.CDLL:
         except OSError:  # made for something else than what runs now
             path.unlink(missing_ok=True)
     try:
-        return ctypes.CDLL(str(keep(KIND, key, ".so", lambda target: _compile(compiler, source(), target))))
+        return ctypes.CDLL(str(keep(KIND, key, ".so", lambda target: _compile(compiler, source(), target, effort))))
     except OSError as refusal:
-        return _load_unkept(compiler, source(), refusal)
+        return _load_unkept(compiler, source(), refusal, effort)
 
 
-def is_kept(content: str) -> bool:
+def is_kept(content: str, effort: Effort) -> bool:
     """Whether the library that ``content`` stands for was compiled before.
 
     Raises
@@ -47,11 +47,11 @@ def is_kept(content: str) -> bool:
     NoCompiler
         There is no compiler.
     """
-    return find(KIND, _key(content, find_compiler())) is not None
+    return find(KIND, _key(content, find_compiler(), effort)) is not None
 
 
-def _key(content: str, compiler: Compiler) -> str:
-    return key_of(content, _our_text(), compiler.identity, " ".join(FLAGS), _processor())
+def _key(content: str, compiler: Compiler, effort: Effort) -> str:
+    return key_of(content, _our_text(), compiler.identity, " ".join((effort, *FLAGS)), _processor())
 
 
 @cache
@@ -65,25 +65,25 @@ def _processor() -> str:
     return f"{sys.platform} {platform.machine()} {sys.maxsize}"
 
 
-def _compile(compiler: Compiler, source: str, target: Path) -> None:
+def _compile(compiler: Compiler, source: str, target: Path, effort: Effort) -> None:
     import shutil
     import tempfile
 
     with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
         text, library = Path(folder) / "model.c", Path(folder) / "model.so"
         text.write_text(source)
-        compiler.build([text], [RUNTIME], library)
+        compiler.build([text], [RUNTIME], library, effort)
         shutil.copyfile(library, target)
 
 
-def _load_unkept(compiler: Compiler, source: str, refusal: OSError) -> ctypes.CDLL:
+def _load_unkept(compiler: Compiler, source: str, refusal: OSError, effort: Effort) -> ctypes.CDLL:
     """Compile for this process alone where nothing can be kept."""
     import tempfile
 
     print(f"hsdsl: compiled code is not kept: {refusal}", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
         library = Path(folder) / "model.so"
-        _compile(compiler, source, library)
+        _compile(compiler, source, library, effort)
         try:
             return ctypes.CDLL(str(library))
         except OSError as error:

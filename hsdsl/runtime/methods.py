@@ -11,7 +11,6 @@ from typing import Any
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.integrators import ButcherTableau, Method, RadauMethod
-from hsdsl.integrators.collocation import coefficients
 from hsdsl.runtime import tables
 
 
@@ -39,6 +38,8 @@ def method_table(method: Method) -> tables.Method:
 
 def _collocation() -> tables.Collocation:
     """Write the coefficients of Radau IIA."""
+    from hsdsl.integrators.collocation import coefficients  # most runs need none
+
     known = coefficients(FLOAT64)
 
     def square(rows: Sequence[Sequence[float]]) -> Any:

@@ -5,6 +5,7 @@
 `located`           the other loop: step, crossing, reset (Fig. 8)
 `spans`             its steps, with states and surfaces as polynomials along them
 `along`, `isolate`  surfaces along a step; where polynomials change sign
+`interpolation`     how functions are interpolated, and how finely
 `rest`, `tails`     rest on a guard, and Zeno tails that end in it (M11)
 `entry`             entering a mode: transitions that fire at once
 `surfaces`          round-off, depth, and where a step crossed a surface
@@ -17,7 +18,8 @@
 `stops`, `notes`    how runs end, and what else they say of themselves, in sentences
 `prepared`          a run as far as its arguments decide it; the two engines
 `result`            what was recorded or written, as an execution
-`compiled`          the same loop in C: what it is given and what it says
+`compiled`          the same loop in C: what it is given
+`telling`           what it says of a run, in the same words
 `desk`, `chunks`    where the compiled loop works, and what it writes to
 `ensemble`          many instances by the compiled loop
 `interrupt`         Ctrl-C while it runs

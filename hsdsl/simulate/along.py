@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.simulate.interpolation import interpolation
 from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, total, value
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
@@ -139,41 +138,3 @@ def settles(off: Number, enough: Number, allowed: Callable[[int], Number], k: in
 def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number]) -> Number:
     """How far a polynomial is off the values it should have at some points."""
     return max(abs(value(c, s) - w) for s, w in zip(tests, wanted, strict=True))
-
-
-@dataclass(frozen=True)
-class Interpolation:
-    """How a function is interpolated on [0, 1].
-
-    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are held against it at
-    ``tests``. ``rounding`` is what round-off in them can amount to, relative to its largest value.
-    """
-
-    nodes: tuple[Number, ...]
-    tests: tuple[Number, ...]
-    matrix: tuple[tuple[Number, ...], ...]
-    rounding: Number
-
-
-@cache
-def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
-    """Make the interpolation of a degree."""
-    nodes = tuple(arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1))
-    tests = tuple(arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1))
-    matrix = _to_powers(degree, arithmetic)
-    rounding = arithmetic.unit * total((abs(m) for line in matrix for m in line), arithmetic.zero)
-    return Interpolation(nodes, tests, matrix, rounding)
-
-
-def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...], ...]:
-    """The matrix from values at i/degree to coefficients of powers, solved in fractions."""
-    columns: list[list[Fraction]] = []
-    for i in range(degree + 1):
-        c = [Fraction(1)]
-        for j in range(degree + 1):
-            if j != i:
-                scale = Fraction(i - j, degree)
-                shifted, kept = [Fraction(0), *c], [*c, Fraction(0)]
-                c = [(a - Fraction(j, degree) * b) / scale for a, b in zip(shifted, kept, strict=True)]
-        columns.append(c)
-    return tuple(tuple(arithmetic.constant(c[k]) for c in columns) for k in range(degree + 1))

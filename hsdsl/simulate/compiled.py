@@ -19,22 +19,14 @@ from hsdsl.program import Program
 from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.sampling import Sampled
-from hsdsl.simulate import notes, stops
-from hsdsl.simulate.along import interpolation
+from hsdsl.simulate import stops
 from hsdsl.simulate.chunks import Shape, Sink
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
-from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import LEFT, left_domain
+from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
 from hsdsl.simulate.interrupt import noted
-from hsdsl.simulate.located import FREE
-from hsdsl.simulate.recorder import OpenArc
-from hsdsl.simulate.relaxed import no_way_on
-from hsdsl.simulate.rest import OVER_TIME
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.spans import along_steps
-from hsdsl.simulate.surfaces import Obstacle, Surfaces
 from hsdsl.simulate.timeline import Timeline
 
 SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
@@ -179,62 +171,23 @@ class CompiledRun:
             raise self.desk.failed[0]
 
     def _notes(self, chunk: dict[str, Array]) -> None:
-        said: list[tuple[int, int, int, int, float, float]] = chunk["note"].tolist()
-        for note in said:
-            self._note(*note)
+        if len(chunk["note"]):
+            from hsdsl.simulate.telling import told
 
-    def _note(self, number: int, index: int, k: int, count: int, time: float, other: float) -> None:
-        """Say what the loop has noted, as the Python loop does."""
-        recorder, mode, kind = self.run.recorder, self.run.program.modes[index], tables.NOTICES[number]
-        if kind == "unsettled":
-            notes.unsettled(recorder, mode.name, k, time)
-        elif kind == "crowded":
-            notes.crowded(recorder, FREE, time)
-        elif kind == "at rest":
-            notes.at_rest(recorder, mode.edges[k].name, time, other)
-        elif kind == "replaced":
-            notes.replaced(recorder, mode.edges[k].name, count, time, other)
-        else:
-            self._accumulated = notes.accumulates(recorder, mode.edges[k].name, time, other)
+            said: list[tuple[int, int, int, int, float, float]] = chunk["note"].tolist()
+            for note in said:
+                self._accumulated = told(self.run, *note) or self._accumulated
 
     _accumulated: Stop | None = None
 
     def _stop(self) -> Stop:
-        found, run = self.desk.task.stop, self.run
-        t, reason, mode = found.time, tables.REASONS[found.reason], run.program.modes[found.mode]
-        if reason in ("until in strip", "until on guard"):
-            return stops.reached_in_strip(t, mode.edges[found.edge].name, reason == "until on guard")
-        if reason == "reset not finite":
-            return stops.reset_not_finite(mode.edges[found.edge], t)
-        if reason == "here not finite":
-            return not_finite(run, self._here(), t, (self._here().x,))
-        if reason == "entered outside":
-            return left_domain(self._here(), found.surface, t, "was entered outside it")
-        if reason == "left":
-            return left_domain(self._here(), found.surface, t, LEFT)
-        if reason == "step not finite":
-            here = self._here()
-            return not_finite(run, here, t, (here.x, self.desk.slope(found.dimension)))
+        reason = tables.REASONS[self.desk.task.stop.reason]
+        if reason == "until":
+            return stops.reached(self.desk.task.stop.time)
+        if reason == "interrupted":
+            return stops.interrupted(self.now)
         if reason == "accumulated" and self._accumulated is not None:
             return self._accumulated
-        if reason == "stuck":
-            run.control.h = found.h
-            obstacle = Obstacle(tables.OBSTACLES[found.obstacle], None if found.surface < 0 else found.surface)
-            return no_way_on(run, self._here(), obstacle, self.desk.slope(found.dimension))
-        return {
-            "until": lambda: stops.reached(t),
-            "final": lambda: stops.entered_final(mode.name, t),
-            "zeno": lambda: stops.endless(mode.name, t),
-            "limit": lambda: stops.limit(run.settings.max_transitions, t),
-            "interrupted": lambda: stops.interrupted(self.now),
-        }[reason]()
+        from hsdsl.simulate.telling import stop
 
-    def _here(self) -> Here:
-        """Where the run stopped, as the Python loop would have it."""
-        found, run = self.desk.task.stop, self.run
-        mode, segment = run.program.modes[found.mode], run.timeline.segments[found.segment]
-        x, t = self.desk.x(found.dimension), found.time
-        kernel = run.kernel.bind(found.mode, segment.data)
-        surfaces = Surfaces(kernel, mode.edges, tuple(0.0 for _ in x), run.arithmetic)
-        arc = OpenArc(mode.name, mode.states, "flow", self.made, None, [t], [x], [])
-        return Here(mode, kernel, surfaces, segment, arc, t, x)
+        return stop(self.run, self.desk, reason, self.made)

@@ -16,9 +16,7 @@ from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
-from hsdsl.simulate.entry import enter
 from hsdsl.simulate.recorder import Progress, Recorder
-from hsdsl.simulate.relaxed import relaxed
 from hsdsl.simulate.result import Written, from_recorder
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
@@ -26,8 +24,14 @@ from hsdsl.simulate.stops import interrupted
 from hsdsl.simulate.timeline import Timeline, make_timeline
 
 
-def _located(run: Run, here: Here | Stop) -> Stop:
+def _relaxed(run: Run, here: Here | Stop) -> Stop:
     """The loop, loaded when it is asked for: the compiled ones need nothing of it."""
+    from hsdsl.simulate.relaxed import relaxed
+
+    return relaxed(run, here)
+
+
+def _located(run: Run, here: Here | Stop) -> Stop:
     from hsdsl.simulate.located import located
 
     return located(run, here)
@@ -40,7 +44,7 @@ def _paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
 
 
 SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {
-    "relaxed": relaxed,
+    "relaxed": _relaxed,
     "located": _located,
     "paoli-schatzman": _paoli_schatzman,
 }
@@ -91,6 +95,8 @@ class Prepared:
         return Run(program, self.kernel, self.timeline, settings, make_control(settings, arithmetic), recorder)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        from hsdsl.simulate.entry import enter
+
         if watch is not None:
             watch(run.recorder)
         zero = run.arithmetic.zero

@@ -10,13 +10,14 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate import notes
 from hsdsl.simulate.along import interpolated, rises_along
+from hsdsl.simulate.interpolation import OVER_TIME
 from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
 
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 PARALLEL = 1e-6
-OVER_TIME, CORRECTIONS = (8, 1e-9), 8  # degree and residual of the interpolation of a push; of its root
+CORRECTIONS = 8  # of the root of a push
 
 
 def rests(run: Run, here: Here) -> int | None:

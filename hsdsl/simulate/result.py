@@ -18,7 +18,6 @@ from hsdsl.simulate.chunks import arcs_of, states_of_arcs, transitions_of
 from hsdsl.simulate.compiled import CompiledPlan
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.verdict import Looking, assess
 
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
@@ -159,4 +158,6 @@ def _verdict(execution: Execution) -> Verdict:
 def _assessment(run: Run, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
     if run.settings.one_stop is not None:
         return Verdict("unknown", notes.TWO_STEP)
+    from hsdsl.simulate.verdict import Looking, assess  # not every run is asked for it
+
     return assess(Looking(run, execution, error), run.recorder.departures, run.recorder.doubts)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators import ButcherTableau, RadauMethod
-from hsdsl.integrators.radau import radau_stepper
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import Kernel, ModeKernel
@@ -65,6 +64,8 @@ class Run:
             return stepper(method, len(here.x), self.arithmetic)
         mode = self.program.modes.index(here.mode)
         if isinstance(method, RadauMethod):
+            from hsdsl.integrators.radau import radau_stepper
+
             jacobian = self.kernel.jacobian(mode, here.segment.data)
             return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic)
         series = self.kernel.taylor(mode, here.segment.data)

@@ -18,20 +18,14 @@ from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
 from hsdsl.simulate.along import Piece, interpolated, settles
+from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE, along_steps
 from hsdsl.simulate.isolate import value
 from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
-from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
-RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
-UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
-LEAST_DEGREE, SERIES_DEGREE = (
-    4,
-    6,
-)  # of interpolation along a step: not below that of its dense output; of Taylor's method
 
 
 @dataclass(frozen=True)
@@ -299,15 +293,6 @@ def interpolate(run: Run, here: Here, t: Number, h: Number, x: State, z: State, 
 
     degree, share = along_steps(run.settings)
     return interpolated(values, count, degree, allowed, share, run.arithmetic)
-
-
-def along_steps(settings: Settings) -> tuple[int, Number]:
-    """Of which degree surfaces are interpolated along a step, and how far they may be off, relative to their size."""
-    tolerance, method = settings.tolerance, settings.method
-    share = max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
-    return SERIES_DEGREE if method is None or isinstance(method, TaylorMethod) else max(
-        LEAST_DEGREE, method.degree
-    ), share
 
 
 def most_halvings(run: Run) -> int:

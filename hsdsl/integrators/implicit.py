@@ -1,0 +1,22 @@
+"""What is known of the implicit method by its name; how it steps is in `hsdsl.integrators.radau`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RadauMethod:
+    """The method; its coefficients are made in the number type of a run."""
+
+    name: str = "radau"
+    title: str = "Radau IIA, three stages, for stiff flows"
+    source: str = "Hairer and Wanner 1996, IV.5 and IV.8, doi:10.1007/978-3-642-05221-7"
+    order: int = 5
+    error_order: int = 4
+    adaptive: bool = True
+    digits: int | None = None
+    degree: int = 3
+
+
+RADAU = RadauMethod()

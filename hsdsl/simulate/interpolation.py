@@ -1,0 +1,72 @@
+"""How functions are interpolated by polynomials, and how finely: surfaces along a step, and a push over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.integrators import TaylorMethod
+from hsdsl.simulate.settings import Settings
+
+RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
+UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
+LEAST_DEGREE = 4  # along a step: also not below that of its dense output
+SERIES_DEGREE = 6  # along a step of Taylor's method, where a surface has no series
+OVER_TIME = 8, 1e-9  # degree and residual of the interpolation of a push
+
+
+def along_steps(settings: Settings) -> tuple[int, Number]:
+    """Of which degree surfaces are interpolated along a step, and how far they may be off, relative to their size."""
+    tolerance, method = settings.tolerance, settings.method
+    share = max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
+    if method is None or isinstance(method, TaylorMethod):
+        return SERIES_DEGREE, share
+    return max(LEAST_DEGREE, method.degree), share
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """How a function is interpolated on [0, 1].
+
+    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are held against it at
+    ``tests``. ``rounding`` is what round-off in them can amount to, relative to its largest value.
+    """
+
+    nodes: tuple[Number, ...]
+    tests: tuple[Number, ...]
+    matrix: tuple[tuple[Number, ...], ...]
+    rounding: Number
+
+
+@cache
+def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
+    """Make the interpolation of a degree."""
+    nodes = tuple(arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1))
+    tests = tuple(arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1))
+    matrix = _to_powers(degree, arithmetic)
+    rounding = arithmetic.unit * _total(matrix, arithmetic)
+    return Interpolation(nodes, tests, matrix, rounding)
+
+
+def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...], ...]:
+    """The matrix from values at i/degree to coefficients of powers, solved in fractions."""
+    columns: list[list[Fraction]] = []
+    for i in range(degree + 1):
+        c = [Fraction(1)]
+        for j in range(degree + 1):
+            if j != i:
+                scale = Fraction(i - j, degree)
+                shifted, kept = [Fraction(0), *c], [*c, Fraction(0)]
+                c = [(a - Fraction(j, degree) * b) / scale for a, b in zip(shifted, kept, strict=True)]
+        columns.append(c)
+    return tuple(tuple(arithmetic.constant(c[k]) for c in columns) for k in range(degree + 1))
+
+
+def _total(matrix: tuple[tuple[Number, ...], ...], arithmetic: Arithmetic) -> Number:
+    total = arithmetic.zero
+    for line in matrix:
+        for m in line:
+            total = total + abs(m)
+    return total
