@@ -51,7 +51,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
 
     def run(tolerance: float) -> Result:
         values = np.full((len(grid), len(scene.states)), np.nan)
-        modes = np.full(len(grid), "", dtype=object)
+        passed: list[tuple[int, int]] = []  # where each arc's samples end, and its mode
         t, x, k, first, count = float(grid[0]), model.x, model.start, 0, 0
         began = time.perf_counter()
         problem = None
@@ -61,7 +61,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
             last = first + len(arc.values)
             for i, j in places[k]:
                 values[first:last, i] = arc.values[:, j]
-            modes[first:last] = mode.name
+            passed.append((last, k))
             first, t = last, arc.end
             if arc.edge is None:
                 break
@@ -73,6 +73,14 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
             if count > most or time.perf_counter() - began > MOST_SECONDS:
                 problem = f"gave up at t = {t:.6g} after {count} transitions"
                 break
-        return Result(values, modes, count, problem)
+        return Result(values, lambda: _modes(passed, model, len(grid)), lambda: count, problem)
 
     return run
+
+
+def _modes(passed: Sequence[tuple[int, int]], model: PlainModel, samples: int) -> Array:
+    modes, first = np.full(samples, "", dtype=object), 0
+    for last, k in passed:
+        modes[first:last] = model.modes[k].name
+        first = last
+    return modes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy.typing as npt
@@ -19,16 +20,14 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Result:
-    """A run at the scene's sample times.
+    """A run at the scene's sample times; what only the judge asks for is made when it does, outside the clock.
 
     Attributes
     ----------
     values : array, shape (samples, states of the scene)
         NaN where the run has no value (its mode lacks the state, or it ended before).
-    modes : array of str, shape (samples,)
-        The mode at each sample, empty where the run had ended.
-    transitions : int or None
-        How many were made; None where the tool cannot say.
+    find_modes, count : callable
+        They give `modes` and `transitions`.
     problem : str or None
         Why the run did not get to its end, in the tool's words; None if it did.
     execution : Execution or None
@@ -36,10 +35,20 @@ class Result:
     """
 
     values: Array
-    modes: Array
-    transitions: int | None
+    find_modes: Callable[[], Array]
+    count: Callable[[], int | None]
     problem: str | None = None
     execution: Execution | None = None
+
+    @cached_property
+    def modes(self) -> Array:
+        """The mode at each sample, shape (samples,), empty where the run had ended."""
+        return self.find_modes()
+
+    @cached_property
+    def transitions(self) -> int | None:
+        """How many were made; None where the tool cannot say."""
+        return self.count()
 
 
 @dataclass(frozen=True)

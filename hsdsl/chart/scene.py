@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -112,22 +112,27 @@ class Scene:
             grid,
             (near > clearance) & (grid <= end - clearance),
             values,
-            modes,
+            modes(),
             _countable(exact, jumps, end - clearance),
         )
 
 
-def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[Array, Array]:
-    """Return values of shape (samples, states) and modes of shape (samples,), NaN and empty beyond the end."""
-    values = np.full((len(grid), len(states)), np.nan)
-    modes = np.full(len(grid), "", dtype=object)
-    end = float(execution.time_span[1])
-    inside = grid <= end
-    at = execution.sample(grid[inside])
-    modes[inside] = at.mode
-    for i, name in enumerate(states):
-        if name in at.states:
-            values[inside, i] = at[name]
+def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[Array, Callable[[], Array]]:
+    """Return values of shape (samples, states), NaN beyond the end, and what gives the modes, empty there."""
+    known = [name for name in states if name in execution.states]
+    inside = slice(0, int(np.searchsorted(grid, float(execution.time_span[1]), side="right")))
+    at = execution.sample(grid[inside], columns=known)
+    values = at.state_columns
+    if values.dtype != float or len(known) < len(states) or inside.stop < len(grid):
+        values = np.full((len(grid), len(states)), np.nan)
+        for i, name in enumerate(known):
+            values[inside, states.index(name)] = at.state_columns[:, i]
+
+    def modes() -> Array:
+        found = np.full(len(grid), "", dtype=object)
+        found[inside] = at.mode
+        return found
+
     return values, modes
 
 

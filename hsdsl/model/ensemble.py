@@ -27,7 +27,8 @@ from hsdsl.model.values import Values
 from hsdsl.model.workers import Progress, run_compiled, run_in_turn
 from hsdsl.names import did_you_mean
 from hsdsl.simulate import Prepared
-from hsdsl.simulate.ensemble import Instances, Kept, kinds_of
+from hsdsl.simulate.ensemble import Instances, Kept
+from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.timeline import make_timeline
 
 if TYPE_CHECKING:
@@ -210,7 +211,7 @@ def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Pre
         start=start[places],
         time=asked.times(np.array([settings[k].until for k in places], dtype=float)),
     )
-    return Ready(model, asked, base, columns, places, instances, kinds_of(model.program, base.states))
+    return Ready(model, asked, base, columns, places, instances, list(Layouts(model.program, base.states).kinds))
 
 
 OUTSIDE = ("settings", "engine", "parameters", "initial")  # of what a run is asked for, these are no settings

@@ -18,7 +18,7 @@ from hsdsl.execution.samples import split
 from hsdsl.model.requests import KEYS
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
-from hsdsl.simulate.chunks import states_of_arcs
+from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.prepared import Prepared, Watch
 from hsdsl.store.table import write_csv
 
@@ -66,7 +66,7 @@ class Rows:
     ) -> None:
         self._program, self._every, self._columns, self._write = program, every, columns, write
         self._names = tuple(dict.fromkeys((*states, *(name for mode in program.modes for name in mode.states))))
-        self._layouts = [states]
+        self._layouts = Layouts(program, states)
         self._arc = 0, 0, 0  # the last one's mode, jump and layout
         self._held: dict[str, Array] | None = None  # the last row: whether a jump follows it is not known yet
         self.written = self.steps = 0
@@ -94,9 +94,7 @@ class Rows:
         arcs, count = chunk["arc"], len(chunk["times"])
         number = self.steps + np.arange(count)
         self.steps += count
-        known = [*states_of_arcs(arcs["mode"].tolist(), self._program, self._layouts[self._arc[2]])]
-        self._layouts += [layout for layout in dict.fromkeys(known) if layout not in self._layouts]
-        layout = np.array([self._layouts.index(states) for states in known], int)
+        layout = self._layouts.of_arcs(arcs["mode"], before=self._arc[2]).astype(int)
         which = np.searchsorted(arcs["first"], number, side="right")
         columns = (arcs["mode"].astype(int), arcs["jump"].astype(int), layout)
         mode, jump, kind = (np.append(last, own) for last, own in zip(self._arc, columns, strict=True))
@@ -107,7 +105,7 @@ class Rows:
     def _table(self, rows: dict[str, Array]) -> Samples:
         columns = np.full((len(rows["times"]), len(self._names)), float("nan"))
         present = np.zeros(columns.shape, dtype=bool)
-        for number, layout in enumerate(self._layouts):
+        for number, layout in enumerate(self._layouts.kinds):
             here = rows["kind"] == number
             for i, name in enumerate(layout):
                 columns[here, self._names.index(name)] = rows["values"][here, i]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -16,8 +16,6 @@ from hsdsl.runtime.kernel import CompiledModel, runtime
 BLOCK = 8  # HS_BLOCK
 NUMBER = 8  # bytes
 
-Layouts = tuple[Sequence[tuple[str, ...]], Array | None]
-
 
 class Sampled:
     """What is the same for all runs of one model over one timeline (a pointer to the ``hs_timeline``)."""
@@ -27,9 +25,9 @@ class Sampled:
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
 
-    def columns(self, layouts: Sequence[tuple[str, ...]], names: Sequence[str]) -> tuple[int, int]:
+    def columns(self, layouts: tuple[tuple[str, ...], ...], names: Sequence[str]) -> tuple[int, int]:
         """Where it is written how many states each layout has, and which of them have these names."""
-        key = tuple(layouts), tuple(names)
+        key = layouts, tuple(names)
         if key not in self._columns:
             dimension = np.array([len(states) for states in layouts], np.int32)
             places = [[there.index(name) if name in there else -1 for name in names] for there in layouts]
@@ -48,24 +46,26 @@ class Sampler:
         The execution's ``times``, ``values``, ``outputs`` and ``coefficients``.
     arcs : array
         The arcs as they were written.
-    layouts : callable
-        Asked when the run is first sampled: the states of each kind of arcs, and of which kind each arc is, as an array
-        of int32 (None where there is only one).
+    kinds : sequence of tuples of str
+        The states of each kind of arcs.
+    layout : array of int32, optional
+        Of which kind each arc is; None where there is only one.
     """
 
     def __init__(
-        self, sampled: Sampled, columns: Mapping[str, Array], arcs: Array, layouts: Callable[[], Layouts]
+        self,
+        sampled: Sampled,
+        columns: Mapping[str, Array],
+        arcs: Array,
+        kinds: tuple[tuple[str, ...], ...],
+        layout: Array | None,
     ) -> None:
-        self._sampled, self._columns, self._arcs, self._layouts = sampled, columns, arcs, layouts
-
-    @cached_property
-    def _kinds(self) -> Layouts:
-        return self._layouts()
+        self._sampled, self._columns, self._arcs, self._kinds, self._layout = sampled, columns, arcs, kinds, layout
 
     @cached_property
     def _table(self) -> tables.Sampling:
         """What is the same for any times."""
-        columns, layout = self._columns, self._kinds[1]
+        columns, layout = self._columns, self._layout
         table = tables.Sampling.from_buffer_copy(self._sampled.table)
         table.rows, table.width = columns["values"].shape
         table.degree, table.arcs = columns["coefficients"].shape[1], len(self._arcs)
@@ -92,7 +92,7 @@ class Sampler:
         memory[:n], memory[n:room] = times, 0.0
         table, start = tables.Sampling.from_buffer_copy(self._table), memory.ctypes.data
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
-        table.dimension, table.column = self._sampled.columns(self._kinds[0], states)
+        table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]
         return Evaluated(
             outside=runtime().hs_sample(ctypes.byref(table)),

@@ -20,6 +20,7 @@
 `result`            what was recorded or written, as an execution
 `compiled`          the same loop in C: what it is given
 `telling`           what it says of a run, in the same words
+`layouts`           which states its arcs have
 `desk`, `chunks`    where the compiled loop works, and what it writes to
 `ensemble`          many instances by the compiled loop
 `interrupt`         Ctrl-C while it runs

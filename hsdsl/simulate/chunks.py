@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.program import Program
 from hsdsl.runtime import tables
+from hsdsl.simulate.layouts import Layouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
 MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
@@ -130,23 +131,15 @@ class Chunks:
         return whole
 
 
-def arcs_of(whole: dict[str, Array], program: Program, states: tuple[str, ...]) -> Iterator[Arc]:
-    """Make the arcs of whole columns; ``states`` are those the run began with."""
+def arcs_of(whole: dict[str, Array], program: Program, layouts: Layouts) -> Iterator[Arc]:
+    """Make the arcs of whole columns."""
     rows = len(whole["times"])
     opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
     ends = [first - 1 for first, *_ in opened[1:]] + [rows - 1]
-    layouts = states_of_arcs([mode for _, _, mode, _ in opened], program, states)
-    for (first, jump, index, kind), last, layout in zip(opened, ends, layouts, strict=True):
+    found: list[int] = layouts.of_arcs(whole["arc"]["mode"]).tolist()
+    for (first, jump, index, kind), last, number in zip(opened, ends, found, strict=True):
         if first <= last:
-            yield Arc(program.modes[index].name, layout, tables.KINDS[kind], jump, first, last)
-
-
-def states_of_arcs(modes: Iterable[int], program: Program, states: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Give the states of each arc of a run that began with ``states``; a final mode without a flow keeps them."""
-    for index in modes:
-        mode = program.modes[index]
-        states = mode.states if mode.states or not mode.final else states
-        yield states
+            yield Arc(program.modes[index].name, layouts.kinds[number], tables.KINDS[kind], jump, first, last)
 
 
 def transitions_of(whole: dict[str, Array], program: Program) -> Iterator[Transition]:

@@ -25,6 +25,7 @@ from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
 from hsdsl.simulate.interrupt import noted
+from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.timeline import Timeline
@@ -40,10 +41,8 @@ class CompiledPlan:
 
     Attributes
     ----------
-    states : tuple of str
-        Those a run begins with.
-    one_layout : bool
-        Whether every mode has these.
+    layouts : Layouts
+        The kinds of arcs; the first is what a run begins with.
     """
 
     def __init__(
@@ -59,8 +58,7 @@ class CompiledPlan:
         assert settings.method is not None
         method, model = methods.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
-        self.program, self.compiled, self.states = program, compiled, states
-        self.one_layout = all(m.states == states or (m.final and not m.states) for m in program.modes)
+        self.program, self.compiled, self.layouts = program, compiled, Layouts(program, states)
         scheme = settings.scheme
         key = settings.method, scheme, shape
         self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import REASONS, Array
-from hsdsl.program import Program
 from hsdsl.runtime import tables
 from hsdsl.runtime.sampling import BLOCK
 from hsdsl.simulate.compiled import CompiledPlan, task_settings
+from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.timeline import Timeline
 
@@ -72,8 +72,7 @@ class CompiledEnsemble:
         self._time = np.ascontiguousarray(instances.time, np.float64)
         self._settings = (tables.Settings * len(instances.settings))(*map(task_settings, instances.settings))
         self._timelines, self._numbers = _timelines(instances.timelines)
-        self._names, self._layouts = names, kinds_of(plan.program, plan.states)
-        self._layout_of = _layout_of_modes(plan, self._layouts)
+        self._names, self._layouts = names, plan.layouts
         self._stop = np.zeros(1, np.int32)
 
     @property
@@ -107,7 +106,7 @@ class CompiledEnsemble:
 
     def place(self) -> Place:
         """Make a place to work at."""
-        return Place(self._plan, self._names, self._layouts, self._layout_of, self._time.shape[1])
+        return Place(self._plan, self._names, self._layouts, self._time.shape[1])
 
 
 class Place:
@@ -117,8 +116,7 @@ class Place:
         self,
         plan: CompiledPlan,
         names: tuple[str, ...],
-        layouts: Sequence[tuple[str, ...]],
-        layout_of: Array | None,
+        layouts: Layouts,
         samples: int,
     ) -> None:
         self.table = tables.Ensemble()
@@ -131,24 +129,11 @@ class Place:
         ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
         sampling.width, sampling.degree = model.width, self.desk.degree
         sampling.columns, sampling.outputs = len(names), model.outputs
-        sampling.dimension, sampling.column = plan.sampled.columns(layouts, names)
+        sampling.dimension, sampling.column = plan.sampled.columns(layouts.kinds, names)
         sampling.time, sampling.row, sampling.states = start, start + 8 * room, start + 16 * room
         sampling.scratch = start + 8 * room * (2 + len(names))
         self.table.layouts = self._arcs.ctypes.data
-        self._layout_of = layout_of
-        self.table.layout_of = None if layout_of is None else layout_of.ctypes.data
-
-
-def kinds_of(program: Program, states: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """The states of each kind of arcs of runs that begin with ``states``, which are the first."""
-    return list(dict.fromkeys((states, *(mode.states for mode in program.modes if mode.states or not mode.final))))
-
-
-def _layout_of_modes(plan: CompiledPlan, kinds: Sequence[tuple[str, ...]]) -> Array | None:
-    if len(kinds) == 1:
-        return None
-    of = [-1 if mode.final and not mode.states else kinds.index(mode.states) for mode in plan.program.modes]
-    return np.array(of, np.int32)
+        self.table.layout_of = None if layouts.one else layouts.of_mode.ctypes.data
 
 
 def _row(array: Any, row: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,7 +14,7 @@ from hsdsl.execution import Arc, Array, Execution, Point, Stop, Verdict
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime.sampling import Sampler
 from hsdsl.simulate import notes
-from hsdsl.simulate.chunks import arcs_of, states_of_arcs, transitions_of
+from hsdsl.simulate.chunks import arcs_of, transitions_of
 from hsdsl.simulate.compiled import CompiledPlan
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
@@ -52,10 +52,14 @@ class Written:
         """
         whole = self.whole
         about, arrays = _about(self.run, stop, seconds, "c"), {name: whole[name] for name in COLUMNS}
-        if self.plan.one_layout:
-            about["states"] = self.plan.states
-        self._trim(arrays)
-        sampler = Sampler(self.plan.sampled, arrays, whole["arc"], self._layouts)
+        layouts, arcs, found = self.plan.layouts, whole["arc"], None
+        if layouts.one:
+            about["states"] = layouts.kinds[0]
+        else:
+            found = layouts.of_arcs(arcs["mode"])
+            about["states"] = layouts.names(found)
+            _trim(arrays, layouts.width(found))
+        sampler = Sampler(self.plan.sampled, arrays, arcs, layouts.kinds, found)
         return Execution.deferred(self._later(), sampler=sampler, **about, **arrays)
 
     def _later(self) -> dict[str, Callable[[Execution], Any]]:
@@ -67,29 +71,18 @@ class Written:
             "verdict": _verdict,
         }
 
-    def _trim(self, arrays: dict[str, Array]) -> None:
-        """Cut arrays to as many states as the largest mode has that the run was in."""
-        plan, there = self.plan, arrays["values"].shape[1]
-        width = len(plan.states) if plan.one_layout else max(len(arc.states) for arc in self._arcs())
-        if width < there:
-            for name in ("values", "coefficients"):
-                arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
-
     def _arcs(self) -> tuple[Arc, ...]:
-        return tuple(arcs_of(self.whole, self.run.program, self.plan.states))
-
-    def _layouts(self) -> tuple[Sequence[tuple[str, ...]], Array | None]:
-        """The states of each kind of arcs, and of which kind each arc is (None where there is only one)."""
-        states = self.plan.states
-        if self.plan.one_layout:
-            return (states,), None
-        of_arc = list(states_of_arcs(self.whole["arc"]["mode"].tolist(), self.run.program, states))
-        layouts = list(dict.fromkeys(of_arc))
-        number = {layout: i for i, layout in enumerate(layouts)}
-        return layouts, np.array([number[states] for states in of_arc], np.int32)
+        return tuple(arcs_of(self.whole, self.run.program, self.plan.layouts))
 
     def _final(self, execution: Execution) -> Point:
         return _final(execution.arcs[-1], self.whole, execution.output_names)
+
+
+def _trim(arrays: dict[str, Array], width: int) -> None:
+    """Cut arrays to as many states as the largest mode has that the run was in."""
+    if width < arrays["values"].shape[1]:
+        for name in ("values", "coefficients"):
+            arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
 
 
 def _about(run: Run, stop: Stop, seconds: dict[str, float], engine: str) -> dict[str, Any]:

@@ -46,7 +46,14 @@ def exactly(scene, **changed):
         "modes": scene.exact_modes.copy(),
         "transitions": len(scene.exact.transitions),
     }
-    return Result(**(given | changed))
+    found = given | changed
+    return Result(
+        found["values"],
+        lambda: found["modes"],
+        lambda: found["transitions"],
+        found.get("problem"),
+        found.get("execution"),
+    )
 
 
 def test_the_exact_execution_is_right_and_without_error(ball):

@@ -47,6 +47,6 @@ def _guarded(run: Callable[[float], Result], scene: Scene) -> Callable[[float], 
         except Exception as error:  # a tool's own errors have no common type
             first = str(error).strip().splitlines()[-1:] or [type(error).__name__]
             nothing = np.full((len(scene.grid), len(scene.states)), np.nan)
-            return Result(nothing, np.full(len(scene.grid), "", dtype=object), None, first[0][:200])
+            return Result(nothing, lambda: np.full(len(scene.grid), "", dtype=object), lambda: None, first[0][:200])
 
     return guarded

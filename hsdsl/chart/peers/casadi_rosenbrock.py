@@ -50,11 +50,14 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
             asked |= {"control_group_size": [len(grid)], "max_num_steps": 1_000_000}
             kept[tolerance] = ca.integrator("run", "rosenbrock", dae, float(grid[0]), grid, asked)
         found: Array = np.asarray(kept[tolerance](x0=start)["xf"]).T
-        names = [mode.name for mode in model.modes]
-        modes = np.array([names[round(k)] if np.isfinite(k) else "" for k in found[:, n]], dtype=object)
-        return Result(found[:, columns], modes, None)
+        return Result(found[:, columns], lambda: _modes(found[:, n], model), lambda: None)
 
     return run
+
+
+def _modes(numbers: Array, model: PlainModel) -> Array:
+    names = [mode.name for mode in model.modes]
+    return np.array([names[round(k)] if np.isfinite(k) else "" for k in numbers], dtype=object)
 
 
 def _problem(model: PlainModel) -> tuple[dict[str, Any], Any]:

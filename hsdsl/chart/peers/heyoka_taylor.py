@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import heyoka as hy
@@ -46,7 +47,7 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
         counted[0] = 0
         result = run(tolerance)
         inside = counted[0]
-        return Result(result.values, result.modes, (result.transitions or 0) + inside, result.problem)
+        return replace(result, count=lambda: (result.transitions or 0) + inside)
 
     return counting
 
