@@ -72,9 +72,13 @@ def within(execution: Execution, times: Any) -> tuple[Array, Array]:
     return asked, inside
 
 
+def _as_floats(times: Any) -> Array:
+    return np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+
+
 def _as_times(execution: Execution, times: Any) -> Array:
     if execution.times.dtype != object:
-        return np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+        return _as_floats(times)
     plain = np.atleast_1d(np.asarray(times, dtype=object)).ravel()
     convert = execution.times[0].context.convert  # a float is exact there, and keeps its binary value
     return np.array([convert(t) for t in plain], dtype=object)
@@ -126,7 +130,7 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
     states, outputs, names = execution.states, execution.output_names, execution.output_names
     if columns is not None:
         states, names = split(columns, states, outputs)
-    asked = _as_times(execution, times)
+    asked = _as_floats(times)
     found = execution.sampler(asked, side == "left", states, bool(names))
     if found.outside >= 0:
         raise _outside(execution, asked[found.outside])

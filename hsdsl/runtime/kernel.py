@@ -53,6 +53,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
             library = load(_text(parts), lambda: _text(parts), RUNTIME)
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.restype = None
+            library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
             library.hs_sample.restype = ctypes.c_int64
             library.hs_run_ensemble.restype = None
             _loaded[parts] = library
@@ -103,6 +104,10 @@ class CompiledModel:
     def simulate(self, task: tables.Task) -> None:
         """Run a task to its end; the interpreter is free meanwhile."""
         _runtime(task.method.contents, task.settings.scheme).hs_simulate(ctypes.byref(task))
+
+    def pack(self, task: tables.Task, to: int) -> int:
+        """Copy what a task has written to an address; returns how many states a row has there."""
+        return _runtime(task.method.contents, task.settings.scheme).hs_pack(ctypes.addressof(task), to)
 
     def run_ensemble(self, ensemble: tables.Ensemble) -> None:
         """Run instances to their end; the interpreter is free meanwhile."""

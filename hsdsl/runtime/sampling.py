@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,15 @@ from hsdsl.runtime.kernel import CompiledModel, runtime
 
 BLOCK = 8  # HS_BLOCK
 NUMBER = 8  # bytes
+
+
+class Placed(Protocol):
+    """Columns that C can be shown."""
+
+    @property
+    def where(self) -> tuple[int, ...]:
+        """Rows, arcs, states, degree, outputs; addresses of times, values, outputs, pieces, arcs."""
+        ...
 
 
 class Sampled:
@@ -42,36 +51,26 @@ class Sampler:
     Parameters
     ----------
     sampled : Sampled
-    columns : mapping
-        The execution's ``times``, ``values``, ``outputs`` and ``coefficients``.
-    arcs : array
-        The arcs as they were written.
-    kinds : sequence of tuples of str
+    columns : object
+        The run's columns; its ``where`` says what of them is where.
+    kinds : tuple of tuples of str
         The states of each kind of arcs.
     layout : array of int32, optional
         Of which kind each arc is; None where there is only one.
     """
 
     def __init__(
-        self,
-        sampled: Sampled,
-        columns: Mapping[str, Array],
-        arcs: Array,
-        kinds: tuple[tuple[str, ...], ...],
-        layout: Array | None,
+        self, sampled: Sampled, columns: Placed, kinds: tuple[tuple[str, ...], ...], layout: Array | None
     ) -> None:
-        self._sampled, self._columns, self._arcs, self._kinds, self._layout = sampled, columns, arcs, kinds, layout
+        self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
 
     @cached_property
     def _table(self) -> tables.Sampling:
         """What is the same for any times."""
-        columns, layout = self._columns, self._layout
         table = tables.Sampling.from_buffer_copy(self._sampled.table)
-        table.rows, table.width = columns["values"].shape
-        table.degree, table.arcs = columns["coefficients"].shape[1], len(self._arcs)
-        table.times, table.values = columns["times"].ctypes.data, columns["values"].ctypes.data
-        table.recorded, table.pieces = columns["outputs"].ctypes.data, columns["coefficients"].ctypes.data
-        table.arc, table.layout = self._arcs.ctypes.data, None if layout is None else layout.ctypes.data
+        table.rows, table.arcs, table.width, table.degree, self._outputs, *places = self._columns.where
+        table.times, table.values, table.recorded, table.pieces, table.arc = places
+        table.layout = None if self._layout is None else self._layout.ctypes.data
         return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
@@ -86,11 +85,12 @@ class Sampler:
         outputs : bool
         """
         n, k, room = len(times), len(states), len(times) + BLOCK
-        m = self._columns["outputs"].shape[1] if outputs else 0
+        own = self._table
+        m = self._outputs if outputs else 0
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
-        memory = np.empty(ends[-1] + 2 * self._table.width)
+        memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n], memory[n:room] = times, 0.0
-        table, start = tables.Sampling.from_buffer_copy(self._table), memory.ctypes.data
+        table, start = tables.Sampling.from_buffer_copy(own), memory.ctypes.data
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]

@@ -21,7 +21,7 @@
 `compiled`          the same loop in C: what it is given
 `telling`           what it says of a run, in the same words
 `layouts`           which states its arcs have
-`desk`, `chunks`    where the compiled loop works, and what it writes to
+`desk`, `chunks`    where the compiled loop works, and what it writes to; `columns` is what it has written
 `ensemble`          many instances by the compiled loop
 `interrupt`         Ctrl-C while it runs
 `verdict`           do the theorem's hypotheses hold for a run?

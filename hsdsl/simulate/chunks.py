@@ -12,6 +12,7 @@ import numpy as np
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.program import Program
 from hsdsl.runtime import tables
+from hsdsl.simulate.columns import Columns, Gathered, Packed
 from hsdsl.simulate.layouts import Layouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
@@ -108,12 +109,14 @@ class Chunks:
         used["alternatives"] = self._columns["alternatives"][: table.alternatives_used]
         return used
 
-    def whole(self) -> dict[str, Array]:
-        """Take away every column from the start of the run.
+    def whole(self, pack: Callable[[int], int], layouts: Layouts) -> Columns:
+        """Take away every column from the start of the run, or copy them where the chunk can be used again.
 
         ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it
-        leaves it.
+        leaves it. ``pack`` copies the chunk to an address, and returns how many states a row has.
         """
+        if not self._full and self._rows * self._shape.row_bytes <= MOST_KEPT:
+            return self._packed(pack)
         chunks = [*self._full, self._written()]
         chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
         self._full = []
@@ -125,13 +128,20 @@ class Chunks:
         else:
             whole = chunks[0]
             whole["coefficients"] = whole.pop("pieces")[1:]
-            if self._rows * self._shape.row_bytes <= MOST_KEPT:
-                return {name: column.copy() if column.size else column for name, column in whole.items()}
         self._rows, self._columns = 0, {}
-        return whole
+        return Gathered(whole, layouts.width(layouts.of_arcs(whole["arc"]["mode"])))
+
+    def _packed(self, pack: Callable[[int], int]) -> Packed:
+        table, shape = self.table, self._shape
+        rows, arcs, transitions, notes = table.rows, table.arcs, table.transitions, table.notes
+        alternatives, states, outputs = table.alternatives_used, shape.width, shape.outputs
+        size = rows * (2 + outputs + states * (1 + shape.degree)) + 3 * arcs + 5 * notes + (alternatives + 1) // 2
+        memory = np.empty(size + transitions * (4 + 2 * states))
+        width = pack(memory.ctypes.data)
+        return Packed(memory, rows, arcs, transitions, notes, alternatives, outputs, shape.degree, states, width)
 
 
-def arcs_of(whole: dict[str, Array], program: Program, layouts: Layouts) -> Iterator[Arc]:
+def arcs_of(whole: Columns, program: Program, layouts: Layouts) -> Iterator[Arc]:
     """Make the arcs of whole columns."""
     rows = len(whole["times"])
     opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
@@ -142,7 +152,7 @@ def arcs_of(whole: dict[str, Array], program: Program, layouts: Layouts) -> Iter
             yield Arc(program.modes[index].name, layouts.kinds[number], tables.KINDS[kind], jump, first, last)
 
 
-def transitions_of(whole: dict[str, Array], program: Program) -> Iterator[Transition]:
+def transitions_of(whole: Columns, program: Program) -> Iterator[Transition]:
     """Make the transitions of whole columns."""
     alternatives: list[int] = whole["alternatives"].tolist()
     made: list[tuple[float, float, int, int, int, int]] = whole["transition"].tolist()

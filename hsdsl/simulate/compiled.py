@@ -6,7 +6,9 @@ The loop says where and why it stopped; what it means is said by the same functi
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
 from hsdsl.simulate.chunks import Shape, Sink
+from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
@@ -69,6 +72,7 @@ class CompiledPlan:
         self.sampled = Sampled(compiled, self.timeline)
         self._mode, self._x = mode, np.array(x, np.float64)
         self._start = len(x), self._x.ctypes.data
+        self.until = settings.until
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, desk: Desk) -> None:
@@ -122,9 +126,19 @@ class CompiledRun:
     A desk that another run works at afterwards tells of that one.
     """
 
-    run: Run
     plan: CompiledPlan
     desk: Desk
+    fresh: Callable[[], Run]
+    _columns: Columns | None = None
+    _accumulated: Stop | None = None
+
+    @cached_property
+    def run(self) -> Run:
+        """What has its notes, and what a verdict looks at; most runs are asked for neither."""
+        run = self.fresh()
+        if self._columns is not None:
+            self._note(run, self._columns["note"])
+        return run
 
     @property
     def now(self) -> Number:
@@ -134,31 +148,31 @@ class CompiledRun:
     @property
     def until(self) -> Number:
         """When the run should end."""
-        return self.run.settings.until
+        return self.plan.until
 
     @property
     def made(self) -> int:
         """How many transitions were made."""
         return self.desk.task.made
 
-    def follow(self) -> tuple[Stop, dict[str, Array]]:
+    def follow(self) -> tuple[Stop, Columns]:
         """Run to the end: why it stopped, and the columns that were written."""
         self._run()
-        whole = self.desk.chunks.whole()
-        self._notes(whole)
-        return self._stop(), whole
+        desk, plan = self.desk, self.plan
+        self._columns = desk.chunks.whole(lambda to: plan.compiled.pack(desk.task, to), plan.layouts)
+        return self._stop(), self._columns
 
     def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
         """Run to the end, handing over every chunk as soon as it is full: why it stopped, and the last chunk."""
 
         def take(chunk: dict[str, Array]) -> None:
-            self._notes(chunk)
+            self._note(self.run, chunk["note"])
             sink(chunk)
 
         self.desk.chunks.sink = take
         self._run()
         rest = self.desk.chunks.rest()
-        self._notes(rest)
+        self._note(self.run, rest["note"])
         return self._stop(), rest
 
     def _run(self) -> None:
@@ -168,24 +182,26 @@ class CompiledRun:
         if self.desk.failed:
             raise self.desk.failed[0]
 
-    def _notes(self, chunk: dict[str, Array]) -> None:
-        if len(chunk["note"]):
+    def _note(self, run: Run, notes: Array) -> None:
+        if len(notes):
             from hsdsl.simulate.telling import told
 
-            said: list[tuple[int, int, int, int, float, float]] = chunk["note"].tolist()
+            said: list[tuple[int, int, int, int, float, float]] = notes.tolist()
             for note in said:
-                self._accumulated = told(self.run, *note) or self._accumulated
-
-    _accumulated: Stop | None = None
+                self._accumulated = told(run, *note) or self._accumulated
 
     def _stop(self) -> Stop:
-        reason = tables.REASONS[self.desk.task.stop.reason]
+        found = self.desk.task.stop
+        reason = tables.REASONS[found.reason]
         if reason == "until":
-            return stops.reached(self.desk.task.stop.time)
+            return stops.reached(found.time)
+        if reason == "final":
+            return stops.entered_final(self.plan.program.modes[found.mode].name, found.time)
         if reason == "interrupted":
             return stops.interrupted(self.now)
-        if reason == "accumulated" and self._accumulated is not None:
-            return self._accumulated
         from hsdsl.simulate.telling import stop
 
-        return stop(self.run, self.desk, reason, self.made)
+        run = self.run
+        if reason == "accumulated" and self._accumulated is not None:
+            return self._accumulated
+        return stop(run, self.desk, reason, self.made)

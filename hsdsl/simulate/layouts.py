@@ -7,6 +7,8 @@ import numpy as np
 from hsdsl.execution import Array
 from hsdsl.program import Program
 
+MOST_ARCS, MOST_KEPT = 256, 64
+
 
 class Layouts:
     """The kinds of arcs of all runs of a program that begin with the same states.
@@ -23,7 +25,7 @@ class Layouts:
         own = [None if mode.final and not mode.states else mode.states for mode in program.modes]
         self.kinds = tuple(dict.fromkeys((states, *(kind for kind in own if kind is not None))))
         self.of_mode = np.array([-1 if kind is None else self.kinds.index(kind) for kind in own], np.int32)
-        self._names: dict[tuple[int, ...], tuple[str, ...]] = {}
+        self._kept: dict[bytes, tuple[Array, tuple[str, ...]]] = {}
 
     @property
     def one(self) -> bool:
@@ -37,13 +39,25 @@ class Layouts:
             found[i] = found[i - 1] if i else before
         return found
 
-    def names(self, found: Array) -> tuple[str, ...]:
-        """Give the names of all states of arcs of these kinds, in the order in which they come up."""
+    def found(self, modes: Array) -> tuple[Array, tuple[str, ...]]:
+        """Give the kind of each arc, and the names of all their states in the order in which they come up.
+
+        The last few answers are kept: runs of one model often pass through the same modes.
+        """
+        if len(modes) > MOST_ARCS:
+            return self._found(modes)
+        key = modes.tobytes()
+        if key not in self._kept:
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[key] = self._found(modes)
+        return self._kept[key]
+
+    def _found(self, modes: Array) -> tuple[Array, tuple[str, ...]]:
+        found = self.of_arcs(modes)
         numbers: list[int] = found.tolist()
-        order = tuple(dict.fromkeys(numbers))
-        if order not in self._names:
-            self._names[order] = tuple(dict.fromkeys(name for kind in order for name in self.kinds[kind]))
-        return self._names[order]
+        order = dict.fromkeys(numbers)
+        return found, tuple(dict.fromkeys(name for kind in order for name in self.kinds[kind]))
 
     def width(self, found: Array) -> int:
         """Return the most states that arcs of these kinds have."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Execution, Stop
@@ -17,7 +19,7 @@ from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.recorder import Progress, Recorder
-from hsdsl.simulate.result import Written, from_recorder
+from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted
@@ -70,10 +72,10 @@ class Prepared:
         ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
         An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
         """
-        run, spent = self._fresh(), dict(seconds or {})
+        spent = dict(seconds or {})
         if self.plan is not None:
-            return self._by_compiled_loop(run, self.plan, watch, spent)
-        return self._by_python_loop(run, watch, spent)
+            return self._by_compiled_loop(self.plan, watch, spent)
+        return self._by_python_loop(self._fresh(), watch, spent)
 
     def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, int, dict[str, Array]]:
         """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
@@ -81,11 +83,15 @@ class Prepared:
         Returns why it stopped, how many transitions it made, and the last chunk.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self._fresh(), self.plan, self.plan.desks.new(tables.Task()))
+        under_way = CompiledRun(self.plan, self.plan.desks.new(tables.Task()), self._fresh)
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)
         return stop, under_way.made, rest
+
+    @cached_property
+    def _about(self) -> dict[str, Any]:
+        return about(self.program, self.settings, self.kernel.arithmetic.digits, "c")
 
     def _fresh(self) -> Run:
         """A run that nothing is recorded of yet."""
@@ -111,10 +117,8 @@ class Prepared:
         spent["simulate"] = time.perf_counter() - began
         return from_recorder(run, stop, spent)
 
-    def _by_compiled_loop(
-        self, run: Run, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]
-    ) -> Execution:
-        under_way = CompiledRun(run, plan, plan.desks.take())
+    def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        under_way = CompiledRun(plan, plan.desks.take(), self._fresh)
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()
@@ -122,7 +126,7 @@ class Prepared:
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the desk for longer than the run lasts
             plan.desks.leave(under_way.desk)
-        return Written(run, plan, whole).execution(stop, spent)
+        return written(self._about, under_way, whole, stop, spent)
 
 
 def prepare(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.arithmetic import Number
-from hsdsl.execution import Arc, Array, Execution, Point, Stop, Verdict
+from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
 from hsdsl.integrators.stepper import State
+from hsdsl.program import Program
 from hsdsl.runtime.sampling import Sampler
 from hsdsl.simulate import notes
 from hsdsl.simulate.chunks import arcs_of, transitions_of
-from hsdsl.simulate.compiled import CompiledPlan
+from hsdsl.simulate.columns import Columns
+from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 
@@ -27,7 +28,11 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
         {"verdict": _verdict},
-        **_about(run, stop, seconds, "python"),
+        **about(run.program, run.settings, run.arithmetic.digits, "python"),
+        stop=stop,
+        seconds=seconds,
+        output_function=partial(output_values, run),
+        assessment=partial(_assessment, run),
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs),
@@ -37,69 +42,86 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
     return execution
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """What the compiled loop has written."""
+def written(
+    known: dict[str, Any], under_way: CompiledRun, columns: Columns, stop: Stop, seconds: dict[str, float]
+) -> Execution:
+    """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 
-    run: Run
-    plan: CompiledPlan
-    whole: dict[str, Array]
-
-    def execution(self, stop: Stop, seconds: dict[str, float]) -> Execution:
-        """Make the execution: its arrays now, what is made of objects when it is first asked for.
-
-        Of a short run those objects would take longer than the run.
-        """
-        whole = self.whole
-        about, arrays = _about(self.run, stop, seconds, "c"), {name: whole[name] for name in COLUMNS}
-        layouts, arcs, found = self.plan.layouts, whole["arc"], None
-        if layouts.one:
-            about["states"] = layouts.kinds[0]
-        else:
-            found = layouts.of_arcs(arcs["mode"])
-            about["states"] = layouts.names(found)
-            _trim(arrays, layouts.width(found))
-        sampler = Sampler(self.plan.sampled, arrays, arcs, layouts.kinds, found)
-        return Execution.deferred(self._later(), sampler=sampler, **about, **arrays)
-
-    def _later(self) -> dict[str, Callable[[Execution], Any]]:
-        return {
-            "settings": lambda _: described(self.run.settings, self.run.program.left_out),
-            "transitions": lambda _: tuple(transitions_of(self.whole, self.run.program)),
-            "arcs": lambda _: self._arcs(),
-            "final": self._final,
-            "verdict": _verdict,
-        }
-
-    def _arcs(self) -> tuple[Arc, ...]:
-        return tuple(arcs_of(self.whole, self.run.program, self.plan.layouts))
-
-    def _final(self, execution: Execution) -> Point:
-        return _final(execution.arcs[-1], self.whole, execution.output_names)
+    Arrays and objects are made when they are first asked for: of a short run they would take longer than the run.
+    """
+    plan = under_way.plan
+    layouts, found = plan.layouts, None
+    if layouts.one:
+        states = layouts.kinds[0]
+    else:
+        found, states = layouts.found(columns["arc"]["mode"])
+    return Execution.deferred(
+        _LATER,
+        **known,
+        stop=stop,
+        seconds=seconds,
+        states=states,
+        output_function=partial(_output_values, under_way),
+        assessment=partial(_assessed, under_way),
+        sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
+        _of=_Written(under_way, columns),
+    )
 
 
-def _trim(arrays: dict[str, Array], width: int) -> None:
-    """Cut arrays to as many states as the largest mode has that the run was in."""
-    if width < arrays["values"].shape[1]:
-        for name in ("values", "coefficients"):
-            arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
+class _Written(NamedTuple):
+    under_way: CompiledRun
+    columns: Columns
 
 
-def _about(run: Run, stop: Stop, seconds: dict[str, float], engine: str) -> dict[str, Any]:
-    program, method = run.program, run.settings.method
+def _column(name: str) -> Callable[[Execution], Any]:
+    return lambda execution: _of(execution).columns[name]
+
+
+def _of(execution: Execution) -> _Written:
+    return execution.__dict__["_of"]
+
+
+def _settings(execution: Execution) -> dict[str, Any]:
+    run = _of(execution).under_way.run
+    return described(run.settings, run.program.left_out)
+
+
+def _transitions(execution: Execution) -> tuple[Transition, ...]:
+    of = _of(execution)
+    return tuple(transitions_of(of.columns, of.under_way.plan.program))
+
+
+def _arcs(execution: Execution) -> tuple[Arc, ...]:
+    of = _of(execution)
+    return tuple(arcs_of(of.columns, of.under_way.plan.program, of.under_way.plan.layouts))
+
+
+def _verdict(execution: Execution) -> Verdict:
+    assert execution.assessment is not None
+    return execution.assessment(execution, None)
+
+
+_LATER: dict[str, Callable[[Execution], Any]] = {
+    **{name: _column(name) for name in COLUMNS},
+    "settings": _settings,
+    "transitions": _transitions,
+    "arcs": _arcs,
+    "final": lambda execution: _final(execution.arcs[-1], _of(execution).columns, execution.output_names),
+    "verdict": _verdict,
+}
+
+
+def about(program: Program, settings: Settings, digits: int | None, engine: str) -> dict[str, Any]:
+    """Return what all runs with these settings have in common."""
     return {
         "model": program.path,
         "digest": program.digest,
         "engine": engine,
-        "scheme": run.settings.scheme,
-        "method": method.name if method else "two-step",
-        "stop": stop,
-        "output_function": partial(output_values, run),
-        "assessment": partial(_assessment, run),
+        "scheme": settings.scheme,
+        "method": settings.method.name if settings.method else "two-step",
         "output_names": program.outputs,
-        "seconds": seconds,
         "title": program.title,
-        "digits": run.arithmetic.digits,
+        "digits": digits,
     }
 
 
@@ -108,7 +130,7 @@ def _native(value: Any) -> Number:
     return float(value) if isinstance(value, np.float64) else value
 
 
-def _final(last: Arc, columns: Mapping[str, Any], outputs: tuple[str, ...]) -> Point:
+def _final(last: Arc, columns: Columns | Mapping[str, Any], outputs: tuple[str, ...]) -> Point:
     row, width = last.last, len(last.states)
     return Point(
         time=_native(columns["times"][row]),
@@ -128,6 +150,10 @@ def output_values(run: Run, mode: str, t: Number, x: State) -> State:
     return run.kernel.bind(index, run.timeline.at(t).data).outputs(t, *x)
 
 
+def _output_values(under_way: CompiledRun, mode: str, t: Number, x: State) -> State:
+    return output_values(under_way.run, mode, t, x)
+
+
 def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the settings that governed the run, by the names of the model file, and what was left out of it."""
     samples = settings.samples if isinstance(settings.samples, int | None) else list(settings.samples)
@@ -143,14 +169,13 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
     }
 
 
-def _verdict(execution: Execution) -> Verdict:
-    assert execution.assessment is not None
-    return execution.assessment(execution, None)
-
-
 def _assessment(run: Run, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
     if run.settings.one_stop is not None:
         return Verdict("unknown", notes.TWO_STEP)
     from hsdsl.simulate.verdict import Looking, assess  # not every run is asked for it
 
     return assess(Looking(run, execution, error), run.recorder.departures, run.recorder.doubts)
+
+
+def _assessed(under_way: CompiledRun, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
+    return _assessment(under_way.run, execution, error)

@@ -42,8 +42,6 @@ def stop(run: Run, desk: Desk, reason: str, made: int) -> Stop:
         return stops.reached_in_strip(t, mode.edges[found.edge].name, reason == "until on guard")
     if reason == "reset not finite":
         return stops.reset_not_finite(mode.edges[found.edge], t)
-    if reason == "final":
-        return stops.entered_final(mode.name, t)
     if reason == "zeno":
         return stops.endless(mode.name, t)
     if reason == "limit":

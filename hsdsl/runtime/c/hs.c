@@ -38,6 +38,7 @@
 #include "tails.c"
 #include "located.c"
 #include "sample.c"
+#include "pack.c"
 
 /* What is left of the caller's memory. Counted without memory first, then given out. */
 typedef struct {

@@ -205,5 +205,6 @@ struct hs_task {
 extern HS_EXPORT const int64_t hs_sizes[];
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
+HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
 
 #endif
