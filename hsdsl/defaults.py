@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 DEFAULTS: dict[str, Any] = {
-    "scheme": "relaxed",
+    "scheme": "located",
     "method": "auto",
     "relaxation": Fraction("1e-6"),
     "max_transitions": 10**6,

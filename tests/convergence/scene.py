@@ -38,7 +38,7 @@ class Scene:
 
     def run(self, **settings: Any) -> Any:
         """Run to the end; every run must make all transitions."""
-        run = self.model.simulate(until=self.until, **settings)
+        run = self.model.simulate(until=self.until, **({"scheme": "relaxed"} | settings))
         assert len(run.transitions) == self.transitions
         return run
 

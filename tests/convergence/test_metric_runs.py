@@ -25,7 +25,9 @@ def model(name):
 def start(x=0.0, y=0.0):
     """Run the digital control system from (-1 - x, -1 - y)."""
     initial = {"x": f"-1 - {x!r}", "y": f"-1 - {y!r}"}
-    return model("digital-control").simulate(method="rk4", step=1 / 64, relaxation=EPS, initial=initial)
+    return model("digital-control").simulate(
+        scheme="relaxed", method="rk4", step=1 / 64, relaxation=EPS, initial=initial
+    )
 
 
 def between(a, b, metric="rho", **options):
@@ -102,10 +104,10 @@ def slope(sizes, errors):
 def test_first_order_in_the_relaxation(name, metric):
     scene = model(name)
     relaxations = [1e-3, 1e-4, 1e-5, 1e-6]
-    fine = scene.simulate(**SCENES[name], relaxation=1e-10)
+    fine = scene.simulate(scheme="relaxed", **SCENES[name], relaxation=1e-10)
     found = []
     for relaxation in relaxations:
-        run = scene.simulate(**SCENES[name], relaxation=relaxation)
+        run = scene.simulate(scheme="relaxed", **SCENES[name], relaxation=relaxation)
         there, back = (distance(*pair, metric, model=scene) for pair in ((run, fine), (fine, run)))
         assert there.lower <= back.upper and back.lower <= there.upper
         found.append(there.middle)

@@ -61,7 +61,7 @@ class Scene:
 
     def run(self, **settings: Any) -> Any:
         """A run of the relaxed scheme; it must make all transitions."""
-        run = self.model.simulate(until=self.until, **settings)
+        run = self.model.simulate(until=self.until, **({"scheme": "relaxed"} | settings))
         assert len(run.transitions) == self.transitions
         return run
 

@@ -138,7 +138,8 @@ def test_digital_control_from_beside_the_diagonal(dx: str, dy: str, path: list[i
 
 def default_beside(dx: str, dy: str) -> Any:
     """The run from (-1 - dx, -1 - dy), relaxation 1e-4."""
-    return model("digital-control").simulate(relaxation="1e-4", initial={"x": f"-1 - {dx}", "y": f"-1 - {dy}"})
+    start = {"x": f"-1 - {dx}", "y": f"-1 - {dy}"}
+    return model("digital-control").simulate(scheme="relaxed", relaxation="1e-4", initial=start)
 
 
 def test_digital_control_on_the_diagonal_says_what_it_passed_over() -> None:

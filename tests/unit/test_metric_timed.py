@@ -63,7 +63,7 @@ def test_runs_that_switch_at_other_times_are_as_near_as_their_times(tmp_path):
         tmp_path,
         "modes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 1, to: b}]\n  b: {flow: {x: -1}}\n",
     )
-    runs = [model.simulate(relaxation=eps) for eps in (1e-8, 1e-3)]
+    runs = [model.simulate(scheme="relaxed", relaxation=eps) for eps in (1e-8, 1e-3)]
     found = between_runs(*runs, model=model)
     assert found.lower == pytest.approx(np.hypot(1e-3, 2e-3), rel=1e-4)
     assert found.upper <= found.lower * 1.011
