@@ -28,7 +28,7 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-# More effort compiles the runtime in twice the time, while a first run waits, and makes it a twentieth faster.
+# More effort would compile the runtime in twice the time, for which a first run waits, and make it no faster.
 RUNTIME: Effort = "-O1"
 MODEL: Effort = "-O2"
 
