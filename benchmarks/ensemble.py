@@ -1,6 +1,6 @@
 """Ten thousand oscillators with a stop, restitution and forcing varied: how long, and is every impact right?
 
-The ensemble is timed on all cores, warm. Then each run's impacts are compared with those of the closed form, followed in
+Timed on all cores, warm. Then each run's impacts are compared with those of the closed form, followed in
 float64 from impact to impact: between two samples of 2e-3 it looks at every maximum that comes near the stop, so that a
 short visit is not missed. That takes minutes; `--checked` says how many of the runs are.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from itertools import islice
 from random import Random
 from typing import Any
 
@@ -15,6 +16,7 @@ import yaml
 
 from fuzz import seeds
 
+MOST_PLACES = 5_000  # of a tree that still is mutated
 VARIABLES = ("x", "v", "y", "a", "c", "u", "t", "pi", "k")
 FUNCTIONS = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "exp",
@@ -313,8 +315,10 @@ def _transition(rng: Random, states: list[str], modes: list[str]) -> dict[str, A
 
 
 def moved(rng: Random, tree: Any) -> Any:
-    """A tree after one mutation of its structure."""
-    places = list(_places(tree))
+    """A tree after one mutation of its structure; one that has grown large stays as it is."""
+    places = list(islice(_places(tree), MOST_PLACES))
+    if len(places) == MOST_PLACES:
+        return tree
     holder, key = rng.choice(places) if places else ({"": tree}, "")
     other_holder, other = rng.choice(places) if places else ({"": tree}, "")
     value = holder[key]
