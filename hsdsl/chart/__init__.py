@@ -93,14 +93,16 @@ def work_precision(
     """
     remarks: list[str] = []
     attempts = list(_attempts(scene, schemes, methods, engines, tolerances, steps, against, remarks))
-    rows: list[Row] = []
-    for attempt, result, timed in race(attempts, rounds, patience, watch):
+
+    def judged(attempt: Attempt, result: Result) -> Judgement:
         judgement = judge(scene, result)
         if with_rho and result.execution is not None:
             watch(f"rho of {attempt.label} {attempt.setting}")
             judgement = judgement.with_rho(rho(scene, result.execution))
-        rows.append(Row(scene.name, attempt, judgement, timed))
-    return rows, remarks
+        return judgement
+
+    done = race(attempts, judged, rounds, patience, watch)
+    return [Row(scene.name, attempt, judgement, timed) for attempt, judgement, timed in done], remarks
 
 
 def _attempts(

@@ -70,4 +70,4 @@ def _run(scene: Scene, asked: dict[str, Any]) -> Result:
     execution = scene.model.simulate(float(scene.grid[-1]), **asked, parameters=scene.parameters, initial=scene.initial)
     values, modes = sampled(execution, scene.grid, scene.states)
     problem = None if execution.stop.complete else execution.stop.message
-    return Result(values, modes, lambda: len(execution.transitions), problem, execution)
+    return Result(values, modes, lambda: execution.made, problem, execution)

@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from statistics import median
+from typing import TypeVar
 
 from hsdsl.chart.result import Attempt, Result
 
+Looked = TypeVar("Looked")
 ENOUGH = 0.02  # seconds of an attempt in one turn: what takes less is repeated
 
 
@@ -32,21 +34,26 @@ class Timed:
 
 
 def race(
-    attempts: Sequence[Attempt], rounds: int, patience: float, watch: Callable[[str], None]
-) -> Iterator[tuple[Attempt, Result, Timed]]:
-    """Warm every attempt, then time all of them in turns.
+    attempts: Sequence[Attempt],
+    look: Callable[[Attempt, Result], Looked],
+    rounds: int,
+    patience: float,
+    watch: Callable[[str], None],
+) -> Iterator[tuple[Attempt, Looked, Timed]]:
+    """Warm every attempt and look at what it gives, which is not kept, then time all of them in turns.
 
     What took longer than ``patience`` the first time is not run again, and the tool's attempts after it are left out:
     they are given in the order of rising effort.
     """
-    warmed: list[tuple[Attempt, Result, float]] = []
+    warmed: list[tuple[Attempt, Looked, float]] = []
     exhausted: set[str] = set()
     for attempt in attempts:
         if attempt.label in exhausted:
             continue
         watch(f"{attempt.label} {attempt.setting}")
         result, seconds = _once(attempt)
-        warmed.append((attempt, result, seconds))
+        warmed.append((attempt, look(attempt, result), seconds))
+        del result
         if seconds > patience:
             exhausted.add(attempt.label)
     turns: dict[int, list[float]] = {k: [] for k in range(len(warmed))}
@@ -55,8 +62,8 @@ def race(
             if seconds <= patience:
                 watch(f"turn {turn + 1} of {rounds}: {attempt.label} {attempt.setting}")
                 turns[k].append(_turn(attempt))
-    for k, (attempt, result, seconds) in enumerate(warmed):
-        yield attempt, result, Timed(tuple(turns[k] or [seconds]), seconds)
+    for k, (attempt, looked, seconds) in enumerate(warmed):
+        yield attempt, looked, Timed(tuple(turns[k] or [seconds]), seconds)
 
 
 def _once(attempt: Attempt) -> tuple[Result, float]:

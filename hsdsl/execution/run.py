@@ -114,6 +114,12 @@ class Execution(Deferred):
         return html(self, limit=12)
 
     @property
+    def made(self) -> int:
+        """How many transitions were made; of a long run that is sooner known than the transitions."""
+        counted = self.__dict__.get("_made")
+        return len(self.transitions) if counted is None else counted
+
+    @property
     def time_span(self) -> tuple[Any, Any]:
         """The first and the last time."""
         return self.times[0], self.times[-1]

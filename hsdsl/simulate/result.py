@@ -65,6 +65,7 @@ def written(
         assessment=partial(_assessed, under_way),
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         _of=_Written(under_way, columns),
+        _made=under_way.made,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import builtins
-import difflib  # noqa: F401 - it compiles a named tuple when it is imported, which hsdsl does late
 import re
 import signal
 import sys
@@ -15,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from fuzz import seeds
+from fuzz import late, seeds
 from hsdsl import limits
 from hsdsl.backends.c import model_source
 from hsdsl.diagnose import as_json, render
@@ -31,6 +30,7 @@ from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.model import Model
 from hsdsl.system import TIME
 
+assert late.LATE  # before anything is watched
 SCOPE = Scope(
     {
         **{name: state(name) for name in ("x", "v", "y", "u")},

@@ -154,7 +154,7 @@ def test_turns_alternate_and_the_slow_are_run_once():
         Attempt("a", "", "", "step", 0.1, partial(slow, "a2")),
         Attempt("b", "", "", "step", 1.0, partial(run, "b1")),
     ]
-    done = list(race(attempts, 2, 0.04, lambda _: None))
+    done = list(race(attempts, lambda _, result: result, 2, 0.04, lambda _: None))
     assert [attempt.tool for attempt, _, _ in done] == ["a", "b"]  # a2 left out: a1 was beyond patience
     assert calls.count("a1") == 1
     assert calls.count("b1") >= 3
