@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -53,7 +52,8 @@ LARGEST_DEFECT = 1e-9  # of slopes, guards and resets, relative
 class Referenced(Protocol):
     """A model, as far as its reference needs one."""
 
-    program: cached_property[Program]
+    @property
+    def program(self) -> Program: ...
 
     @property
     def system(self) -> Any: ...
