@@ -28,8 +28,6 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-# More effort would compile the runtime in twice the time, for which a first run waits, and make it no faster.
-RUNTIME: Effort = "-O1"
 MODEL: Effort = "-O2"
 
 Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
@@ -50,7 +48,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
     parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
     with _loading:  # another thread may be at it: see `begin`
         if parts not in _loaded:
-            library = load(_text(parts), lambda: _text(parts), RUNTIME)
+            library = load(_text(parts), lambda: _text(parts), _effort(parts))
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.restype = None
             library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -68,7 +66,8 @@ def begin(scheme: str, method: str) -> None:
             runtime(scheme, method)
 
     with suppress(NoCompiler):
-        if not is_kept(_text(_parts(scheme, method)), RUNTIME):
+        parts = _parts(scheme, method)
+        if not is_kept(_text(parts), _effort(parts)):
             Thread(target=compile_runtime, daemon=True).start()
 
 
@@ -79,6 +78,12 @@ def _parts(scheme: str, method: str) -> Parts:
 def _text(parts: Parts) -> str:
     located, radau = map(int, parts)
     return f'#define HS_HAS_LOCATED {located}\n#define HS_HAS_RADAU {radau}\n#include "hs.c"\n'
+
+
+def _effort(parts: Parts) -> Effort:
+    """More effort takes twice as long to compile, for which a first run waits; only `radau` gets faster by it."""
+    _, radau = parts
+    return "-O2" if radau else "-O1"
 
 
 class CompiledModel:

@@ -199,4 +199,4 @@ def test_a_runtime_has_the_parts_that_are_asked_for(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(kernel, "_loaded", {})
     kernel.begin("relaxed", "rk4")
     assert kernel.runtime("relaxed", "rk4") is kernel.runtime() is kernel.runtime("relaxed", "taylor")
-    assert not kernel.is_kept("nothing", "-O1") and kernel.is_kept(kernel._text((False, False)), kernel.RUNTIME)
+    assert not kernel.is_kept("nothing", "-O1") and kernel.is_kept(kernel._text((False, False)), "-O1")
