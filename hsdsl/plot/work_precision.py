@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 FORMATS = (".png", ".svg")
 MARKERS = "osD^vP*hXp<>"
 LEAST_ERROR = 1e-16
+WORST = 30  # times the largest error of a right answer: where wrong ones are drawn that are farther off
+ABREAST = 2  # single panels in a row
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,14 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
 
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
-    down = max(len(column) for column in columns)
+    places, down, across = _places(columns)
     with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
-        figure = Figure(figsize=(4.6 * len(columns) + 2.4, 3.7 * down + 0.3), layout="constrained")
-        axes = figure.subplots(down, len(columns), squeeze=False)
-        for i, column in enumerate(columns):
-            for k in range(down):
-                if k < len(column):
-                    _draw(axes[k][i], column[k], labels, groups, ylabel=i == 0)
+        figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
+        axes = figure.subplots(down, across, squeeze=False)
+        for k in range(down):
+            for i in range(across):
+                if (k, i) in places:
+                    _draw(axes[k][i], places[k, i], labels, groups, ylabel=i == 0)
                 else:
                     axes[k][i].axis("off")
         _legend(figure, labels, groups)
@@ -93,6 +95,15 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
             dpi=150,
             metadata={"Date": None} if target.suffix == ".svg" else None,
         )
+
+
+def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:
+    """Where panels stand, by row and column, and how many rows and columns there are; single ones two in a row."""
+    if len(columns) > ABREAST and all(len(column) == 1 for column in columns):
+        flat = [column[0] for column in columns]
+        return {divmod(n, ABREAST): panel for n, panel in enumerate(flat)}, -(-len(flat) // ABREAST), ABREAST
+    placed = {(k, i): panel for i, column in enumerate(columns) for k, panel in enumerate(column)}
+    return placed, max(len(column) for column in columns), len(columns)
 
 
 def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str, Any]:
@@ -107,11 +118,13 @@ def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str
 
 
 def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str], ylabel: bool) -> None:
+    found = [m.error for line in panel.lines for m in line.marks if m.verdict == "right" and isfinite(m.error)]
+    largest = WORST * max([LEAST_ERROR, *found]) if found else inf  # what is worse says no more by how much
     for line in panel.lines:
         look = _look(line.label, labels, groups)
         known = [m for m in line.marks if isfinite(m.error)]
         right = [(max(m.error, LEAST_ERROR), m.seconds) for m in known if m.verdict == "right"]
-        wrong = [(max(m.error, LEAST_ERROR), m.seconds) for m in known if m.verdict != "right"]
+        wrong = [(min(max(m.error, LEAST_ERROR), largest), m.seconds) for m in known if m.verdict != "right"]
         if right:
             axis.plot(*zip(*right, strict=True), **look)
         if wrong:
