@@ -5,7 +5,9 @@ Started by `unit/test_sanitizers.py`; a fault ends the process with a message of
 
 from __future__ import annotations
 
+import tempfile
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 from conformance.test_agreement import COMPILED, FLOATS, LONG, MODELS, SHORT, STEPS, arguments
@@ -29,7 +31,29 @@ def by_c(model: Model, **arguments: Any) -> bool:
     return run.engine == "c"
 
 
+def in_other_ways(model: Model, folder: Path, **arguments: Any) -> int:
+    """In one chunk, as an ensemble, and streamed."""
+    count = by_c(model, **arguments)
+    arguments["max_transitions"] = 40
+    many = model.ensemble(samples=50, transition_times=3, **arguments)
+    streamed = model.stream(folder / "rows.csv", every=3, **arguments)
+    return count + many.stop.size + (streamed.rows > 0)
+
+
 def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        count = sum(
+            in_other_ways(
+                hsdsl.load(path), Path(folder), method=method, scheme=scheme, **({**step, **SHORT.get(name, {})})
+            )
+            for name, path in MODELS.items()
+            for step, (scheme, method) in product(list(STEPS)[:2], COMPILED)
+        )
+    print(f"{count + in_chunks()} runs")
+
+
+def in_chunks() -> int:
+    """In chunks so small that every run fills several."""
     chunks.LEAST_ROWS, chunks.MOST_ROWS = 12, 200
     count = 0
     for name in CASES:
@@ -50,7 +74,7 @@ def main() -> None:
                         count += by_c(drawn, max_transitions=25, scheme=scheme, **setting)
             except (ModelError, UsageError):
                 continue
-    print(f"{count} runs")
+    return count
 
 
 if __name__ == "__main__":
