@@ -6,7 +6,7 @@ A step is bounded by its error alone; where surfaces are crossed inside is asked
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import log2
 from typing import Protocol
@@ -25,6 +25,7 @@ from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
+BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
 
@@ -126,6 +127,8 @@ class TableSteps:
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
             curves = interpolate(self.run, self.here, t, h, x, z, piece)
             ends = self.here.kernel.surfaces(t1, *z)
+            if method.landing is not None and control.tolerance is not None and method.error is not None:
+                curves = self._blurred(curves, t1, z, method.error(h, stages, end), ends)
         except NoConvergence:
             return UNSOLVED
         except DOMAIN_ERRORS:
@@ -151,6 +154,16 @@ class TableSteps:
             return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
 
         return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
+
+    def _blurred(self, curves: list[list[Piece]], t1: Number, z: State, error: State, ends: State) -> list[list[Piece]]:
+        """Let no rise count that is lower than what the step's error moves a surface by.
+
+        A collocation polynomial is off inside the step as it is at its end, its first terms too: where a mode is
+        entered on a surface that the flow leaves slowly, it may rise where the solution falls.
+        """
+        moved = self.here.kernel.surfaces(t1, *(a + BLUR * e for a, e in zip(z, error, strict=True)))
+        off = [abs(a - b) for a, b in zip(moved, ends, strict=True)]
+        return [[replace(piece, off=piece.off + more) for piece in row] for row, more in zip(curves, off, strict=True)]
 
 
 @dataclass

@@ -1,6 +1,7 @@
 /* One accepted step of the located scheme, with what happens along it. See hsdsl/simulate/spans.py.
    run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
 
+#define BLUR 2
 #define UNKNOWN_TOLERANCE 1e-10
 #define LAST_TERM 4
 #define TERM_BEFORE 32
@@ -87,6 +88,19 @@ static void begin_span(hs_run *run, double h, double t1) {
   copy(span->x, run->x, run->here.dimension);
 }
 
+/* Let no rise count that is lower than what the step's error moves a surface by. */
+static int blur(hs_run *run, int n, double t1) {
+  const hs_curves *curves = &run->curves;
+  for (int s = 0; s < n; s++) run->at[s] = run->z[s] + BLUR * run->error[s];
+  if (run->here.table->values(run->here.p, t1, run->at, run->middle)) return RAISED;
+  for (int part = 0; part < curves->parts; part++)
+    for (int k = 0; k < curves->count; k++) {
+      double *const off = off_of(curves, part, k);
+      *off = *off + fabs(run->middle[k] - run->ends[k]);
+    }
+  return 0;
+}
+
 /* Try a step of a table or of Radau IIA, or say what is in its way. */
 HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
   hs_span *const span = &run->span;
@@ -107,7 +121,9 @@ HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
     for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
   }
   if (method_piece(run, span->t, h, &span->piece) || interpolate(run)) return HS_NOT_FINITE;
-  return mode->values(p, t1, run->z, run->ends) ? HS_NOT_FINITE : HS_CLEAR;
+  if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
+  const int blurred = HS_HAS_RADAU && run->method->kind == HS_RADAU && run->control.tolerance > 0;
+  return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
 /* Make one step of a table or of Radau IIA: rejected by the error estimate, halved where something has no value. */
