@@ -29,8 +29,10 @@ class Arithmetic:
         ``float64`` or ``mpmath``.
     digits : int or None
         Decimal digits asked for; None for float64.
+    bits : int
+        Of the significand.
     unit : Number
-        The unit round-off u.
+        The unit round-off u, 2**-bits.
     constant : callable
         The nearest number to an exact fraction.
     isfinite : callable
@@ -41,6 +43,7 @@ class Arithmetic:
 
     name: str
     digits: int | None
+    bits: int
     unit: Number
     constant: Callable[[Fraction], Number]
     isfinite: Callable[[Number], bool]
@@ -86,6 +89,7 @@ _MATH = (*_TRIGONOMETRIC, *_HYPERBOLIC, "exp", "log", "sqrt", "pow")
 FLOAT64 = Arithmetic(
     name="float64",
     digits=None,
+    bits=53,
     unit=2.0**-53,
     constant=_float_constant,
     isfinite=math.isfinite,
@@ -132,6 +136,7 @@ def multiprecision(digits: int) -> Arithmetic:
     return Arithmetic(
         name="mpmath",
         digits=digits,
+        bits=context.prec,
         unit=context.ldexp(1, -context.prec),
         constant=lambda value: context.mpf(value.numerator) / context.mpf(value.denominator),
         isfinite=isfinite,

@@ -98,6 +98,10 @@ class Execution(Deferred):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Give what can travel: a copy, or what is read from a pickle, is as one that was saved and read."""
+        return super().__getstate__() | {"output_function": None, "sampler": None, "assessment": None}
+
     def __repr__(self) -> str:
         start, end = self.time_span
         count = len(self.transitions)
@@ -156,6 +160,8 @@ class Execution(Deferred):
             For a time outside the run.
         """
         one = self.sample(t, side)
+        if len(one) != 1:
+            raise ValueError(f"one time is wanted, not {len(one)}: sample(times) takes many")
         state = {
             name: value
             for name, value, there in zip(one.states, one.state_columns[0].tolist(), one.present[0], strict=True)

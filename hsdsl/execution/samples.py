@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib import import_module
 from typing import Any
 
@@ -120,6 +121,13 @@ def split(
     UsageError
         For a name that is neither; the closest one is suggested.
     """
+    return _split(tuple(map(str, columns)), states, outputs)
+
+
+@lru_cache(64)
+def _split(
+    columns: tuple[str, ...], states: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     known = states + outputs
     for name in columns:
         if name not in known:

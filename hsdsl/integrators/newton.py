@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import islice
-from math import log2
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators.linear import Vector
@@ -96,7 +95,7 @@ class Convergence:
         """
         unit, before, z = self._arithmetic.unit, None, None
         allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
-        for largest, z in islice(iterations, 16 - 2 * int(log2(unit))):
+        for largest, z in islice(iterations, 16 + 2 * self._arithmetic.bits):
             size = _scaled(largest, x)
             rate = SLOW if not before else size / before
             reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]

@@ -186,6 +186,7 @@ _ARC_SINE = _rising(np.arcsin, -1.0, 1.0)
 ENCLOSED = Arithmetic(
     name="enclosure",
     digits=None,
+    bits=53,
     unit=2.0**-53,
     constant=_constant,
     isfinite=lambda value: bool(np.all(np.isfinite(value.low) & np.isfinite(value.high))),

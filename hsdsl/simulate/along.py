@@ -15,7 +15,8 @@ from hsdsl.simulate.interpolation import interpolation
 from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, total, value
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
-MOST_PIECES = 1000  # of a step, before what is left is taken as it is
+MOST_FIRST = 3  # of a step's first piece, before the step is made shorter
+MOST_PIECES = 1000  # of a step, before it is made shorter, or what is left is taken as it is
 Function = Callable[[Number], Number]
 
 
@@ -100,9 +101,15 @@ def interpolated(
     share: Number,
     arithmetic: Arithmetic,
     far: bool = True,
+    may_refuse: bool = False,
 ) -> list[list[Piece]]:
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
     their largest value, or ``allowed(k)`` more; not ``far``, only to where the first of them is positive.
+
+    Raises
+    ------
+    ValueError
+        It ``may_refuse`` and the functions vary too fast: the first piece would be too short, or there are too many.
     """
     by, zero = interpolation(degree, arithmetic), arithmetic.zero
     nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
@@ -118,6 +125,12 @@ def interpolated(
             settles(residual(c, tests, check), enough, allowed, k)
             for k, (c, check, enough) in enumerate(zip(pieces, checks, off, strict=True))
         ]
+        if (
+            may_refuse
+            and not all(settled)
+            and (len(found[0]) >= MOST_PIECES or (start == 0 and halvings == MOST_FIRST))
+        ):
+            raise ValueError("too fast for one step")
         if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < MOST_PIECES:
             half = width / 2
             parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]

@@ -14,6 +14,9 @@ RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: wha
 UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
 LEAST_DEGREE = 4  # along a step: also not below that of its dense output
 SERIES_DEGREE = 6  # along a step of Taylor's method, where a surface has no series
+# Where between nodes an interpolation is tested: parts of no simple ratio to them, since what oscillates in step with
+# the nodes, as the guard of a clock may, would else pass for a constant.
+BETWEEN = Fraction(3_819_661, 10**7), Fraction(6_180_339, 10**7), Fraction(4_142_137, 10**7)
 OVER_TIME = 8, 1e-9  # degree and residual of the interpolation of a push
 
 
@@ -44,7 +47,8 @@ class Interpolation:
 def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
     """Make the interpolation of a degree."""
     nodes = tuple(arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1))
-    tests = tuple(arithmetic.constant(Fraction(2 * i + 1, 2 * degree)) for i in (0, degree // 2, degree - 1))
+    parts = 0, degree // 2, degree - 1
+    tests = tuple(arithmetic.constant((i + part) / degree) for i, part in zip(parts, BETWEEN, strict=True))
     matrix = _to_powers(degree, arithmetic)
     rounding = arithmetic.unit * _total(matrix, arithmetic)
     return Interpolation(nodes, tests, matrix, rounding)

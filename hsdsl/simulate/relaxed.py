@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import log2
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
@@ -59,7 +58,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     control, method, arc = run.control, run.stepper(here), here.arc
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
-    most_halvings = 16 - 2 * int(log2(run.arithmetic.unit))
+    most_halvings = 16 + 2 * run.arithmetic.bits
     t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
     stood_on = here.surfaces.stood_on
     try:

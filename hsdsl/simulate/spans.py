@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from math import log2
 from typing import Protocol
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
@@ -25,6 +24,7 @@ from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
+LONG = 2**24  # in a run: steps that are made shorter where surfaces vary too fast along them
 BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
@@ -305,9 +305,9 @@ def interpolate(run: Run, here: Here, t: Number, h: Number, x: State, z: State, 
         return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
 
     degree, share = along_steps(run.settings)
-    return interpolated(values, count, degree, allowed, share, run.arithmetic)
+    return interpolated(values, count, degree, allowed, share, run.arithmetic, may_refuse=h * LONG > run.settings.until)
 
 
 def most_halvings(run: Run) -> int:
     """Enough to go from any step to round-off of it."""
-    return 16 - 2 * int(log2(run.arithmetic.unit))
+    return 16 + 2 * run.arithmetic.bits

@@ -170,3 +170,42 @@ def test_no_impact_is_missed_or_made_up_whatever_the_parameters(count: int, tmp_
         assert len(run.transitions) == len(exact.impacts), (c, amplitude)
         off = [abs(t.time - float(i.time)) for t, i in zip(run.transitions, exact.impacts, strict=True)]
         assert max(off, default=0) <= 1e-7, (c, amplitude)
+
+
+CLOCK = """
+hsdsl: 1
+modes:
+  off: {flow: {x: 0}, transitions: [{when: sin(2*pi*t) >= 0.5, to: on}]}
+  on: {flow: {x: 1}, transitions: [{when: sin(2*pi*t) <= 0, to: off}]}
+initial: {mode: off, x: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("until", [250, 300, 301, 1000])
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_clock_faster_than_the_flow_is_not_passed_over(method: str, until: int, tmp_path: Path) -> None:
+    """The flow alone would allow steps of many periods, and the period divides them: on for 5/12 of each."""
+    path = tmp_path / "clock.yaml"
+    path.write_text(CLOCK)
+    run = hsdsl.load(path).simulate(until, method=method)
+    assert len(run.transitions) == 2 * until
+    assert run.final.state["x"] == pytest.approx(until * 5 / 12, abs=1e-8)
+    assert run.verdict.theorem == "holds"
+
+
+def test_the_relaxed_scheme_says_what_it_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "clock.yaml"
+    path.write_text(CLOCK)
+    run = hsdsl.load(path).simulate(10, scheme="relaxed")
+    assert len(run.transitions) < 20
+    assert run.verdict.theorem == "unknown" and "passed over" in run.verdict.reasons[0]
+
+
+@pytest.mark.parametrize("scheme", ["located", "relaxed"])
+def test_more_digits_than_float64_has_exponents_for(scheme: str) -> None:
+    run = model("bouncing-ball").simulate(
+        "1.5", scheme=scheme, method="rk4", step="1/2", relaxation="1e-300", precision=400
+    )
+    with mp.workdps(400):
+        assert abs(run.transitions[0].time - mp.sqrt(mp.mpf(20) / mp.mpf("9.81"))) < mp.mpf(10) ** -290

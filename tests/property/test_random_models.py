@@ -189,7 +189,7 @@ def test_random_models_follow_the_exact_execution(block: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(20))
+@pytest.mark.parametrize("block", range(12))
 def test_many_random_models_follow_the_exact_execution(block: int) -> None:
     for seed in range(1000 + 20 * block, 1020 + 20 * block):
         check(seed)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import hand_made
 import numpy as np
 import pytest
 
+import hsdsl
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Stop
 
+MODELS = Path(__file__).parents[2] / "models"
 FIFTY = decimals.context_of(50)
 
 # t, side, mode, j, kind, state
@@ -231,3 +236,18 @@ def test_jupyter_shows_escaped_text():
     shown = replace(hand_made.thermostat(30), title="<b>hot & cold</b>")._repr_html_()
     assert "&lt;b&gt;hot &amp; cold&lt;/b&gt;" in shown
     assert "18 more" in shown
+
+
+@pytest.mark.parametrize("engine", ["auto", "python"])
+def test_a_copy_or_a_pickle_is_the_execution(engine):
+    run = hsdsl.load(MODELS / "pronking-runner.yaml").simulate(engine=engine)
+    for other in (copy.deepcopy(run), pickle.loads(pickle.dumps(run))):
+        assert other == run and other.verdict == run.verdict
+        assert other(0.3).state == run(0.3).state
+
+
+def test_one_time_is_one_time():
+    run = hsdsl.load(MODELS / "bouncing-ball.yaml").simulate(1)
+    for times in ([0.5, 1], []):
+        with pytest.raises(ValueError, match="sample"):
+            run(times)

@@ -1,6 +1,7 @@
 /* Surfaces along one step, as polynomials of the share s of the step. See hsdsl/simulate/along.py. */
 
 #define MOST_SPLITS 30 /* MOST_HALVINGS there */
+#define MOST_FIRST 3
 #define MOST_PIECES 1000
 #define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
 #define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
@@ -136,9 +137,10 @@ static void straighten(hs_run *run, int degree) {
 }
 
 /* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
-   `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. */
+   `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. It may refuse what varies too
+   fast: the step is to be shorter. */
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
-                        hs_allowed *allowed, int far) {
+                        hs_allowed *allowed, int far, int may_refuse) {
   struct {
     double start, width;
     int halvings;
@@ -152,6 +154,7 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     const int halvings = parts[open].halvings;
     curves->start[curves->parts] = start, curves->width[curves->parts] = width;
     if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
+    if (may_refuse && !settled && (curves->parts >= MOST_PIECES || (start == 0 && halvings == MOST_FIRST))) return RAISED;
     if (!settled && halvings < MOST_SPLITS && curves->parts < MOST_PIECES) {
       const double half = width / 2;
       parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;

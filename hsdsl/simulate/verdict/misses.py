@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Arc
+from hsdsl.simulate.interpolation import BETWEEN
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.choices import commute
 from hsdsl.simulate.verdict.finding import Finding, times
@@ -53,6 +54,8 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
     crossed = _crossed(run, arc)
     last_arc = arc is run.flows[-1] and crossed is None
     first, last = run.at_row(arc, arc.first), run.at_row(arc, arc.last)
+    if run.run.settings.scheme == "relaxed" and (passed := _passed_over(run, arc, crossed)):
+        yield passed, None
     for k, values in enumerate(zip(*run.surfaces_along(arc), strict=True)):
         for i in _where_it_may_turn(values):
             row = arc.first + i
@@ -68,6 +71,26 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
             yield _other(run, arc, last, k, crossed), None
         if values[0] <= 0 and first.rate(k) < 0:
             yield _start(run, arc, first, k), None
+
+
+def _passed_over(run: Looking, arc: Arc, crossed: int | None) -> Finding | None:
+    """A visit beyond a surface inside a step: the relaxed scheme looks at the ends of steps."""
+    relaxation, ends = run.run.settings.relaxation, list(run.surfaces_along(arc))
+    for i in range(len(ends) - 1):
+        look, last = run.between(arc, arc.first + i), arc.first + i + 1 == arc.last
+        for part in BETWEEN:
+            place = look(run.arithmetic.constant(part))
+            for k, value in enumerate(place.kernel.surfaces(place.t, *place.x)):
+                if value <= 0 or ends[i][k] > 0 or ends[i + 1][k] > 0 or (last and k == crossed):
+                    continue
+                slopes = place.kernel.gradients[k](place.t, *place.x)
+                level = TWICE * relaxation * sum((abs(g) for g in slopes), value * 0) + place.noise(k)
+                if value > level and not _has_condition(place, k):
+                    sentence = (
+                        f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
+                    )
+                    return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
+    return None
 
 
 def _where_it_may_turn(values: Sequence[Number]) -> Iterator[int]:
