@@ -16,7 +16,7 @@ from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, tot
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_FIRST = 3  # of a step's first piece, before the step is made shorter
-MOST_PIECES = 1000  # of a step, before it is made shorter, or what is left is taken as it is
+MOST_PIECES = 1000  # before what is left is taken as it is, or it is refused
 Function = Callable[[Number], Number]
 
 
@@ -101,6 +101,7 @@ def interpolated(
     share: Number,
     arithmetic: Arithmetic,
     far: bool = True,
+    most: int = MOST_PIECES,
     may_refuse: bool = False,
 ) -> list[list[Piece]]:
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
@@ -125,13 +126,9 @@ def interpolated(
             settles(residual(c, tests, check), enough, allowed, k)
             for k, (c, check, enough) in enumerate(zip(pieces, checks, off, strict=True))
         ]
-        if (
-            may_refuse
-            and not all(settled)
-            and (len(found[0]) >= MOST_PIECES or (start == 0 and halvings == MOST_FIRST))
-        ):
+        if may_refuse and not all(settled) and (len(found[0]) >= most or (start == 0 and halvings == MOST_FIRST)):
             raise ValueError("too fast for one step")
-        if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < MOST_PIECES:
+        if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < most:
             half = width / 2
             parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]
             continue

@@ -24,7 +24,8 @@ from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
-LONG = 2**24  # in a run: steps that are made shorter where surfaces vary too fast along them
+IN_A_STEP = 250  # pieces of a surface, at most
+LONG = 2**9  # in a run: steps that are made shorter where surfaces vary too fast along them
 BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
@@ -305,7 +306,8 @@ def interpolate(run: Run, here: Here, t: Number, h: Number, x: State, z: State, 
         return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
 
     degree, share = along_steps(run.settings)
-    return interpolated(values, count, degree, allowed, share, run.arithmetic, may_refuse=h * LONG > run.settings.until)
+    refuse = h * LONG > run.settings.until
+    return interpolated(values, count, degree, allowed, share, run.arithmetic, most=IN_A_STEP, may_refuse=refuse)
 
 
 def most_halvings(run: Run) -> int:

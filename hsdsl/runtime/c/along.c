@@ -140,7 +140,7 @@ static void straighten(hs_run *run, int degree) {
    `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. It may refuse what varies too
    fast: the step is to be shorter. */
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
-                        hs_allowed *allowed, int far, int may_refuse) {
+                        hs_allowed *allowed, int far, int most, int may_refuse) {
   struct {
     double start, width;
     int halvings;
@@ -154,8 +154,8 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     const int halvings = parts[open].halvings;
     curves->start[curves->parts] = start, curves->width[curves->parts] = width;
     if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
-    if (may_refuse && !settled && (curves->parts >= MOST_PIECES || (start == 0 && halvings == MOST_FIRST))) return RAISED;
-    if (!settled && halvings < MOST_SPLITS && curves->parts < MOST_PIECES) {
+    if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST))) return RAISED;
+    if (!settled && halvings < MOST_SPLITS && curves->parts < most) {
       const double half = width / 2;
       parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;
       parts[open].start = start, parts[open].width = half, parts[open++].halvings = halvings + 1;

@@ -115,7 +115,8 @@ static int nothing_more(hs_run *run, int k, double *allowed) {
 /* When the push falls through zero, isolated on an interpolant over time, then solved on the push itself: 1, or 0. */
 static int released(hs_run *run, double *release) {
   const double t = run->here.t, span = run->task->timeline->end[run->here.segment] - t;
-  if (interpolated(run, inward, 1, &run->task->interpolation[HS_OVER_TIME], nothing_more, 0, 0)) return RAISED;
+  if (interpolated(run, inward, 1, &run->task->interpolation[HS_OVER_TIME], nothing_more, 0, MOST_PIECES, 0))
+    return RAISED;
   run->bernstein_of = 0;
   hs_walk walk = begin_walk(&run->curves, 0, 0.0, 0);
   hs_rise rise;

@@ -2,7 +2,8 @@
    run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
 
 #define BLUR 2
-#define LONG 16777216.0 /* 2**24 */
+#define LONG 512.0
+#define IN_A_STEP 250
 #define UNKNOWN_TOLERANCE 1e-10
 #define LAST_TERM 4
 #define TERM_BEFORE 32
@@ -79,7 +80,7 @@ static int noise_at_ends(hs_run *run, int k, double *allowed) {
 static int interpolate(hs_run *run) {
   const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
   const int long_enough = run->span.h * LONG > run->until;
-  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, long_enough);
+  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, IN_A_STEP, long_enough);
 }
 
 static void begin_span(hs_run *run, double h, double t1) {

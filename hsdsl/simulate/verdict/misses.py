@@ -54,7 +54,7 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
     crossed = _crossed(run, arc)
     last_arc = arc is run.flows[-1] and crossed is None
     first, last = run.at_row(arc, arc.first), run.at_row(arc, arc.last)
-    if run.run.settings.scheme == "relaxed" and (passed := _passed_over(run, arc, crossed)):
+    if passed := _passed_over(run, arc, crossed):
         yield passed, None
     for k, values in enumerate(zip(*run.surfaces_along(arc), strict=True)):
         for i in _where_it_may_turn(values):
@@ -74,7 +74,10 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
 
 
 def _passed_over(run: Looking, arc: Arc, crossed: int | None) -> Finding | None:
-    """A visit beyond a surface inside a step: the relaxed scheme looks at the ends of steps."""
+    """A visit beyond a surface inside a step.
+
+    The relaxed scheme looks at the ends of steps, the located one at so many pieces of a surface and no more.
+    """
     relaxation, ends = run.run.settings.relaxation, list(run.surfaces_along(arc))
     for i in range(len(ends) - 1):
         look, last = run.between(arc, arc.first + i), arc.first + i + 1 == arc.last
