@@ -8,6 +8,7 @@ from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators import TaylorMethod
+from hsdsl.simulate.isolate import total
 from hsdsl.simulate.settings import Settings
 
 RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
@@ -50,7 +51,7 @@ def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
     parts = 0, degree // 2, degree - 1
     tests = tuple(arithmetic.constant((i + part) / degree) for i, part in zip(parts, BETWEEN, strict=True))
     matrix = _to_powers(degree, arithmetic)
-    rounding = arithmetic.unit * _total(matrix, arithmetic)
+    rounding = arithmetic.unit * total((abs(m) for line in matrix for m in line), arithmetic.zero)
     return Interpolation(nodes, tests, matrix, rounding)
 
 
@@ -66,11 +67,3 @@ def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...],
                 c = [(a - Fraction(j, degree) * b) / scale for a, b in zip(shifted, kept, strict=True)]
         columns.append(c)
     return tuple(tuple(arithmetic.constant(c[k]) for c in columns) for k in range(degree + 1))
-
-
-def _total(matrix: tuple[tuple[Number, ...], ...], arithmetic: Arithmetic) -> Number:
-    total = arithmetic.zero
-    for line in matrix:
-        for m in line:
-            total = total + abs(m)
-    return total

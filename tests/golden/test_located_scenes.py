@@ -191,7 +191,9 @@ def test_a_clock_faster_than_the_flow_is_not_passed_over(method: str, until: int
     run = hsdsl.load(path).simulate(until, method=method)
     assert len(run.transitions) == 2 * until
     assert run.final.state["x"] == pytest.approx(until * 5 / 12, abs=1e-8)
-    assert run.verdict.theorem == "holds" or until > 500  # a crossing near the edge of a short piece may be in doubt
+    assert run.verdict.theorem in (
+        ("holds",) if until < 500 else ("holds", "unknown")
+    )  # one in a short piece may be in doubt
 
 
 def test_a_clock_too_fast_to_be_followed_is_told_of(tmp_path: Path) -> None:

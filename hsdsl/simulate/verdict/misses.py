@@ -54,9 +54,10 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
     crossed = _crossed(run, arc)
     last_arc = arc is run.flows[-1] and crossed is None
     first, last = run.at_row(arc, arc.first), run.at_row(arc, arc.last)
-    if passed := _passed_over(run, arc, crossed):
+    ends = list(run.surfaces_along(arc))
+    if passed := _passed_over(run, arc, crossed, ends):
         yield passed, None
-    for k, values in enumerate(zip(*run.surfaces_along(arc), strict=True)):
+    for k, values in enumerate(zip(*ends, strict=True)):
         for i in _where_it_may_turn(values):
             row = arc.first + i
             if (k == crossed and row + 1 == arc.last) or values[i] > 0:
@@ -73,15 +74,15 @@ def _along(run: Looking, arc: Arc) -> Iterator[tuple[Finding | None, Miss | None
             yield _start(run, arc, first, k), None
 
 
-def _passed_over(run: Looking, arc: Arc, crossed: int | None) -> Finding | None:
-    """A visit beyond a surface inside a step.
+def _passed_over(run: Looking, arc: Arc, crossed: int | None, ends: Sequence[Sequence[Number]]) -> Finding | None:
+    """A visit beyond a surface inside a step, seen at three points of each step, in long arcs at one.
 
     The relaxed scheme looks at the ends of steps, the located one at so many pieces of a surface and no more.
     """
-    relaxation, ends = run.run.settings.relaxation, list(run.surfaces_along(arc))
+    relaxation = run.run.settings.relaxation
     for i in range(len(ends) - 1):
         look, last = run.between(arc, arc.first + i), arc.first + i + 1 == arc.last
-        for part in BETWEEN:
+        for part in BETWEEN if len(ends) <= FEW else (BETWEEN[i % len(BETWEEN)],):
             place = look(run.arithmetic.constant(part))
             for k, value in enumerate(place.kernel.surfaces(place.t, *place.x)):
                 if value <= 0 or ends[i][k] > 0 or ends[i + 1][k] > 0 or (last and k == crossed):
