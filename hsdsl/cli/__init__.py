@@ -56,24 +56,31 @@ def main() -> None:
     _prepare_streams()
     code = 0
     try:
-        with app.make_context("hsdsl", sys.argv[1:]) as context:
-            app.invoke(context)
+        code = _obey(sys.argv[1:])
         sys.stdout.flush()  # a full disk shows here rather than when the interpreter ends
-    except Exit as end:
-        code = end.exit_code
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        print("interrupted", file=sys.stderr)
-        code = INTERRUPTED
     except BrokenPipeError:
         _drop_output()  # nobody reads: nothing left to say
     except OSError as error:
+        code = WRONG_USAGE
         _drop_output()
         print(f"hsdsl: the answer cannot be written: {error.strerror or error}", file=sys.stderr)
-        code = WRONG_USAGE
     sys.exit(code)
+
+
+def _obey(words: list[str]) -> int:
+    """Do what a command line says and return the exit code."""
+    try:
+        with app.make_context("hsdsl", words) as context:
+            app.invoke(context)
+    except Exit as end:
+        return end.exit_code
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    return 0
 
 
 def _prepare_streams() -> None:

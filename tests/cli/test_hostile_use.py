@@ -21,7 +21,8 @@ experiment: {until: 2, step: 0.1, method: euler}
 def shell(command, folder, **environment):
     """A command line in a shell; `hsdsl` stands for this interpreter's own."""
     command = command.replace("hsdsl ", f"{sys.executable} -m hsdsl ")
-    given = {**os.environ, "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache"), **environment}
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    given = {**inherited, "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache"), **environment}
     done = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, env=given, timeout=120)
     errors = done.stderr.decode("utf-8", "replace")
     assert "Traceback" not in errors and "Exception ignored" not in errors, errors
