@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 Side = Literal["right", "left"]
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluated:
+class Evaluated(NamedTuple):
     """What a sampler finds at n times.
 
     Attributes
@@ -73,7 +72,7 @@ def within(execution: Execution, times: Any) -> tuple[Array, Array]:
 
 
 def _as_floats(times: Any) -> Array:
-    return np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+    return np.asarray(times, dtype=float).reshape(-1)
 
 
 def _as_times(execution: Execution, times: Any) -> Array:

@@ -50,10 +50,10 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
         if parts not in _loaded:
             library = load(_text(parts), lambda: _text(parts), _effort(parts))
             library.hs_workspace.restype = ctypes.c_int64
-            library.hs_simulate.restype = None
+            library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
             library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-            library.hs_sample.restype = ctypes.c_int64
-            library.hs_run_ensemble.restype = None
+            library.hs_sample.argtypes, library.hs_sample.restype = (ctypes.c_void_p,), ctypes.c_int64
+            library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
             _loaded[parts] = library
     return _loaded[parts]
 
@@ -104,28 +104,16 @@ class CompiledModel:
     def workspace(self, method: tables.Method, scheme: str) -> int:
         """How many numbers a run needs for itself."""
         number = tables.SCHEMES.index(scheme)
-        return _runtime(method, number).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
-
-    def simulate(self, task: tables.Task) -> None:
-        """Run a task to its end; the interpreter is free meanwhile."""
-        _runtime(task.method.contents, task.settings.scheme).hs_simulate(ctypes.byref(task))
-
-    def pack(self, task: tables.Task, to: int) -> int:
-        """Copy what a task has written to an address; returns how many states a row has there."""
-        return _runtime(task.method.contents, task.settings.scheme).hs_pack(ctypes.addressof(task), to)
-
-    def run_ensemble(self, ensemble: tables.Ensemble) -> None:
-        """Run instances to their end; the interpreter is free meanwhile."""
-        task = ensemble.task
-        _runtime(task.method.contents, task.settings.scheme).hs_run_ensemble(ctypes.byref(ensemble))
+        return runtime_of(method, scheme).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
 
 
-def _runtime(method: tables.Method, scheme: int) -> ctypes.CDLL:
-    return runtime(tables.SCHEMES[scheme], tables.METHOD_KINDS[int(method.kind)])
+def runtime_of(method: tables.Method, scheme: str) -> ctypes.CDLL:
+    """The runtime that has a method and a scheme; what runs there leaves the interpreter free meanwhile."""
+    return runtime(scheme, tables.METHOD_KINDS[int(method.kind)])
 
 
 def _source(program: Program) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +12,7 @@ from hsdsl.execution import Array, Evaluated
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel, runtime
 
-BLOCK = 8  # HS_BLOCK
+BLOCK = 16  # HS_BLOCK
 NUMBER = 8  # bytes
 
 
@@ -31,6 +30,7 @@ class Sampled:
 
     def __init__(self, compiled: CompiledModel, timeline: Any) -> None:
         self.table = tables.Sampling(model=ctypes.pointer(compiled.table), timeline=timeline)
+        self.run = runtime().hs_sample
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
 
@@ -63,8 +63,8 @@ class Sampler:
         self, sampled: Sampled, columns: Placed, kinds: tuple[tuple[str, ...], ...], layout: Array | None
     ) -> None:
         self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
+        self._own: tables.Sampling | None = None
 
-    @cached_property
     def _table(self) -> tables.Sampling:
         """What is the same for any times."""
         table = tables.Sampling.from_buffer_copy(self._sampled.table)
@@ -85,17 +85,17 @@ class Sampler:
         outputs : bool
         """
         n, k, room = len(times), len(states), len(times) + BLOCK
-        own = self._table
+        own = self._own = self._own or self._table()
         m = self._outputs if outputs else 0
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n], memory[n:room] = times, 0.0
-        table, start = tables.Sampling.from_buffer_copy(own), memory.ctypes.data
+        table, start = tables.Sampling.from_buffer_copy(own), tables.address_of(memory)
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]
         return Evaluated(
-            outside=runtime().hs_sample(ctypes.byref(table)),
+            outside=self._sampled.run(ctypes.byref(table)),
             times=memory[:n],
             rows=memory[room : room + n].view(np.int64),
             states=memory[ends[2] : ends[3]].reshape(k, room)[:, :n].T,

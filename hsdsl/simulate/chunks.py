@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.program import Program
 from hsdsl.runtime import tables
-from hsdsl.simulate.columns import Columns, Gathered, Packed
+from hsdsl.simulate.columns import Columns, Counts, Gathered, Packed, Shape
 from hsdsl.simulate.layouts import Layouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
@@ -22,21 +21,6 @@ BY_TRANSITION = ("transition", "before", "after")
 
 
 Sink = Callable[[dict[str, Array]], Any]
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Sizes of one model's rows: states of the largest mode, outputs, the pieces' degree, edges of any mode."""
-
-    width: int
-    outputs: int
-    degree: int
-    edges: int
-
-    @property
-    def row_bytes(self) -> int:
-        """About how much memory a row takes."""
-        return 8 * (3 + self.width * (2 + self.degree) + self.outputs)
 
 
 class Chunks:
@@ -72,6 +56,12 @@ class Chunks:
         """What is in the chunk that is being written."""
         return self._written()
 
+    @property
+    def counts(self) -> Counts:
+        """How much the chunk that is being written holds."""
+        table = self.table
+        return Counts(table.rows, table.arcs, table.transitions, table.notes, table.alternatives_used)
+
     def _open(self, rows: int) -> None:
         shape = self._shape
         arcs, transitions, notes = rows // 2 + 8, rows // 4 + 8, rows // 16 + 8
@@ -99,14 +89,13 @@ class Chunks:
         table.rows = table.arcs = table.transitions = table.notes = table.alternatives_used = 0
 
     def _written(self) -> dict[str, Array]:
-        table = self.table
-        rows, transitions = table.rows, table.transitions
+        rows, arcs, transitions, notes, alternatives = self.counts
         used = {name: self._columns[name][:rows] for name in BY_ROW}
         used |= {name: self._columns[name][:transitions] for name in BY_TRANSITION}
         used["pieces"] = self._columns["pieces"][: rows + 1]
-        used["arc"] = self._columns["arc"][: table.arcs]
-        used["note"] = self._columns["note"][: table.notes]
-        used["alternatives"] = self._columns["alternatives"][: table.alternatives_used]
+        used["arc"] = self._columns["arc"][:arcs]
+        used["note"] = self._columns["note"][:notes]
+        used["alternatives"] = self._columns["alternatives"][:alternatives]
         return used
 
     def whole(self, pack: Callable[[int], int], layouts: Layouts) -> Columns:
@@ -116,7 +105,7 @@ class Chunks:
         leaves it. ``pack`` copies the chunk to an address, and returns how many states a row has.
         """
         if not self._full and self._rows * self._shape.row_bytes <= MOST_KEPT:
-            return self._packed(pack)
+            return Packed(pack, self.counts, self._shape)
         chunks = [*self._full, self._written()]
         chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
         self._full = []
@@ -130,15 +119,6 @@ class Chunks:
             whole["coefficients"] = whole.pop("pieces")[1:]
         self._rows, self._columns = 0, {}
         return Gathered(whole, layouts.width(layouts.of_arcs(whole["arc"]["mode"])))
-
-    def _packed(self, pack: Callable[[int], int]) -> Packed:
-        table, shape = self.table, self._shape
-        rows, arcs, transitions, notes = table.rows, table.arcs, table.transitions, table.notes
-        alternatives, states, outputs = table.alternatives_used, shape.width, shape.outputs
-        size = rows * (2 + outputs + states * (1 + shape.degree)) + 3 * arcs + 5 * notes + (alternatives + 1) // 2
-        memory = np.empty(size + transitions * (4 + 2 * states))
-        width = pack(memory.ctypes.data)
-        return Packed(memory, rows, arcs, transitions, notes, alternatives, outputs, shape.degree, states, width)
 
 
 def arcs_of(whole: Columns, program: Program, layouts: Layouts) -> Iterator[Arc]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,6 +18,31 @@ ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Sizes of one model's rows: states of the largest mode, outputs, the pieces' degree, edges of any mode."""
+
+    width: int
+    outputs: int
+    degree: int
+    edges: int
+
+    @property
+    def row_bytes(self) -> int:
+        """About how much memory a row takes."""
+        return 8 * (3 + self.width * (2 + self.degree) + self.outputs)
+
+
+class Counts(NamedTuple):
+    """How much a run has written."""
+
+    rows: int
+    arcs: int
+    transitions: int
+    notes: int
+    alternatives: int
 
 
 class Where(NamedTuple):
@@ -55,56 +81,62 @@ class Gathered:
         return Where(rows, len(of["arc"]), width, degree, of["outputs"].shape[1], *places)
 
 
-@dataclass(frozen=True, eq=False)
 class Packed:
     """Columns of a short run in one stretch of memory, as ``pack.c`` puts them; arrays are made when asked for.
 
     A dozen arrays take longer to make than many a run.
+
+    Parameters
+    ----------
+    pack : callable
+        Copies the columns to an address, and returns how many states a row has there.
+    counts : Counts
+    shape : Shape
+        With the states of the model's largest mode, of which the run may not have been in one.
     """
 
-    memory: Array
-    rows: int
-    arcs: int
-    transitions: int
-    notes: int
-    alternatives: int
-    outputs: int
-    degree: int
-    there: int  # states of the model's largest mode, and below of those the run was in
-    width: int
+    def __init__(self, pack: Callable[[int], int], counts: Counts, shape: Shape) -> None:
+        rows, arcs, transitions, notes, alternatives = counts
+        by_row = 2 + shape.outputs + shape.width * (1 + shape.degree)
+        self._counts, self._shape = counts, shape
+        self._memory = np.empty(
+            rows * by_row + 3 * arcs + transitions * (4 + 2 * shape.width) + 5 * notes + (alternatives + 1) // 2
+        )
+        self._start = tables.address_of(self._memory)
+        self._width = pack(self._start)
 
     @cached_property
     def _sizes(self) -> tuple[int, ...]:
         """How many numbers each column takes, in the order of `ORDER`."""
-        n, k, w, there = self.rows, self.transitions, self.width, self.there
-        by_row = n, n * w, n * self.outputs, n, n * self.degree * w
-        return (*by_row, 3 * self.arcs, 4 * k, k * there, k * there, 5 * self.notes, (self.alternatives + 1) // 2)
+        (n, arcs, k, notes, alternatives), w, there = self._counts, self._width, self._shape.width
+        by_row = n, n * w, n * self._shape.outputs, n, n * self._shape.degree * w
+        return (*by_row, 3 * arcs, 4 * k, k * there, k * there, 5 * notes, (alternatives + 1) // 2)
 
     def __getitem__(self, name: str) -> Array:
         place = ORDER.index(name)
         start = sum(self._sizes[:place])
-        raw: Array = self.memory[start : start + self._sizes[place]]
+        raw: Array = self._memory[start : start + self._sizes[place]]
         if name in RECORDS:
             return raw.view(RECORDS[name])
         if name == "alternatives":
-            return raw.view(np.int32)[: self.alternatives]
-        n, k = self.rows, self.transitions
+            return raw.view(np.int32)[: self._counts.alternatives]
+        n, k, shape = self._counts.rows, self._counts.transitions, self._shape
         if name in ("values", "outputs"):
-            return raw.reshape(n, self.width if name == "values" else self.outputs)
+            return raw.reshape(n, self._width if name == "values" else shape.outputs)
         if name in ("before", "after"):
-            return raw.reshape(k, self.there)
-        return raw.reshape(n, self.degree, self.width) if name == "coefficients" else raw
+            return raw.reshape(k, shape.width)
+        return raw.reshape(n, shape.degree, self._width) if name == "coefficients" else raw
 
     @property
     def where(self) -> Where:
         """Where they are."""
-        n, w, m = self.rows, self.width, self.outputs
-        times = self.memory.ctypes.data
+        n, w, m, degree = self._counts.rows, self._width, self._shape.outputs, self._shape.degree
+        times = self._start
         values = times + NUMBER * n
         recorded = values + NUMBER * n * w
         pieces = recorded + NUMBER * n * (m + 1)  # behind the depths
-        arc = pieces + NUMBER * n * self.degree * w
-        return Where(n, self.arcs, w, self.degree, m, times, values, recorded, pieces, arc)
+        arc = pieces + NUMBER * n * degree * w
+        return Where(n, self._counts.arcs, w, degree, m, times, values, recorded, pieces, arc)
 
 
 Columns = Gathered | Packed

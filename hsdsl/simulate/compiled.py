@@ -22,12 +22,12 @@ from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
-from hsdsl.simulate.chunks import Shape, Sink
-from hsdsl.simulate.columns import Columns
+from hsdsl.simulate.chunks import Sink
+from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
-from hsdsl.simulate.interrupt import noted
+from hsdsl.simulate.interrupt import Noted
 from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
@@ -158,8 +158,7 @@ class CompiledRun:
     def follow(self) -> tuple[Stop, Columns]:
         """Run to the end: why it stopped, and the columns that were written."""
         self._run()
-        desk, plan = self.desk, self.plan
-        self._columns = desk.chunks.whole(lambda to: plan.compiled.pack(desk.task, to), plan.layouts)
+        self._columns = self.desk.chunks.whole(self.desk.pack, self.plan.layouts)
         return self._stop(), self._columns
 
     def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
@@ -177,8 +176,8 @@ class CompiledRun:
 
     def _run(self) -> None:
         self.plan.lay(self.desk)
-        with noted(self.desk.press):
-            self.plan.compiled.simulate(self.desk.task)
+        with Noted(self.desk.press):
+            self.desk.simulate()
         if self.desk.failed:
             raise self.desk.failed[0]
 

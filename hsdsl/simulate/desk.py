@@ -14,8 +14,9 @@ import numpy as np
 
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
-from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate.chunks import Chunks, Shape, grown
+from hsdsl.runtime.kernel import CompiledModel, runtime_of
+from hsdsl.simulate.chunks import Chunks, grown
+from hsdsl.simulate.columns import Shape
 
 VISITED = 64
 MOST_KEPT = 4  # desks of one model and method
@@ -39,7 +40,8 @@ class Desk:
         self.task.workspace = self._workspace.ctypes.data
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
         self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
-        _desks[ctypes.addressof(self.task)] = self
+        self._runtime, self._where = runtime_of(method, scheme), ctypes.addressof(self.task)
+        _desks[self._where] = self
 
     def clear(self, rows: float) -> None:
         """Make ready for a run that may write about so many rows."""
@@ -49,6 +51,18 @@ class Desk:
         if len(self._visited) > 1:  # a large set takes long to forget
             self._visited = [grown(self.task.visited, VISITED, self._width)]
         self.task.now, self.task.made = 0.0, 0
+
+    def simulate(self) -> None:
+        """Run the task to its end; the interpreter is free meanwhile."""
+        self._runtime.hs_simulate(self._where)
+
+    def pack(self, to: int) -> int:
+        """Copy what the task has written to an address; returns how many states a row has there."""
+        return self._runtime.hs_pack(self._where, to)
+
+    def run_ensemble(self, ensemble: tables.Ensemble) -> None:
+        """Run instances to their end, their task being the desk's; the interpreter is free meanwhile."""
+        self._runtime.hs_run_ensemble(ctypes.addressof(ensemble))
 
     def press(self, number: int, frame: FrameType | None) -> None:
         """Ctrl-C: the run is to stop."""

@@ -98,7 +98,7 @@ class CompiledEnsemble:
         table.stop = self._stop.ctypes.data
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
-        self._plan.compiled.run_ensemble(table)
+        place.desk.run_ensemble(table)
         if place.desk.failed:
             raise place.desk.failed[0]
         known = np.array([*(ENDED.get(reason, reason) for reason in tables.REASONS), "interrupted"], LONGEST)

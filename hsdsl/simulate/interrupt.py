@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import signal
 import sys
-import threading
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
+from threading import get_ident, main_thread
 from types import FrameType
 from typing import Any
 
@@ -17,17 +16,20 @@ _getsignal: Callable[..., Any] = getattr(_plain, "getsignal")  # noqa: B009
 _SIGINT = int(signal.SIGINT)
 
 
-@contextmanager
-def noted(press: Callable[[int, FrameType | None], None]) -> Generator[None]:
+class Noted:
     """Call ``press`` at Ctrl-C while the block runs, where this thread would else raise KeyboardInterrupt.
 
     A handler that somebody else has installed stays.
     """
-    ours = threading.get_ident() == threading.main_thread().ident and _getsignal(_SIGINT) is signal.default_int_handler
-    if ours:
-        _signal(_SIGINT, press)
-    try:
-        yield
-    finally:
-        if ours:
+
+    def __init__(self, press: Callable[[int, FrameType | None], None]) -> None:
+        self._press = press
+
+    def __enter__(self) -> None:
+        self._ours = get_ident() == main_thread().ident and _getsignal(_SIGINT) is signal.default_int_handler
+        if self._ours:
+            _signal(_SIGINT, self._press)
+
+    def __exit__(self, *_: object) -> None:
+        if self._ours:
             _signal(_SIGINT, signal.default_int_handler)

@@ -109,8 +109,9 @@ static int interpolate_part(hs_run *run, hs_functions *functions, const hs_inter
   for (int k = 0; k < count; k++) {
     double *const c = coefficients_of(curves, part, k), largest = fabs(rows[k]);
     for (int j = 0; j < nodes; j++) {
-      c[j] = 0.0;
-      for (int i = 0; i < nodes; i++) c[j] = c[j] + by->matrix[j * nodes + i] * rows[i * count + k];
+      double power = 0.0;
+      for (int i = 0; i < nodes; i++) power = power + by->matrix[j * nodes + i] * rows[i * count + k];
+      c[j] = power;
     }
     for (int i = 1; i < nodes; i++) largest = hs_max(largest, fabs(rows[i * count + k]));
     int *const certain = &curves->certain[part * count + k];

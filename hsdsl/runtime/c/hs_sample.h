@@ -5,7 +5,7 @@
 
 #include "hs_simulate.h"
 
-#define HS_BLOCK 8 /* times that are evaluated together: memory for so many more than there are */
+#define HS_BLOCK 16 /* times that are evaluated together: memory for so many more than there are */
 
 typedef struct {
   const hs_model *model; /* these two for outputs alone */

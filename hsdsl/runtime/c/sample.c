@@ -1,12 +1,13 @@
 /* The value of a run at many times. See hsdsl/execution/sampling.py.
 
    Times in one piece are evaluated together, a block of them at once; a block may go beyond them, since what it writes
-   there is written again. Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)). */
+   there is written again. Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)); a processor that
+   does four at once rounds none of them otherwise. */
 
 #if defined(__GNUC__)
-typedef double hs_pair __attribute__((vector_size(16)));
+typedef double hs_few __attribute__((vector_size(32)));
 #else
-typedef double hs_pair;
+typedef double hs_few;
 #endif
 #if defined(__GNUC__) && !defined(__clang__)
 #define HS_UNROLLED __attribute__((optimize("O3")))
@@ -14,8 +15,8 @@ typedef double hs_pair;
 #define HS_UNROLLED
 #endif
 
-enum { HALF_BLOCK = HS_BLOCK / 2, STEPS_BEFORE_SEARCH = 8 };
-#define PAIRS(count) ((count) / (int)(sizeof(hs_pair) / sizeof(double)))
+enum { STEPS_BEFORE_SEARCH = 8 };
+#define PARTS(count) ((count) / (int)(sizeof(hs_few) / sizeof(double)))
 
 /* A row's piece, and where its arc's states are among the columns asked for. */
 typedef struct {
@@ -28,26 +29,50 @@ typedef struct {
 } hs_place;
 
 /* Evaluate the columns asked for at the times of a block, to `out` and further columns behind it. */
-#define DEFINE_BLOCK(name, count)                                                                                 \
-  HS_INLINE void name(const hs_sampling *s, const hs_place *at, const double *time, double *out) {               \
+#define DEFINE_BLOCK(name, count, target)                                                                         \
+  HS_INLINE target void name(const hs_sampling *s, const hs_place *at, const double *time, double *out) {        \
     const int w = s->width, top = at->degree - 1;                                                                \
     const double length = at->end - at->begin;                                                                   \
-    hs_pair u[PAIRS(count)], y[PAIRS(count)];                                                                    \
+    hs_few u[PARTS(count)], y[PARTS(count)];                                                                     \
     memcpy(u, time, sizeof u);                                                                                   \
-    for (int q = 0; q < PAIRS(count); q++) u[q] = (u[q] - at->begin) / length;                                   \
+    for (int q = 0; q < PARTS(count); q++) u[q] = (u[q] - at->begin) / length;                                   \
     for (int k = 0; k < s->columns; k++, out += s->samples + HS_BLOCK) {                                         \
       const int place = at->column[k];                                                                           \
-      const double *c = place < 0 ? at->c : at->c + place, x = place < 0 ? NAN : at->x[place];                                       \
-      for (int q = 0; q < PAIRS(count); q++) y[q] = (hs_pair){0} + (place < 0 ? 0.0 : c[top * w]);               \
+      const double *c = place < 0 ? at->c : at->c + place, x = place < 0 ? NAN : at->x[place];                   \
+      for (int q = 0; q < PARTS(count); q++) y[q] = (hs_few){0} + (place < 0 ? 0.0 : c[top * w]);                \
       for (int m = place < 0 ? -1 : top - 1; m >= 0; m--)                                                        \
-        for (int q = 0; q < PAIRS(count); q++) y[q] = c[m * w] + u[q] * y[q];                                    \
-      for (int q = 0; q < PAIRS(count); q++) y[q] = x + u[q] * y[q];                                             \
+        for (int q = 0; q < PARTS(count); q++) y[q] = c[m * w] + u[q] * y[q];                                    \
+      for (int q = 0; q < PARTS(count); q++) y[q] = x + u[q] * y[q];                                             \
       memcpy(out, y, sizeof y);                                                                                  \
     }                                                                                                            \
   }
 
-DEFINE_BLOCK(half_block, HALF_BLOCK)
-DEFINE_BLOCK(whole_block, HS_BLOCK)
+/* Evaluate them at all times from one up to another, which are in one piece. */
+#define DEFINE_PIECE(name, target)                                                                                \
+  DEFINE_BLOCK(name##_block, HS_BLOCK, target)                                                                   \
+  DEFINE_BLOCK(name##_half, HS_BLOCK / 2, target)                                                                \
+  DEFINE_BLOCK(name##_quarter, HS_BLOCK / 4, target)                                                             \
+  HS_UNROLLED target static void name(const hs_sampling *s, const hs_place *at, int64_t from, int64_t to) {      \
+    for (int64_t k = from; k < to; k += HS_BLOCK) {                                                              \
+      const double *time = s->time + k;                                                                          \
+      double *out = s->states + k;                                                                               \
+      if (to - k > HS_BLOCK / 2)                                                                                 \
+        name##_block(s, at, time, out);                                                                          \
+      else if (to - k > HS_BLOCK / 4)                                                                            \
+        name##_half(s, at, time, out);                                                                           \
+      else                                                                                                       \
+        name##_quarter(s, at, time, out);                                                                        \
+    }                                                                                                            \
+  }
+
+DEFINE_PIECE(piece, )
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+DEFINE_PIECE(wide_piece, __attribute__((target("avx2"))))
+#define HS_PIECE (__builtin_cpu_supports("avx2") ? wide_piece : piece)
+#else
+#define HS_PIECE piece
+#endif
 
 /* The last row not after a time; it is likely to be soon behind `from`. */
 HS_INLINE int64_t row_at(const hs_sampling *s, double t, int64_t from) {
@@ -145,7 +170,8 @@ static int64_t outside(const hs_sampling *s) {
   return -1;
 }
 
-HS_UNROLLED int64_t hs_sample(const hs_sampling *s) {
+int64_t hs_sample(const hs_sampling *s) {
+  void (*const evaluate)(const hs_sampling *, const hs_place *, int64_t, int64_t) = HS_PIECE;
   const int64_t first = outside(s);
   hs_place at;
   if (first >= 0 || !s->samples) return first;
@@ -163,12 +189,7 @@ HS_UNROLLED int64_t hs_sample(const hs_sampling *s) {
     }
     const int64_t start = i;
     for (; i < s->samples && at.begin < s->time[i] && s->time[i] < at.end; i++) s->row[i] = at.row;
-    for (int64_t k = start; k < i; k += HS_BLOCK) {
-      if (i - k > HALF_BLOCK)
-        whole_block(s, &at, s->time + k, s->states + k);
-      else
-        half_block(s, &at, s->time + k, s->states + k);
-    }
+    evaluate(s, &at, start, i);
     for (int64_t k = start; s->outputs && k < i; k++) outputs_between(s, &at, k);
   }
   return -1;

@@ -256,12 +256,12 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
   const double *p = run->here.p, tolerance = run->control.tolerance;
   const hs_polynomial *piece = &run->span.piece;
   begin_span(run, h, t1);
-  taylor_piece(run, h, &run->span.piece);
-  at(run, piece, 1.0, run->z);
+  taylor_piece(run, n, h, &run->span.piece);
+  at_in(run, n, piece, 1.0, run->z);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (tolerance > 0) {
-    taylor_error(run, h);
+    taylor_error(run, n, h);
     if (error_ratio(run) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
   }
   return mode->values(p, t1, run->z, run->ends) || curves(run) ? HS_NOT_FINITE : HS_CLEAR;

@@ -17,7 +17,7 @@ HS_INLINE int part_of_step(hs_run *run, int n, double t, double h) {
 /* The method's own interpolant of the step from (t, run->x) to run->z; not 0 where the flow has no value. */
 static int method_piece(hs_run *run, double t, double h, hs_polynomial *piece) {
   switch (run->method->kind) {
-    case HS_TAYLOR: return taylor_piece(run, h, piece), 0;
+    case HS_TAYLOR: return taylor_piece(run, run->here.dimension, h, piece), 0;
     case HS_RADAU: return radau_piece(run, piece), 0;
     default: return table_piece(run, t, h, piece);
   }
@@ -26,7 +26,7 @@ static int method_piece(hs_run *run, double t, double h, hs_polynomial *piece) {
 /* The estimate of the local error, to run->error; the flow at the step's end is run->end. */
 static void local_error(hs_run *run, double h) {
   switch (run->method->kind) {
-    case HS_TAYLOR: taylor_error(run, h); break;
+    case HS_TAYLOR: taylor_error(run, run->here.dimension, h); break;
     case HS_RADAU: copy(run->error, run->radau.error, run->here.dimension); break;
     default: table_error(run, h);
   }

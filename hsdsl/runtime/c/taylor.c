@@ -32,19 +32,21 @@ static int taylor_step(hs_run *run, double t, double h) {
   return 0;
 }
 
-static void taylor_piece(const hs_run *run, double h, hs_polynomial *piece) {
-  double power = 1.0;
-  piece->degree = run->method->order;
-  for (int m = 1; m <= run->method->order; m++) {
+HS_INLINE void taylor_piece(const hs_run *run, const int n, double h, hs_polynomial *piece) {
+  const int order = run->method->order, length = series_length(run->method), w = run->width;
+  const double *line = series_of(run, 0);
+  double *c = piece->c, power = 1.0;
+  piece->degree = order;
+  for (int m = 1; m <= order; m++, c += w) {
     power = power * h;
-    for (int s = 0; s < run->here.dimension; s++) piece->c[(m - 1) * run->width + s] = series_of(run, s)[m] * power;
+    for (int s = 0; s < n; s++) c[s] = line[s * length + m] * power;
   }
 }
 
 /* How badly the polynomial solves the equation at its end: h (X' - f) / (order + 1). */
-static void taylor_error(hs_run *run, double h) {
+HS_INLINE void taylor_error(hs_run *run, const int n, double h) {
   const int order = run->method->order;
-  for (int s = 0; s < run->here.dimension; s++) {
+  for (int s = 0; s < n; s++) {
     const double *c = series_of(run, s);
     double slope = order * c[order];
     for (int m = order - 1; m > 0; m--) slope = m * c[m] + h * slope;

@@ -21,7 +21,7 @@ static uint64_t hash_of(int mode, const double *x, int n) {
 }
 
 static void forget(hs_visited *visited) {
-  for (int64_t i = 0; visited->count && i < 2 * visited->room; i++) visited->slot[i] = 0;
+  if (visited->count) memset(visited->slot, 0, 2 * (size_t)visited->room * sizeof *visited->slot);
   visited->count = 0;
 }
 
