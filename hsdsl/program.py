@@ -126,6 +126,9 @@ class ModeProgram:
     ``jacobian`` has one routine, ``jacobian``, called like the others: the n * n derivatives of the flow by the states,
     row by row. It stands apart because only implicit methods ask for it.
 
+    ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
+    everywhere.
+
     ``tape`` gives Taylor coefficients along the flow; None where the flow is kinked (`abs`, `sign`, `min`, `max`,
     `floor`).
 
@@ -140,6 +143,7 @@ class ModeProgram:
     walls: tuple[str, ...]
     flow_texts: tuple[str, ...]
     routines: Routines
+    affine: bool
     jacobian: Routines
     tape: Tape | None
     expressions: tuple[str, ...]

@@ -156,11 +156,28 @@ def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram
         walls=tuple(wall.text for wall in mode.walls),
         flow_texts=mode.flow_texts,
         routines=print_routines(_mode_routines(mode, names), names.data),
+        affine=_affine(mode, names),
         jacobian=print_routines((_jacobian(mode, names),), names.data),
         tape=_tape(mode, names),
         expressions=tuple(text for text, _ in _expressions(mode)),
         diagnosis=print_routines(_diagnosis(mode, names), names.data),
     )
+
+
+def _affine(mode: Mode, names: Names) -> bool:
+    """Whether all surfaces of a mode are affine functions of time and the states, as far as can be told at sight."""
+    arguments, mapping, done = (TIME, *names.of_states(mode.states)), names.mapping(mode.states), {}
+    residuals = [replaced(sp.sympify(r), mapping, done) for r in _residuals(mode)]
+    return all(r.is_polynomial(*arguments) and _constant_slopes(r, arguments) for r in residuals)
+
+
+def _constant_slopes(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> bool:
+    slopes = Gradient((expression,), arguments)
+    return not slopes.statements and not any(slope.free_symbols & set(arguments) for slope in slopes.rows[0])
+
+
+def _residuals(mode: Mode) -> list[sp.Expr]:
+    return [edge.surface.residual for edge in mode.edges] + [wall.residual for wall in mode.walls]
 
 
 def _jacobian(mode: Mode, names: Names) -> Definition:
@@ -171,8 +188,8 @@ def _jacobian(mode: Mode, names: Names) -> Definition:
 
 def _tape(mode: Mode, names: Names) -> lowered.Tape | None:
     mapping, done = names.mapping(mode.states), {}
-    residuals = [edge.surface.residual for edge in mode.edges] + [wall.residual for wall in mode.walls]
-    flow, surfaces = ([replaced(sp.sympify(e), mapping, done) for e in part] for part in (mode.flow, residuals))
+    parts = mode.flow, _residuals(mode)
+    flow, surfaces = ([replaced(sp.sympify(e), mapping, done) for e in part] for part in parts)
     return make_tape(flow, surfaces, names.of_states(mode.states), names.data)
 
 

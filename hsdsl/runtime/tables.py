@@ -72,6 +72,7 @@ class Mode(ctypes.Structure):
         ("surface_series", c_void_p),
         ("surface_line", POINTER(c_int)),
         ("jacobian", c_void_p),
+        ("affine", c_int),
     )
 
 

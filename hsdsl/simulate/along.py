@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.simulate.interpolation import interpolation
 from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, total, value
 
@@ -91,6 +92,28 @@ def _slope(c: Coefficients, s: Number) -> Number:
     for k in range(len(c) - 1, 0, -1):
         slope = k * c[k] + s * slope
     return slope
+
+
+def affine_curve(start: Number, slopes: State, h: Number, piece: Polynomial, share: Number) -> list[Piece]:
+    """A surface that is affine, with these slopes by time and the states, along a piece over ``h``.
+
+    It is a polynomial of the piece's degree. Rises below a share of its size tell nothing.
+    """
+    zero = start * 0
+    c = [start]
+    for m, powers in enumerate(piece):
+        first = zero if m else slopes[0] * h
+        c.append(total((slope * power for slope, power in zip(slopes[1:], powers, strict=True)), first))
+    off = share * total(map(abs, c[1:]), abs(start))
+    return [Piece(zero, zero + 1, without_zeros(c), True, off)]
+
+
+def without_zeros(c: Coefficients) -> Coefficients:
+    """Leave out last coefficients that are zero, but for two: along a polynomial solution the degree is low."""
+    length = len(c)
+    while length > 2 and c[length - 1] == 0:
+        length -= 1
+    return c[:length]
 
 
 def interpolated(

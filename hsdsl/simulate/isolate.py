@@ -136,14 +136,14 @@ def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Numb
     return None
 
 
-def _towards(c: Coefficients, end: Number, other: Number, sign: int) -> tuple[Number, Number]:
+def _towards(c: Coefficients, end: Number, other: Number, sign: int, tiny: Number) -> tuple[Number, Number]:
     """Halve the way to an end of a bracket until the polynomial has the sign: a smaller bracket, or ``end`` twice.
 
     An end that is a root up to round-off may be where the polynomial comes back, not where it rises.
     """
     while True:
         middle = (end + other) / 2
-        if middle in (end, other):
+        if middle in (end, other) or abs(end - other) <= tiny * tiny:
             return end, end
         if sign * value(c, middle) > 0:
             return middle, other
@@ -155,9 +155,9 @@ def _refined(c: Coefficients, a: Number, b: Number, tiny: Number) -> Number:
     fa, fb = value(c, a), value(c, b)
     noise = ROUNDING * tiny * total(map(abs, c), fa * 0)
     if not fa < -noise:
-        a, b = _towards(c, a, b, -1)
+        a, b = _towards(c, a, b, -1, tiny)
     if not fb > noise:
-        b, a = _towards(c, b, a, 1)
+        b, a = _towards(c, b, a, 1, tiny)
     fa, fb = value(c, a), value(c, b)
     if a == b or not fa < 0:
         return a

@@ -16,16 +16,15 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
-from hsdsl.simulate.along import Piece, interpolated, settles
-from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE, along_steps
+from hsdsl.simulate.along import Piece, settles, without_zeros
+from hsdsl.simulate.curves import Curves, curves_along
+from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE
 from hsdsl.simulate.isolate import value
 from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
-IN_A_STEP = 250  # pieces of a surface, at most
-LONG = 2**9  # in a run: steps that are made shorter where surfaces vary too fast along them
 BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
@@ -45,7 +44,7 @@ class Span:
     x: State
     z: State
     piece: Polynomial
-    curves: list[list[Piece]]
+    curves: Curves
     ends: State
     point: Callable[[Number], tuple[Number, State]]
     cut: Callable[[Number], Polynomial]
@@ -126,7 +125,7 @@ class TableSteps:
                 if not self._ratio <= 1:
                     return TOO_WRONG
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
-            curves = interpolate(self.run, self.here, t, h, x, z, piece)
+            curves = curves_along(self.run, self.here, t, h, x, z, piece)
             ends = self.here.kernel.surfaces(t1, *z)
             if method.landing is not None and control.tolerance is not None and method.error is not None:
                 curves = self._blurred(curves, t1, z, method.error(h, stages, end), ends)
@@ -156,7 +155,7 @@ class TableSteps:
 
         return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
 
-    def _blurred(self, curves: list[list[Piece]], t1: Number, z: State, error: State, ends: State) -> list[list[Piece]]:
+    def _blurred(self, curves: Curves, t1: Number, z: State, error: State, ends: State) -> Curves:
         """Let no rise count that is lower than what the step's error moves a surface by.
 
         A collocation polynomial is off inside the step as it is at its end, its first terms too: where a mode is
@@ -244,7 +243,7 @@ class SeriesSteps:
         piece: Polynomial,
         lines: tuple[Series, ...],
         ends: State,
-    ) -> list[list[Piece]]:
+    ) -> Curves:
         """The surfaces' series where they meet the surfaces at the step's end, interpolation for the others."""
         run, here = self.run, self.here
         starts, zero = here.kernel.surfaces(t, *x), run.arithmetic.zero
@@ -254,7 +253,7 @@ class SeriesSteps:
             found = self.series.surfaces(self.method.order, lines)
         except DOMAIN_ERRORS:
             found = tuple(None for _ in ends)
-        curves: list[list[Piece]] = []
+        curves: Curves = []
         half = (zero + 1) / 2
 
         @cache
@@ -267,10 +266,8 @@ class SeriesSteps:
                 scaled.append(c * power)
                 power = power * h
             if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k, middle):
-                return interpolate(run, here, t, h, x, z, piece)
-            while len(scaled) > 2 and scaled[-1] == 0:  # a polynomial solution is of lower degree
-                scaled.pop()
-            curves.append([Piece(zero, zero + 1, [starts[k], *scaled[1:]])])
+                return curves_along(run, here, t, h, x, z, piece)
+            curves.append([Piece(zero, zero + 1, without_zeros([starts[k], *scaled[1:]]))])
         return curves
 
     def _converges(
@@ -293,21 +290,6 @@ class SeriesSteps:
 def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
     """The sums of the absolute terms of an interpolant."""
     return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
-
-
-def interpolate(run: Run, here: Here, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> list[list[Piece]]:
-    """Interpolate all surfaces along a step's interpolant."""
-    surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
-
-    def values(s: Number) -> State:
-        return surfaces(t + s * h, *at(x, piece, s))
-
-    def allowed(k: int) -> Number:
-        return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
-
-    degree, share = along_steps(run.settings)
-    refuse = h * LONG > run.settings.until
-    return interpolated(values, count, degree, allowed, share, run.arithmetic, most=IN_A_STEP, may_refuse=refuse)
 
 
 def most_halvings(run: Run) -> int:

@@ -95,6 +95,7 @@ class _Writer:
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
             self.routines(mode.jacobian)["jacobian"],
+            str(int(mode.affine)),
         ]
         return f"{{{', '.join(fields)}}}"
 

@@ -94,6 +94,34 @@ static int settles(hs_run *run, double off, double enough, hs_allowed *allowed, 
   return 0;
 }
 
+/* Begin curves of `count` surfaces that are one piece each. */
+static void begin_curves(hs_curves *curves, int count) {
+  curves->parts = 1;
+  curves->count = count;
+  curves->start[0] = 0.0, curves->width[0] = 1.0;
+}
+
+/* The degree of a polynomial, at least 1: along a polynomial solution it is low. */
+static int degree_without_zeros(const double *c, int degree) {
+  while (degree > 1 && c[degree] == 0) degree--;
+  return degree;
+}
+
+/* A surface that is affine, with these slopes by time and the states, along a piece of n states over h: the sum of the
+   absolute coefficients. Those of powers 1 and up go to c, c[0] is there. */
+HS_INLINE double affine_curve(const hs_polynomial *piece, const int n, int w, double h, const double *slopes, double *c,
+                              int *degree) {
+  double sizes = fabs(c[0]);
+  for (int m = 1; m <= piece->degree; m++) {
+    double power = m == 1 ? slopes[0] * h : 0.0;
+    for (int s = 0; s < n; s++) power = power + slopes[s + 1] * piece->c[(m - 1) * w + s];
+    c[m] = power;
+    sizes = sizes + fabs(power);
+  }
+  *degree = degree_without_zeros(c, piece->degree);
+  return sizes;
+}
+
 /* Interpolate functions on one part of a step; `settled` says whether all of them are close enough. */
 static int interpolate_part(hs_run *run, hs_functions *functions, const hs_interpolation *by, hs_allowed *allowed,
                             int *settled) {

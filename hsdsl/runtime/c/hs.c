@@ -33,6 +33,7 @@
 #include "relaxed.c"
 #include "isolate.c"
 #include "along.c"
+#include "curves.c"
 #include "spans.c"
 #include "rest.c"
 #include "tails.c"

@@ -52,6 +52,7 @@ typedef struct {
   hs_surface_series *surface_series;
   const int *surface_line; /* for each surface; -1 where it is kinked */
   hs_routine *jacobian;    /* of the flow by the states, row by row */
+  int affine;              /* whether every surface's gradient is the same everywhere */
 } hs_mode;
 
 typedef struct {

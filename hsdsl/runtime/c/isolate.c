@@ -113,7 +113,7 @@ HS_INLINE double value_and_slope(const double *c, int n, double s, double *slope
 static void towards(const double *c, int n, double *end, double *other, double sign) {
   for (;;) {
     const double middle = (*end + *other) / 2;
-    if (middle == *end || middle == *other) {
+    if (middle == *end || middle == *other || fabs(*end - *other) <= HS_UNIT * HS_UNIT) {
       *other = *end;
       return;
     }

@@ -2,8 +2,6 @@
    run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
 
 #define BLUR 2
-#define LONG 512.0
-#define IN_A_STEP 250
 #define UNKNOWN_TOLERANCE 1e-10
 #define LAST_TERM 4
 #define TERM_BEFORE 32
@@ -61,28 +59,6 @@ HS_INLINE double span_size(const hs_run *run, const hs_span *span, double s, int
   return fabs(span->x[state]) + v;
 }
 
-/* The surfaces at the share s of the step, by its interpolant. */
-static int surfaces_along(hs_run *run, double s, double *values) {
-  at(run, &run->span.piece, s, run->at);
-  return run->here.table->values(run->here.p, run->span.t + s * run->span.h, run->at, values);
-}
-
-static int noise_at_ends(hs_run *run, int k, double *allowed) {
-  const hs_span *span = &run->span;
-  double first, last;
-  if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t + span->h, run->z, 0, &last))
-    return RAISED;
-  *allowed = hs_max(first, last);
-  return 0;
-}
-
-/* Interpolate all surfaces along the step's interpolant. */
-static int interpolate(hs_run *run) {
-  const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
-  const int long_enough = run->span.h * LONG > run->until;
-  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, IN_A_STEP, long_enough);
-}
-
 static void begin_span(hs_run *run, double h, double t1) {
   hs_span *const span = &run->span;
   span->t = run->here.t;
@@ -123,7 +99,7 @@ HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
     span->largest[s] = fabs(run->k[0][s]);
     for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
   }
-  if (method_piece(run, span->t, h, &span->piece) || interpolate(run)) return HS_NOT_FINITE;
+  if (method_piece(run, span->t, h, &span->piece) || curves_along(run)) return HS_NOT_FINITE;
   if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
   const int blurred = HS_HAS_RADAU && run->method->kind == HS_RADAU && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
@@ -215,7 +191,7 @@ static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
 }
 
 /* The surfaces' series where they meet the surfaces at the step's end, interpolation for all where one does not. */
-static int curves(hs_run *run) {
+static int series_curves(hs_run *run) {
   const hs_mode *mode = run->here.table;
   const int order = run->method->order, length = series_length(run->method);
   hs_curves *const found = &run->curves;
@@ -226,12 +202,10 @@ static int curves(hs_run *run) {
   copy(run->starts, run->values, mode->surfaces);
   known = !mode->surface_series(p, order, run->lines);
   run->has_middle = 0;
-  found->parts = 1;
-  found->count = mode->surfaces;
-  found->start[0] = 0.0, found->width[0] = 1.0;
+  begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
     double *const c = coefficients_of(found, 0, k), power = 1.0;
-    if (!known || mode->surface_line[k] < 0) return interpolate(run);
+    if (!known || mode->surface_line[k] < 0) return curves_along(run);
     const double *line = run->lines + mode->surface_line[k] * length;
     for (int m = 0; m <= order; m++) {
       c[m] = line[m] * power;
@@ -239,11 +213,9 @@ static int curves(hs_run *run) {
     }
     int met;
     if (converges(run, c, order, k, &met)) return RAISED;
-    if (!met) return interpolate(run);
+    if (!met) return curves_along(run);
     c[0] = run->starts[k];
-    int degree = order; /* of a polynomial solution it is lower */
-    while (degree > 1 && c[degree] == 0) degree--;
-    *degree_of(found, 0, k) = degree;
+    *degree_of(found, 0, k) = degree_without_zeros(c, order);
     *off_of(found, 0, k) = 0;
     found->certain[k] = 1;
   }
@@ -264,7 +236,7 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
     taylor_error(run, n, h);
     if (error_ratio(run) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
   }
-  return mode->values(p, t1, run->z, run->ends) || curves(run) ? HS_NOT_FINITE : HS_CLEAR;
+  return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
 /* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
