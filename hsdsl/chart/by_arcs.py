@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.chart.result import Array, Result
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.translation import PlainModel, as_function
+from hsdsl.chart.translation import PlainMode, PlainModel, as_function
 
 MOST_SECONDS = 60.0
 
@@ -41,6 +41,7 @@ Integrate = Callable[[float, int, float, Sequence[float], Array, float], ToolArc
 
 def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[float], Result]:
     """Make ``run(tolerance)``: one arc after the other, until the scene's end or a final mode."""
+    choices = [[_alternatives(mode, edge.guard) for edge in mode.edges] for mode in model.modes]
     resets = [[as_function(mode, edge.reset) for edge in mode.edges] for mode in model.modes]
     places = [
         [(i, mode.states.index(name)) for i, name in enumerate(scene.states) if name in mode.states]
@@ -56,7 +57,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
         began = time.perf_counter()
         problem = None
         while True:
-            mode = model.modes[k]
+            mode, begin = model.modes[k], t
             arc = integrate(tolerance, k, t, x, grid[first:], until)
             last = first + len(arc.values)
             for i, j in places[k]:
@@ -65,9 +66,16 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
             first, t = last, arc.end
             if arc.edge is None:
                 break
+            taken = _taken(choices[k][arc.edge], t, arc.x)
+            if taken is None:
+                if t == begin:
+                    problem = f"stays at t = {t:.6g}, at a guard whose conditions do not hold"
+                    break
+                x = arc.x
+                continue
             count += 1
-            x = resets[k][arc.edge](t, *arc.x)
-            k = mode.edges[arc.edge].target
+            x = resets[k][taken](t, *arc.x)
+            k = mode.edges[taken].target
             if model.modes[k].final or t >= until:
                 break
             if count > most or time.perf_counter() - began > MOST_SECONDS:
@@ -76,6 +84,20 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
         return Result(values, lambda: _modes(passed, model, len(grid)), lambda: count, problem)
 
     return run
+
+
+Choice = tuple[int, Callable[..., tuple[bool]]]
+
+
+def _alternatives(mode: PlainMode, guard: object) -> list[Choice]:
+    """The edges that have a guard in common, in the order of the file, and their conditions."""
+    edges = [i for i, edge in enumerate(mode.edges) if edge.guard == guard]
+    return [(i, as_function(mode, (mode.edges[i].condition,))) for i in edges]
+
+
+def _taken(choices: Sequence[Choice], t: float, x: Sequence[float]) -> int | None:
+    """The edge that is taken where their guard is reached; None where no condition holds."""
+    return next((i for i, holds in choices if holds(t, *x)[0]), None)
 
 
 def _modes(passed: Sequence[tuple[int, int]], model: PlainModel, samples: int) -> Array:

@@ -17,11 +17,15 @@ from hsdsl.system import TIME, Edge, Mode
 
 @dataclass(frozen=True)
 class PlainEdge:
-    """An edge: it fires when ``guard`` rises through zero; ``reset`` gives the target's states."""
+    """An edge: it fires when ``guard`` rises through zero and ``condition`` holds there.
+
+    ``condition`` is `sympy.true` where there is none; ``reset`` gives the target's states.
+    """
 
     source: int
     target: int
     guard: sp.Expr
+    condition: Any
     reset: tuple[sp.Expr, ...]
 
 
@@ -39,11 +43,16 @@ class PlainMode:
 
 @dataclass(frozen=True)
 class PlainModel:
-    """A scene's model for another tool: no `if`, no sampled inputs; walls are left out, for no tool knows them."""
+    """A scene's model for another tool: no sampled inputs; walls are left out, for no tool knows them."""
 
     modes: tuple[PlainMode, ...]
     start: int
     x: tuple[float, ...]
+
+    @property
+    def conditional(self) -> bool:
+        """Whether any edge has an `if`."""
+        return any(edge.condition != sp.true for mode in self.modes for edge in mode.edges)
 
 
 T = sp.Symbol("t", real=True)
@@ -60,16 +69,15 @@ def translate(scene: Scene) -> PlainModel:
     system = scene.model.system
     if any(hasattr(signal, "times") for signal in system.inputs):
         raise Refused("sampled inputs are not translated")
-    if any(edge.condition is not None for mode in system.modes for edge in mode.edges):
-        raise Refused("an `if` on a guard is not translated")
     numbers: dict[sp.Symbol, Any] = {}
     for parameter in system.parameters:
         value = scene.parameters.get(parameter.name, parameter.value)
         numbers[sp.Symbol(parameter.name, real=True)] = sp.Float(sp.N(sp.sympify(value).xreplace(numbers), 17))
     index = {mode.name: k for k, mode in enumerate(system.modes)}
     modes = tuple(_mode(mode, index, numbers) for mode in system.modes)
-    first = scene.exact.arcs[0]
-    x = tuple(float(v) for v in scene.exact.values[0][: len(first.states)])
+    start = scene.model.simulate(0, parameters=scene.parameters, initial=scene.initial)
+    first = start.arcs[0]
+    x = tuple(float(v) for v in start.values[0][: len(first.states)])
     return PlainModel(modes, index[first.mode], x)
 
 
@@ -81,7 +89,8 @@ def _mode(mode: Mode, index: dict[str, int], numbers: dict[sp.Symbol, Any]) -> P
         return _in_floats(sp.sympify(expression).xreplace(names | numbers | {TIME: T}))
 
     def edge(e: Edge) -> PlainEdge:
-        return PlainEdge(index[e.source], index[e.target], plain(e.surface.residual), tuple(map(plain, e.reset)))
+        guard, condition = plain(e.surface.residual), plain(sp.true if e.condition is None else e.condition)
+        return PlainEdge(index[e.source], index[e.target], guard, condition, tuple(map(plain, e.reset)))
 
     flow = tuple(map(plain, mode.flow))
     return PlainMode(mode.name, mode.states, symbols, flow, tuple(map(edge, mode.edges)), mode.final)

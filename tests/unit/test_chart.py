@@ -170,10 +170,36 @@ def test_the_table_has_one_line_a_run(ball):
     assert float(line["error"]) == rows[0].judgement.error
 
 
-def test_sampled_inputs_and_conditions_are_refused(tmp_path):
-    text = SHEDDING.replace("[{when: y >= 1, to: light}]", "[{when: y >= 1, if: x > 0, to: light}]")
-    (tmp_path / "m.yaml").write_text(text)
-    with pytest.raises(Refused, match="`if`"):
+CHOOSING = """
+hsdsl: 1
+modes:
+  up:
+    flow: {x: v, v: -1}
+    transitions:
+      - {name: bounce, when: x <= 0, if: v < -0.3, to: up, reset: {v: -v/2}}
+      - {name: stay, when: x <= 0, if: v >= -0.3, to: down, reset: {v: 0}}
+  down:
+    flow: {x: 0, v: 0}
+initial: {mode: up, x: 1, v: 0}
+experiment: {until: 5}
+"""
+
+
+@pytest.mark.parametrize("name", ["scipy", "heyoka", "sksundae"])
+def test_a_condition_decides_between_edges_of_one_guard(tmp_path, name):
+    if not find_spec(PACKAGES[name]):
+        pytest.skip(f"{name} is not installed")
+    (tmp_path / "m.yaml").write_text(CHOOSING)
+    scene = Scene.of(hsdsl.load(tmp_path / "m.yaml"), samples=500)
+    judgement = judge(scene, prepare(name, scene)(1e-10))
+    assert (judgement.verdict, judgement.transitions) == ("right", 4)
+    assert judgement.error < 1e-7
+
+
+def test_sampled_inputs_are_refused(tmp_path):
+    sampled = "inputs: {u: {times: [0, 2], values: [0, 1]}}\nmodes:"
+    (tmp_path / "m.yaml").write_text(SHEDDING.replace("modes:", sampled).replace("y: 1}\n", "y: 1 + u}\n"))
+    with pytest.raises(Refused, match="sampled inputs"):
         prepare("scipy", Scene.of(hsdsl.load(tmp_path / "m.yaml"), samples=50))
 
 

@@ -34,6 +34,8 @@ FUNCTIONS = [
 def prepare(scene: Scene) -> Callable[[float], Result]:
     """See `hsdsl.chart.peers`."""
     model = translate(scene)
+    if model.conditional:
+        raise Refused("an `if` on a guard is not translated for its transition function")
     occupied = [mode for mode in model.modes if not mode.final]
     if len({mode.states for mode in occupied}) > 1 or len(occupied) < len(model.modes):
         raise Refused("its integrator has one set of states for all modes, and no final mode")

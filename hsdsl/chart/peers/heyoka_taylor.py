@@ -10,6 +10,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+import sympy as sp
 
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
 from hsdsl.chart.result import Array, Refused, Result
@@ -65,7 +66,7 @@ def _event(mode: PlainMode, i: int, k: int, names: Any, counted: list[int]) -> A
     edge = mode.edges[i]
     guard = hy.from_sympy(edge.guard, names)
     rising = hy.event_direction.positive
-    if edge.target != k:
+    if edge.target != k or edge.condition != sp.true:
         return hy.t_event(guard, direction=rising)
     reset = as_function(mode, edge.reset)
 
