@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from hsdsl.chart.translation import PlainMode, PlainModel, as_function
 MOST_SECONDS = 60.0
 
 
-@dataclass(frozen=True)
-class ToolArc:
+class ToolArc(NamedTuple):
     """What a tool made of one mode.
 
     Attributes

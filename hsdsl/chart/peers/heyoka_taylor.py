@@ -1,6 +1,9 @@
 # The peers are optional and untyped.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
-"""heyoka: an adaptive Taylor integrator a mode with terminal events; a reset to the same mode is its callback."""
+"""heyoka: an adaptive Taylor integrator a mode with terminal events; a reset to the same mode is its callback.
+
+Where an arc ends is found first, since a grid that goes on beyond it takes longer than to integrate twice.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,9 @@ import sympy as sp
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
 from hsdsl.chart.result import Array, Refused, Result
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.translation import PlainMode, PlainModel, T, as_function, translate
+from hsdsl.chart.translation import PlainEdge, PlainMode, PlainModel, T, as_function, translate
+
+NOTHING = np.empty((0, 0))
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:
@@ -23,24 +28,18 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
     model = translate(scene)
     kept: dict[tuple[int, float], Any] = {}
     counted = [0]
+    stops = [any(_stops(edge, k) for edge in mode.edges) for k, mode in enumerate(model.modes)]
 
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
         if (k, tolerance) not in kept:
             kept[k, tolerance] = _integrator(model, k, tolerance, counted)
-        ta = kept[k, tolerance]
-        ta.time = t
-        ta.state[:] = x
-        if ta.with_events:
-            ta.reset_cooldowns()
-        ahead = np.concatenate(([t], times[times > t]))
-        outcome, *_, values = ta.propagate_grid(ahead)
-        number = int(outcome)
-        if outcome == hy.taylor_outcome.err_nf_state:
-            raise Refused("the state is not finite")
-        skipped = 1 if not len(times) or times[0] > t else 0
-        edge = None if outcome == hy.taylor_outcome.time_limit else -number - 1
-        rows = values[skipped : skipped + int(np.count_nonzero(times <= ta.time))]
-        return ToolArc(float(ta.time), ta.state.copy(), edge, rows[np.isfinite(rows).all(axis=1)])
+        ta, end = kept[k, tolerance], None
+        if stops[k]:
+            end = _reached(_begun(ta, t, x).propagate_until(until)[0], ta)
+            times = times[: int(np.searchsorted(times, end.end, side="right"))]
+        ahead = times if len(times) and times[0] == t else np.concatenate(([t], times))
+        outcome, *_, values = _begun(ta, t, x).propagate_grid(ahead)
+        return (end or _reached(outcome, ta))._replace(values=values[len(ahead) - len(times) :])
 
     run = by_arcs(scene, model, integrate)
 
@@ -51,6 +50,28 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
         return replace(result, count=lambda: (result.transitions or 0) + inside)
 
     return counting
+
+
+def _begun(ta: Any, t: float, x: Sequence[float]) -> Any:
+    """Put an integrator to a point."""
+    ta.time = t
+    ta.state[:] = x
+    if ta.with_events:
+        ta.reset_cooldowns()
+    return ta
+
+
+def _reached(outcome: Any, ta: Any) -> ToolArc:
+    """Where an integrator has stopped; without samples."""
+    if outcome == hy.taylor_outcome.err_nf_state:
+        raise Refused("the state is not finite")
+    edge = None if outcome == hy.taylor_outcome.time_limit else -int(outcome) - 1
+    return ToolArc(float(ta.time), ta.state.copy(), edge, NOTHING)
+
+
+def _stops(edge: PlainEdge, k: int) -> bool:
+    """Whether the integrator stops at an edge of mode k; any other is a reset in its own loop."""
+    return edge.target != k or edge.condition != sp.true
 
 
 def _integrator(model: PlainModel, k: int, tolerance: float, counted: list[int]) -> Any:
@@ -66,7 +87,7 @@ def _event(mode: PlainMode, i: int, k: int, names: Any, counted: list[int]) -> A
     edge = mode.edges[i]
     guard = hy.from_sympy(edge.guard, names)
     rising = hy.event_direction.positive
-    if edge.target != k or edge.condition != sp.true:
+    if _stops(edge, k):
         return hy.t_event(guard, direction=rising)
     reset = as_function(mode, edge.reset)
 
