@@ -67,7 +67,8 @@ def _refusal(scene: Scene, asked: dict[str, Any], size: str, value: float) -> st
 
 
 def _run(scene: Scene, asked: dict[str, Any]) -> Result:
-    execution = scene.model.simulate(float(scene.grid[-1]), **asked, parameters=scene.parameters, initial=scene.initial)
+    numbers: dict[str, Any] = {"parameters": scene.parameters or None, "initial": scene.initial or None}
+    execution = scene.model.simulate(float(scene.grid[-1]), **asked, **numbers)
     values, modes = sampled(execution, scene.grid, scene.states)
     problem = None if execution.stop.complete else execution.stop.message
     return Result(values, modes, lambda: execution.made, problem, execution)

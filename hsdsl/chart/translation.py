@@ -28,6 +28,11 @@ class PlainEdge:
     condition: Any
     reset: tuple[sp.Expr, ...]
 
+    @property
+    def conditional(self) -> bool:
+        """Whether it has an `if`."""
+        return self.condition != sp.true
+
 
 @dataclass(frozen=True)
 class PlainMode:
@@ -52,7 +57,7 @@ class PlainModel:
     @property
     def conditional(self) -> bool:
         """Whether any edge has an `if`."""
-        return any(edge.condition != sp.true for mode in self.modes for edge in mode.edges)
+        return any(edge.conditional for mode in self.modes for edge in mode.edges)
 
 
 T = sp.Symbol("t", real=True)

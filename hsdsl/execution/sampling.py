@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 Side = Literal["right", "left"]
 
 
-class Evaluated(NamedTuple):
-    """What a sampler finds at n times.
+class Evaluated(Protocol):
+    """What a sampler finds at n times; all but the first may be made when it is asked for.
 
     Attributes
     ----------
@@ -32,11 +32,16 @@ class Evaluated(NamedTuple):
     states, outputs : array, shape (n, number of them)
     """
 
-    outside: int
-    times: Array
-    rows: Array
-    states: Array
-    outputs: Array
+    @property
+    def outside(self) -> int: ...
+    @property
+    def times(self) -> Array: ...
+    @property
+    def rows(self) -> Array: ...
+    @property
+    def states(self) -> Array: ...
+    @property
+    def outputs(self) -> Array: ...
 
 
 Sampler = Callable[[Array, bool, Sequence[str], bool], Evaluated]
@@ -133,15 +138,16 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
     found = execution.sampler(asked, side == "left", states, bool(names))
     if found.outside >= 0:
         raise _outside(execution, asked[found.outside])
-    values = found.outputs if names == outputs else found.outputs[:, [outputs.index(name) for name in names]]
     later: dict[str, Callable[[Samples], Array]] = {
         "mode": lambda _: execution.arc_table.mode[_arcs(execution, found.rows)],
         "jump": lambda _: execution.arc_table.jump[_arcs(execution, found.rows)],
         "kind": lambda _: execution.arc_table.kind[_arcs(execution, found.rows)],
         "present": lambda _: execution.arc_table.present(states)[_arcs(execution, found.rows)],
+        "output_columns": lambda _: (
+            found.outputs if names == outputs else found.outputs[:, [outputs.index(name) for name in names]]
+        ),
     }
-    now = {"time": found.times, "state_columns": found.states, "output_columns": values}
-    return Samples.deferred(later, states=states, outputs=names, **now)
+    return Samples.deferred(later, states=states, outputs=names, time=found.times, state_columns=found.states)
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,19 +157,22 @@ class Model:
                 samples=samples, max_transitions=max_transitions, parameters=parameters, initial=given,
                 settings=settings, engine=engine, precision=precision, watch=watch,
             )  # fmt: skip
-        asked = dict(
-            until=until,
-            scheme=scheme,
-            method=method,
-            step=step,
-            tolerance=tolerance,
-            relaxation=relaxation,
-            samples=samples,
-            max_transitions=max_transitions,
-        )
-        key = key_of(*asked.values(), parameters, initial, settings, engine, precision)
+        key = key_of(
+            until, scheme, method, step, tolerance, relaxation, samples, max_transitions,
+            parameters, initial, settings, engine, precision,
+        )  # fmt: skip
         ready = self._prepared.find(key)
         if ready is None:
+            asked = dict(
+                until=until,
+                scheme=scheme,
+                method=method,
+                step=step,
+                tolerance=tolerance,
+                relaxation=relaxation,
+                samples=samples,
+                max_transitions=max_transitions,
+            )
             ready = self.parts.prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
             self._prepared.keep(key, ready)
         return ready.simulate(watch, self.parts.seconds)

@@ -39,6 +39,9 @@ def key_of(*arguments: Any) -> Hashable | None:
 
     1, 1.0 and True are not the same, zeros of both signs are.
     """
+    kinds = tuple(map(type, arguments))
+    if _PLAIN.issuperset(kinds):
+        return kinds, arguments
     try:
         return tuple([(a.__class__, a) if a.__class__ in _PLAIN else _key(a) for a in arguments])
     except TypeError:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.execution import Array, Evaluated
 from hsdsl.runtime import tables
-from hsdsl.runtime.kernel import CompiledModel, runtime
+from hsdsl.runtime.kernel import CompiledModel
 
 BLOCK = 16  # HS_BLOCK
 NUMBER = 8  # bytes
@@ -26,11 +26,14 @@ class Placed(Protocol):
 
 
 class Sampled:
-    """What is the same for all runs of one model over one timeline (a pointer to the ``hs_timeline``)."""
+    """What is the same for all runs of one model over one timeline (a pointer to the ``hs_timeline``).
 
-    def __init__(self, compiled: CompiledModel, timeline: Any) -> None:
+    ``library`` is the runtime that the runs need anyway: it has all that samples need.
+    """
+
+    def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
         self.table = tables.Sampling(model=ctypes.pointer(compiled.table), timeline=timeline)
-        self.run = runtime().hs_sample
+        self.run = library.hs_sample
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
 
@@ -43,6 +46,36 @@ class Sampled:
             column = np.array(places, np.int32)
             self._columns[key] = dimension, column, dimension.ctypes.data, column.ctypes.data
         return self._columns[key][2:]
+
+
+class Filled:
+    """Memory that C has filled at n times: times, rows, k states, m outputs, and room between them."""
+
+    def __init__(self, memory: Array, outside: int, n: int, k: int, m: int) -> None:
+        self._memory, self.outside, self._n, self._k, self._m = memory, outside, n, k, m
+
+    @property
+    def times(self) -> Array:
+        """Shape (n,)."""
+        return self._memory[: self._n]
+
+    @property
+    def rows(self) -> Array:
+        """Shape (n,), of int."""
+        room = self._n + BLOCK
+        return self._memory[room : room + self._n].view(np.int64)
+
+    @property
+    def states(self) -> Array:
+        """Shape (n, k)."""
+        room = self._n + BLOCK
+        return self._memory[2 * room : (2 + self._k) * room].reshape(self._k, room)[:, : self._n].T
+
+    @property
+    def outputs(self) -> Array:
+        """Shape (n, m)."""
+        start = (2 + self._k) * (self._n + BLOCK)
+        return self._memory[start : start + self._n * self._m].reshape(self._n, self._m)
 
 
 class Sampler:
@@ -70,7 +103,7 @@ class Sampler:
         table = tables.Sampling.from_buffer_copy(self._sampled.table)
         table.rows, table.arcs, table.width, table.degree, self._outputs, *places = self._columns.where
         table.times, table.values, table.recorded, table.pieces, table.arc = places
-        table.layout = None if self._layout is None else self._layout.ctypes.data
+        table.layout = None if self._layout is None else tables.address_of(self._layout)
         return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
@@ -89,15 +122,9 @@ class Sampler:
         m = self._outputs if outputs else 0
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
-        memory[:n], memory[n:room] = times, 0.0
+        memory[:n] = times
         table, start = tables.Sampling.from_buffer_copy(own), tables.address_of(memory)
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]
-        return Evaluated(
-            outside=self._sampled.run(ctypes.byref(table)),
-            times=memory[:n],
-            rows=memory[room : room + n].view(np.int64),
-            states=memory[ends[2] : ends[3]].reshape(k, room)[:, :n].T,
-            outputs=memory[ends[3] : ends[4]].reshape(n, m),
-        )
+        return Filled(memory, self._sampled.run(ctypes.byref(table)), n, k, m)

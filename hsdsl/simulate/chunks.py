@@ -38,11 +38,9 @@ class Chunks:
 
     def clear(self, rows: float) -> None:
         """Make ready for a run that may write about so many rows."""
-        wanted = int(min(max(rows, self._before, LEAST_ROWS), MOST_ROWS))
-        if wanted <= self._rows:
-            self._reset()
-        else:
-            self._open(wanted)
+        wanted = min(max(rows, self._before, LEAST_ROWS), MOST_ROWS)
+        if wanted > self._rows:
+            self._open(int(wanted))
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large."""

@@ -19,7 +19,7 @@ from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.program import Program
 from hsdsl.runtime import methods, tables
-from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
 from hsdsl.simulate.chunks import Sink
@@ -69,16 +69,18 @@ class CompiledPlan:
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(timeline)
         self.timeline = self._columns.pointer
-        self.sampled = Sampled(compiled, self.timeline)
+        self.sampled = Sampled(runtime_of(method, scheme), compiled, self.timeline)
         self._mode, self._x = mode, np.array(x, np.float64)
         self._start = len(x), self._x.ctypes.data
         self.until = settings.until
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, desk: Desk) -> None:
-        """Put everything on a desk."""
+        """Put everything on a desk, unless it lies there from the run before."""
         desk.clear(0 if desk.chunks.sink else self._rows)
-        task = desk.task
+        if desk.laid is self:
+            return
+        task, desk.laid = desk.task, self
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
         task.mode, (task.dimension, task.x) = self._mode, self._start

@@ -31,6 +31,7 @@ class Desk:
         model = compiled.table
         self.task, self.degree = task, shape.degree
         self.pressed, self.failed = False, list[BaseException]()
+        self.laid: object = None  # the plan that the task is filled in from
         self.chunks = Chunks(self.task.chunk, shape)
         self._width = model.width
         self._workspace = np.empty(compiled.workspace(method, scheme))

@@ -200,3 +200,11 @@ def test_a_runtime_has_the_parts_that_are_asked_for(monkeypatch: pytest.MonkeyPa
     kernel.begin("relaxed", "rk4")
     assert kernel.runtime("relaxed", "rk4") is kernel.runtime() is kernel.runtime("relaxed", "taylor")
     assert not kernel.is_kept("nothing", "-O1") and kernel.is_kept(kernel._text((False, False)), "-O1")
+
+
+@needs_compiler
+def test_a_run_and_its_samples_load_no_other_runtime(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel, "_loaded", {})
+    run = hsdsl.load(ROOT / "models" / "bouncing-ball.yaml").simulate(1, scheme="relaxed", method="rk4", step=0.1)
+    run.sample([0.5])
+    assert list(kernel._loaded) == [(False, False)]

@@ -53,20 +53,24 @@ def line_count(tape: Tape, dimension: int) -> int:
 
 
 def flow_lines(tape: Tape, dimension: int) -> str:
-    """Write the function of the lines that the flow needs; its name is to be put in for ``NAME``."""
+    """Write the function of the lines that the flow needs; its name is to be put in for ``NAME``.
+
+    The states' newest coefficients stay in variables ``w``: each waits for the one before, and memory is slower.
+    """
     first, states = dimension + 1, range(1, dimension + 1)
 
     def value(line: int) -> str:
         return "t" if line == 0 else f"x[{line - 1}]" if line < first else f"v{line}"
 
     def newest(line: int) -> str:
-        return f"l{line}[k]" if line < first else f"v{line}"
+        return "l0[k]" if line == 0 else f"w{line}" if line < first else f"v{line}"
 
     own = range(first, first + tape.needed)
     values = [f"l{i}[0] = {value(i)};" for i in states] + _values(tape, own, first, value)
-    values += [f"l{i}[1] = {value(tape.flow[i - 1])};" for i in states]
+    values += [f"double w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
     coefficients = _coefficients(tape, own, first, newest)
-    coefficients += [f"l{i}[k + 1] = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
+    coefficients += [f"const double u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
+    coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
     return _filled(_FLOW, values, coefficients)
 
 

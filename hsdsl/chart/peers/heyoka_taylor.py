@@ -13,7 +13,6 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-import sympy as sp
 
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
 from hsdsl.chart.result import Array, Refused, Result
@@ -71,7 +70,7 @@ def _reached(outcome: Any, ta: Any) -> ToolArc:
 
 def _stops(edge: PlainEdge, k: int) -> bool:
     """Whether the integrator stops at an edge of mode k; any other is a reset in its own loop."""
-    return edge.target != k or edge.condition != sp.true
+    return edge.target != k or edge.conditional
 
 
 def _integrator(model: PlainModel, k: int, tolerance: float, counted: list[int]) -> Any:

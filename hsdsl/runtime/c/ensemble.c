@@ -21,7 +21,7 @@ static void sample_chunk(hs_ensemble *e, int at_end) {
   s->pieces = chunk->pieces + (int64_t)s->degree * s->width;
   s->layout = e->layout_of ? e->layouts : 0;
   s->results = e->results + (instance * e->samples + e->next) * s->outputs;
-  for (int64_t i = 0; i < count + HS_BLOCK; i++) s->time[i] = i < count ? time[e->next + i] : 0.0;
+  copy(s->time, time + e->next, (int)count);
   hs_sample(s);
   for (int k = 0; k < s->columns; k++)
     for (int64_t i = 0; i < count; i++)
@@ -84,15 +84,12 @@ void hs_run_ensemble(hs_ensemble *e) {
   task->flush = let_go;
   task->poll = asked_to_stop;
   for (; e->done < e->instances && !*e->stop; e->done++) {
-    hs_chunk *chunk = &task->chunk;
-    chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
     e->base = e->made = e->next = e->layout = 0;
-    task->made = 0;
     task->timeline = &e->timeline[e->done];
     task->settings = e->settings[e->done];
     task->x = e->start + e->done * task->dimension;
     hs_simulate(task);
     if (*e->stop && task->stop.reason == HS_INTERRUPTED) return;
-    if (chunk->rows) keep(e);
+    if (task->chunk.rows) keep(e);
   }
 }

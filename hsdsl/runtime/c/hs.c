@@ -14,6 +14,10 @@
 #define HS_HAS_RADAU 1
 #endif
 
+#if HS_HAS_LOCATED && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a sixth */
+#endif
+
 #include "hs_ensemble.h"
 
 #include "table.c"
@@ -182,6 +186,10 @@ int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme s
 void hs_simulate(hs_task *task) {
   hs_store store = {task->workspace, 0};
   hs_run run = make_run(task->model, task->method, (hs_scheme)task->settings.scheme, &store);
+  hs_chunk *const chunk = &task->chunk;
+  chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
+  task->now = 0.0;
+  task->made = 0;
   run.task = task;
   run.epsilon = task->settings.relaxation;
   run.until = task->settings.until;

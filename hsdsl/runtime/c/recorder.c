@@ -19,7 +19,8 @@ HS_INLINE int room(hs_run *run) {
 /* Keep a piece, zero where it has nothing: of lower degree, or in a mode with fewer states. */
 HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece, double *kept) {
   const int w = run->width, degree = run->method->degree, used = piece ? piece->degree : 0;
-  for (int m = 0; m < used; m++) {
+  if (n == w && used) memcpy(kept, piece->c, (size_t)(used * w) * sizeof *kept);
+  for (int m = 0; n < w && m < used; m++) {
     copy(kept + m * w, piece->c + m * w, n);
     for (int s = n; s < w; s++) kept[m * w + s] = 0.0;
   }

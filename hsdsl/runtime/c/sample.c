@@ -175,6 +175,7 @@ int64_t hs_sample(const hs_sampling *s) {
   const int64_t first = outside(s);
   hs_place at;
   if (first >= 0 || !s->samples) return first;
+  for (int i = 0; i < HS_BLOCK; i++) s->time[s->samples + i] = 0.0; /* a last block goes beyond the times */
   at.arc = 0;
   go_to(s, 0, &at);
   for (int64_t i = 0; i < s->samples;) {

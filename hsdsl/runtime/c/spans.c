@@ -229,7 +229,7 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
   const hs_polynomial *piece = &run->span.piece;
   begin_span(run, h, t1);
   taylor_piece(run, n, h, &run->span.piece);
-  at_in(run, n, piece, 1.0, run->z);
+  at_end(run, n, piece, run->z);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (tolerance > 0) {

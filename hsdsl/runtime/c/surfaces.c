@@ -26,6 +26,16 @@ HS_INLINE void at_in(const hs_run *run, const int n, const hs_polynomial *piece,
   }
 }
 
+/* The same at its end. */
+HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, double *value) {
+  const int w = run->width, last = piece->degree - 1;
+  for (int s = 0; s < n; s++) {
+    double v = piece->c[last * w + s];
+    for (int m = last - 1; m >= 0; m--) v = piece->c[m * w + s] + v;
+    value[s] = run->x[s] + v;
+  }
+}
+
 /* The same; for one or two states the compiler is told how many. */
 HS_INLINE void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
   switch (run->here.dimension) {
