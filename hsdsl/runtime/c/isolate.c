@@ -59,6 +59,13 @@ HS_INLINE double value_of(const double *c, int n, double s) {
   return total;
 }
 
+/* The same at 1. */
+HS_INLINE double value_at_end(const double *c, int n) {
+  double total = c[n];
+  for (int k = n - 1; k >= 0; k--) total = c[k] + total;
+  return total;
+}
+
 /* Changes of sign, zeros left out. */
 static int changes(const double *b, int n) {
   int count = 0, before = -1;

@@ -183,7 +183,7 @@ static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
   double most = fabs(c[0]);
   for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
   *answer = fabs(c[n]) <= LAST_TERM * tolerance * most && fabs(c[n - 1]) <= TERM_BEFORE * tolerance * most;
-  const double off = fabs(value_of(c, n, 1.0) - end);
+  const double off = fabs(value_at_end(c, n) - end);
   double noise;
   if (*answer) return settles(run, off, tolerance * most, noise_at_end, k, answer);
   if (noise_at_end(run, k, &noise)) return RAISED;
