@@ -35,6 +35,10 @@ _HOMES = {
 }
 
 
+def __dir__() -> list[str]:
+    return sorted({*__all__, "exact"})
+
+
 def __getattr__(name: str) -> Any:
     """Import public names on first use: importing one stage must not load the others."""
     from importlib import import_module

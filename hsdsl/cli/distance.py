@@ -76,13 +76,19 @@ def distance(
         elif coordinates is not None:
             raise UsageError("--coordinates is for two runs")
         elif start is None or end is None:
-            raise UsageError(
-                "two states are wanted, or a second run",
-                f'for example: hsdsl distance {first} --from "free x=13 v=5" --to "free x=13 v=-4"',
-            )
+            raise UsageError("two states are wanted, or a second run", _example(first))
         else:
             check_picture(plot)
             of_points(first, start, end, metric, json, {**options, "plot": plot})
+
+
+def _example(path: Path) -> str:
+    from hsdsl.model import load
+
+    program = load(path).program
+    mode = program.modes[program.initial_mode]
+    two = (f'"{mode.name} {" ".join(f"{state}={number}" for state in mode.states)}"' for number in (0, 1))
+    return "for example: hsdsl distance {} --from {} --to {}".format(path, *two)
 
 
 def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, options: dict[str, Any]) -> None:

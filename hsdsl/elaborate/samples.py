@@ -74,6 +74,15 @@ def _bytes(world: World, file: Scalar, path: Path) -> bytes | None:
     return data
 
 
+def _hint(name: str, columns: list[str]) -> str | None:
+    """What a header probably meant."""
+    if any(mark in column for column in columns for mark in ";\t"):
+        return "columns are separated by commas, and numbers have decimal points"
+    if name in columns:
+        return "the column of times is called `time`"
+    return did_you_mean(name, columns)
+
+
 class _Table:
     """A comma-separated table, and what is wrong with it."""
 
@@ -88,7 +97,7 @@ class _Table:
         if "time" not in columns or name not in columns:
             there = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
             message = f"the header must be `time,{name}`, and has {there}"
-            self.fault(1, 1, len(self.lines[0]) if self.lines else 1, message, did_you_mean(name, columns))
+            self.fault(1, 1, len(self.lines[0]) if self.lines else 1, message, _hint(name, columns))
             return None
         wanted = (columns.index("time"), columns.index(name))
         times: list[Fraction] = []

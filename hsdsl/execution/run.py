@@ -27,8 +27,8 @@ Assessment = Callable[["Execution", "Mapping[str, Any] | None"], Verdict]
 class Execution(Deferred):
     """A run's result; see the package's docstring for the arrays.
 
-    Two executions are equal when every field is, not-a-number being equal to itself; ``output_function`` and
-    ``sampler`` are left out.
+    Two executions are equal when every field is, not-a-number being equal to itself; ``seconds``,
+    ``output_function`` and ``sampler`` are left out.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Execution(Deferred):
     depth: Array
     coefficients: Array
     arcs: tuple[Arc, ...]
-    seconds: dict[str, float]
+    seconds: dict[str, float] = field(compare=False)
     digits: int | None = None  # decimal digits of the numbers, None for float64
     title: str | None = None
     output_function: OutputFunction | None = field(default=None, compare=False)

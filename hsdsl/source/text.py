@@ -14,6 +14,7 @@ from hsdsl.names import INVISIBLE, closest
 
 _MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 _BREAK = re.compile("\r\n|\r|\n")
+_ARCHIVE = b"PK\x03\x04"
 _OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -97,6 +98,9 @@ def decode(path: str, data: bytes) -> Text:
     if len(data) > most:
         hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
         raise _refused(path, "HS003", f"the file is larger than {_size(most)}", hint)
+    if data.startswith(_ARCHIVE):
+        hint = "a saved run (.npz) is read with hsdsl.store.load"
+        raise _refused(path, "HS001", "the file is an archive, not the text of a model", hint)
     if data.startswith(_OTHER_ENCODINGS):
         raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
     try:

@@ -55,6 +55,7 @@ WRONG = [
     (("--from", "free x=15 v=0", "--to", "free x=1 v=1"), "not in the domain of mode free"),
     (("--from", "free x=1 v=0 t=1", "--to", "free x=1 v=1"), "leave out t"),
     (("--from", "free x=1 v=0"), "two states are wanted"),
+    ((), '--from "free x=0 v=0" --to "free x=1 v=1"'),
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--metric", "relax"), "did you mean 'relaxed'?"),
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--metric", "quotient", "--relaxation", "1"), "relaxed"),
     (("--from", "free x=1 v=0", "--to", "free x=1 v=1", "--relaxation", "0"), "must be positive"),

@@ -128,3 +128,10 @@ def test_only_the_last_are_remembered():
         remembered.keep((number,), number)
     remembered.keep(None, 7)
     assert [remembered.find(key) for key in ((0,), (1,), (2,), None)] == [None, 1, 2, None]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_run_made_again_is_the_same_run(engine):
+    model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+    assert model.simulate(2, engine=engine) == model.simulate(2, engine=engine)
+    assert model.simulate(2, engine=engine) != model.simulate(1, engine=engine)

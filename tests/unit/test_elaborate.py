@@ -265,3 +265,21 @@ def test_nobody_reads_more_than_five_hundred_errors():
 def test_ways_to_write_a_file(before, line_end, end):
     text = f"{before}{HEAD}modes: {{A: {{flow: {{x: v, v: -x}}}}}}\n{TAIL.strip()}{end}"
     assert system(text.replace("\n", line_end)).modes[0].states == ("x", "v")
+
+
+@pytest.mark.parametrize(
+    ("header", "hint"),
+    [
+        ("time;u", "separated by commas"),
+        ("time\tu", "separated by commas"),
+        ("t,u", "called `time`"),
+        ("time,v", "'v'"),
+    ],
+)
+def test_a_header_of_samples_is_told_what_it_should_be(tmp_path, header, hint):
+    (tmp_path / "u.csv").write_text(f"{header}\n0,1\n1,2\n")
+    text = f"{HEAD}inputs: {{u: {{file: u.csv}}}}\nmodes: {{A: {{flow: {{x: u, v: 1}}}}}}\n{TAIL}"
+    with pytest.raises(ModelError) as refusal:
+        elaborate(tmp_path / "m.yaml", text=text.encode())
+    (fault,) = refusal.value.diagnostics
+    assert fault.code == "HS312" and hint in f"{fault.message} {fault.hint}"

@@ -135,3 +135,10 @@ def test_pieces_that_never_close_are_read_in_no_time():
     began = time.perf_counter()
     root("a: [" + "min(1, " * 20_000 + "2]")
     assert time.perf_counter() - began < 5
+
+
+def test_a_saved_run_is_no_model():
+    with pytest.raises(ModelError) as raised:
+        decode("run.npz", b"PK\x03\x04...")
+    (fault,) = raised.value.diagnostics
+    assert "archive" in fault.message and "hsdsl.store.load" in (fault.hint or "")

@@ -96,6 +96,7 @@ def test_columns_and_refusals(tmp_path):
         ({"path": tmp_path / "none" / "run.csv"}, r"cannot write .*: No such file"),
         ({"every": 0}, "every must be at least 1"),
         ({"columns": ["w"]}, "no state or output is called w"),
+        ({"engine": "python"}, "only the compiled engine streams"),
         ({"precision": 50}, "a streamed run has no argument 'precision'"),
     ):
         with pytest.raises(UsageError, match=sentence):
