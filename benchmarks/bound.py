@@ -11,7 +11,6 @@ target. Ours is a call of `model.simulate` and one of `sample`, from Python.
 from __future__ import annotations
 
 import ctypes
-import subprocess
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from engines import compiled
 
 import hsdsl
 from hsdsl.chart import Scene
@@ -26,10 +26,8 @@ from hsdsl.chart.judge import judge
 from hsdsl.chart.plan import own_runs
 from hsdsl.chart.result import Attempt, Result
 from hsdsl.chart.stopwatch import race
-from hsdsl.runtime.compiler import find_compiler
 
 HERE = Path(__file__).parent
-FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC")
 NUMBERS = (0.05, 0.9, 20.0, 2.5, 11.36, 31.4)  # a, c, amplitude, omega, x and v at the start
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-11)
 TOLERANCES = tuple(10 ** -(k / 2) for k in range(8, 27))
@@ -38,10 +36,7 @@ HAND = "by hand"
 
 def by_hand(folder: Path, scene: Scene) -> Callable[[float], Result]:
     """Compile the program; returns what runs it at a tolerance."""
-    path = folder / "taylor_by_hand.so"
-    command = [*find_compiler().command, *FLAGS, "-o", str(path), str(HERE / "taylor_by_hand.c"), "-lm"]
-    subprocess.run(command, check=True)
-    library = ctypes.CDLL(str(path))
+    library = compiled(folder, "taylor_by_hand")
     library.prepare()
     grid, until, modes = np.ascontiguousarray(scene.grid), float(scene.grid[-1]), scene.exact_modes
 

@@ -34,12 +34,16 @@ SCENES: list[Scene] = [
 ]
 
 
+def compiled(folder: Path, name: str) -> ctypes.CDLL:
+    """Compile a program of this folder as a person would who wants speed."""
+    library = folder / f"{name}.so"
+    subprocess.run([*find_compiler().command, *FLAGS, "-o", library, HERE / f"{name}.c", "-lm"], check=True)
+    return ctypes.CDLL(str(library))
+
+
 def by_hand(folder: Path) -> Any:
-    """Compile `by_hand.c` as a person would who wants speed."""
-    library = folder / "by_hand.so"
-    source = HERE / "by_hand.c"
-    subprocess.run([*find_compiler().command, *FLAGS, "-o", library, source, "-lm"], check=True)
-    function = ctypes.CDLL(str(library)).relaxed_midpoint
+    """The relaxed loop by hand."""
+    function = compiled(folder, "by_hand").relaxed_midpoint
     function.restype = ctypes.c_double
     return function
 
