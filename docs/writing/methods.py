@@ -14,7 +14,8 @@ from hsdsl.integrators import ButcherTableau
 INTEGRATORS = """# Integrators
 
 The values of `method` and `--method`. `auto` is chosen for each run, and the run says why: `radau` where the start is
-stiff, else `taylor` where every flow is smooth, else `{auto}`, and `{auto}` with a fixed step. A method with an
+stiff, else `taylor` where every flow is smooth and has derivatives at the start, else `{auto}`, and `{auto}` with a
+fixed step. A method with an
 embedded error estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`.
 
 """

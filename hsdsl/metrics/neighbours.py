@@ -24,6 +24,7 @@ from hsdsl.metrics.search import HOPS, End, search
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
+FAR = 10  # times the lower bound: a path so long that it may take the wrong way
 AGAIN = 16  # pairs improved before paths are carried over anew
 
 Indices = NDArray[np.intp]
@@ -146,7 +147,7 @@ class _Batch:
                 self._shorter(k, found.route.length(found.points) + self._toll(found.route), found)
 
     def improve(self, k: int, enough: float) -> None:
-        """Search from the best guess, or from nothing where there is none or it leads nowhere."""
+        """Search from the best guess, or from nothing where there is none, or another way may be much shorter."""
         guess = self.guess.get(k)
         found = None if guess is None else improve(guess.route, guess.points, self.pairs.toll)
         if found is not None:
@@ -155,7 +156,7 @@ class _Batch:
             self.pool.append(known)
             self._shorter(k, value, known)
             self.done[k] = True
-        if not np.isfinite(self.pairs.upper[k]):
+        if self.pairs.upper[k] > FAR * self.pairs.lower[k]:
             self.from_nothing(k, enough)
         self.done[k] = True
 

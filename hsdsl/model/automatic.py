@@ -5,7 +5,7 @@ With a fixed step it is the table `dopri5`. With a tolerance it is
 ========= ============================================================================================
 `radau`   where the mode of the start, or one that its edges lead to, is stiff (below)
 `taylor`  where every flow is smooth
-`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor`
+`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor`, or no derivatives at the start
 ========= ============================================================================================
 
 A mode is called stiff where both hold, near the start, once what decays fast has decayed:
@@ -70,14 +70,25 @@ def _chosen(
     if settings.tolerance is None:
         return METHODS[AUTO], "the step is fixed"
     if kernel.arithmetic.digits is None:
-        for k in _near(program, mode, len(x)):
+        near = list(_near(program, mode, len(x)))
+        for k in near:
             stiff = stiffness(kernel, timeline, program.modes[k].name, k, x, float(settings.until))
             if stiff is not None:
                 return METHODS["radau"], str(stiff)
+        if mode in near and not _has_derivatives(kernel, timeline, mode, x):
+            return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
     for each in program.modes:
         if each.tape is None:
             return METHODS[AUTO], f"the flow of {each.name} has abs, sign, min, max or floor"
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
+
+
+def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:
+    """Whether the flow has finite derivatives at the start: the square root of 0 has none, and so no Taylor series."""
+    try:
+        return bool(np.isfinite(_Look(kernel, timeline, mode).jacobian(0.0, np.array(x, float))).all())
+    except DOMAIN_ERRORS:
+        return False
 
 
 def _near(program: Program, mode: int, states: int) -> Iterator[int]:

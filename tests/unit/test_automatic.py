@@ -34,7 +34,9 @@ CASES = {
     "kinked": ("{x: v, v: -abs(x)}", "x: 1, v: 0", "1", "dopri5"),
     "kinked and stiff": ("{x: -1e5*(x - abs(cos(t)))}", "x: 3", "10", "radau"),
     "nothing moves": ("{x: 0}", "x: 1", "1e9", "taylor"),
-    "no value at the start": ("{x: -1e9*sqrt(x)}", "x: 0", "1", "taylor"),
+    "no derivatives at the start": ("{x: -1e9*sqrt(x)}", "x: 0", "1", "dopri5"),
+    "a tank that fills": ("{x: 1 - sqrt(x)}", "x: 0", "1", "dopri5"),
+    "derivatives by the states alone": ("{x: 1 + sqrt(t)}", "x: 0", "1", "taylor"),
 }
 
 

@@ -285,3 +285,29 @@ def test_runner_against_another_optimiser_from_two_hundred_starts(height, shift)
     found = distance(space, Place("aerial", tuple(p)), Place("left", tuple(q)))
     assert found.interval.upper <= best * (1 + 1e-6)
     assert found.interval.lower <= best
+
+
+TANKS = """
+hsdsl: 1
+modes:
+  pumping:
+    flow: {h1: 0.6 - 0.3*sqrt(h1), h2: 0.6*sqrt(h1) - 0.4*sqrt(h2)}
+    domain: [h1 >= 0, h2 >= 0]
+    transitions: [{name: full, when: h1 >= 1.5, to: draining}]
+  draining:
+    flow: {h1: -0.3*sqrt(h1), h2: 0.6*sqrt(h1) - 0.4*sqrt(h2)}
+    domain: [h1 >= 0, h2 >= 0]
+    transitions: [{name: empty, when: h1 <= 0.5, to: pumping}]
+initial: {mode: pumping, h1: 1, h2: 0.5}
+experiment: {until: 60}
+"""
+
+
+def test_runs_that_are_near_are_near_through_every_guard(tmp_path):
+    """Through the other guard the way is 2 long, and a path by it was all that was known when this guard came."""
+    (tmp_path / "tanks.yaml").write_text(TANKS)
+    model = hsdsl.load(tmp_path / "tanks.yaml")
+    relaxed = model.simulate(scheme="relaxed", method="taylor", tolerance=1e-5, relaxation=1e-7)
+    exact = model.simulate(tolerance=1e-13)
+    found = hsdsl.distance(relaxed, exact, model=model)
+    assert 1e-6 < found.lower <= found.upper <= 1.01 * found.lower
