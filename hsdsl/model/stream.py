@@ -138,7 +138,7 @@ def check(
         if name == "samples" or name not in known:
             raise UsageError(f"a streamed run has no argument '{name}'", did_you_mean(name, known))
     if asked.get("engine") == "python":
-        raise UsageError("only the compiled engine streams", "leave the engine out, or the steps to be written")
+        raise UsageError("only the compiled engine streams", "leave out the engine, or what is to be streamed")
     target = Path(path)
     if target.suffix.lower() != ".csv":
         raise UsageError(f"{target} should end in .csv: only such a file can be written while a run goes on")

@@ -185,7 +185,7 @@ experiment: {until: 5}
 """
 
 
-@pytest.mark.parametrize("name", ["scipy", "heyoka", "sksundae"])
+@pytest.mark.parametrize("name", ["scipy", "heyoka", "sksundae", "diffrax"])
 def test_a_condition_decides_between_edges_of_one_guard(tmp_path, name):
     if not find_spec(PACKAGES[name]):
         pytest.skip(f"{name} is not installed")
