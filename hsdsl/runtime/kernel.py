@@ -81,7 +81,7 @@ def _text(parts: Parts) -> str:
 
 
 def _effort(parts: Parts) -> Effort:
-    """More effort takes twice as long to compile, for which a first run waits; hardly more than `radau` gets faster by it."""
+    """More effort takes twice as long to compile, for which a first run waits; little but `radau` gets faster by it."""
     _, radau = parts
     return "-O2" if radau else "-O1"
 
