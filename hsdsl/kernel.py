@@ -64,6 +64,11 @@ class Kernel(Protocol):
     @property
     def arithmetic(self) -> Arithmetic: ...
 
+    @property
+    def enclosing(self) -> Kernel:
+        """The same program over interval arithmetic (`hsdsl.enclosures`), many boxes at once."""
+        ...
+
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         ...

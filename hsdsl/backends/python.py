@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
@@ -45,6 +46,13 @@ class PythonKernel:
         self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
+
+    @cached_property
+    def enclosing(self) -> PythonKernel:
+        """The same program over interval arithmetic."""
+        from hsdsl.enclosures import ENCLOSED  # only verdicts ask for it
+
+        return PythonKernel(self._program, ENCLOSED)
 
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""

@@ -106,9 +106,9 @@ def _simulate(
     asked |= {"parameters": parameters, "initial": initial, "settings": settings, "outputs": names}
     with progress(quiet or json) as watch:
         execution = model.simulate(**asked, watch=watch)
-    found = model.estimate(execution, **asked) if estimate else None
-    if found is not None and found.error is not None:
-        execution = execution.with_error(found.error)
+    found = model.estimate(execution) if estimate else None
+    if found is not None:
+        execution = execution.estimated()
     if out is not None:
         for written in execution.save(out, columns=names):
             say(f"wrote {written}")

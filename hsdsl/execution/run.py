@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
-Assessment = Callable[["Execution", "Mapping[str, Any] | None"], Verdict]
+Assessment = Callable[["Execution", bool], Verdict]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,8 +39,10 @@ class Execution(Deferred):
     sampler : callable or None
         A faster way to the same values at many times, of a compiled run.
     assessment : callable or None
-        ``assessment(execution, error) -> Verdict``: the verdict, the error being that of each state, or None for what
-        the run's settings allow; without it the verdict stays what it is.
+        ``assessment(execution, estimated) -> Verdict``: the verdict, where ``estimated`` holds it against a finer run
+        also where steps are fixed; without it the verdict stays what it is.
+    repetition : callable or None
+        Makes the same run again, finer (`hsdsl.simulate.finer`).
     """
 
     model: str
@@ -66,6 +68,7 @@ class Execution(Deferred):
     output_function: OutputFunction | None = field(default=None, compare=False)
     sampler: Sampler | None = field(default=None, compare=False)
     assessment: Assessment | None = field(default=None, compare=False)
+    repetition: Callable[[], Execution] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
@@ -100,7 +103,12 @@ class Execution(Deferred):
 
     def __getstate__(self) -> dict[str, Any]:
         """Give what can travel: a copy, or what is read from a pickle, is as one that was saved and read."""
-        return super().__getstate__() | {"output_function": None, "sampler": None, "assessment": None}
+        return super().__getstate__() | {
+            "output_function": None,
+            "sampler": None,
+            "assessment": None,
+            "repetition": None,
+        }
 
     def __repr__(self) -> str:
         start, end = self.time_span
@@ -138,11 +146,16 @@ class Execution(Deferred):
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
 
-    def with_error(self, error: Mapping[str, Any]) -> Execution:
-        """Return the same execution with its verdict held against a known error of each state."""
+    @cached_property
+    def finer(self) -> Execution | None:
+        """The same run, finer; None for one that was read from a file."""
+        return None if self.repetition is None else self.repetition()
+
+    def estimated(self) -> Execution:
+        """Return the same execution with its verdict held against the finer run, also where steps are fixed."""
         if self.assessment is None:
             return self
-        return replace(self, verdict=self.assessment(self, error))
+        return replace(self, verdict=self.assessment(self, True))
 
     def __call__(self, t: Any, side: Side = "right") -> Point:
         """Return the execution's value at a time.

@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.backends.python import compile_routines
-from hsdsl.metrics.enclosures import ENCLOSED, Array, as_range, hull
+from hsdsl.enclosures import ENCLOSED, Array, as_range, hull
 from hsdsl.program import Routines
 
 Boxes = Callable[[Array, Array], tuple[Array, Array]]

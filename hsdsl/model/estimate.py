@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from hsdsl.arithmetic import Number
+from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Transition
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import Errors
 
+TIE = 1e-12  # of the run's length
 SAMPLES = 1000
-FINER_TOLERANCE = 32  # a method of order 5 halves its steps
 
 
 @dataclass(frozen=True)
@@ -23,13 +25,14 @@ class Estimate:
     settings : dict
         What the finer run used.
     same_transitions : bool
-        Whether both made the same transitions in the same order.
+        Whether both made the same transitions in the same order and stopped alike.
     time : Number or None
-        Largest difference between transition times, strips' delays subtracted; None where the sequences differ.
+        Largest difference between transition times, strips' delays subtracted; None where there is none in common.
     final : dict or None
         Difference of each final state; None where the runs ended in different modes or at different times.
     largest : dict or None
-        Largest difference of each state at `SAMPLES` times away from transitions; None where the sequences differ.
+        Largest difference of each state at `SAMPLES` times away from transitions; None where the runs make other
+        transitions or no such time is left.
     """
 
     settings: dict[str, Any]
@@ -37,11 +40,6 @@ class Estimate:
     time: Number | None
     final: dict[str, Number] | None
     largest: dict[str, Number] | None = None
-
-    @property
-    def error(self) -> dict[str, Number] | None:
-        """What the coarser run's error may be where both errors fall at least linearly; None where nothing is known."""
-        return None if self.largest is None else {name: 2 * value for name, value in self.largest.items()}
 
     def as_json(self) -> dict[str, Any]:
         """Return the ``estimate`` object of ``hsdsl run --estimate --json``."""
@@ -58,9 +56,9 @@ class Estimate:
         """What the estimate says, for a person."""
         finer = ", ".join(f"{name} {show(value)}" for name, value in self.settings.items())
         if not self.same_transitions:
-            return f"estimate: left; the finer run ({finer}) makes other transitions, so neither can be trusted"
+            return f"estimate: unknown; the finer run ({finer}) makes other transitions, so neither can be trusted"
         if self.final is None:
-            return f"estimate: left; the finer run ({finer}) ends elsewhere"
+            return f"estimate: unknown; the finer run ({finer}) ends elsewhere"
         apart = ", ".join(f"{name} {float(value):.2g}" for name, value in self.final.items()) or "no states"
         times = f", transition times {float(self.time):.2g}" if self.time is not None else ""
         return (
@@ -69,42 +67,48 @@ class Estimate:
         )
 
 
-def finer_settings(execution: Execution) -> dict[str, Number]:
-    """Return settings with half the step (or the tolerance of half steps) and half the relaxation."""
-    settings = execution.settings
-    finer = {"relaxation": settings["relaxation"] / 2} if "relaxation" in settings else {}
-    if "step" in settings:
-        return {"step": settings["step"] / 2, **finer}
-    return {"tolerance": settings["tolerance"] / FINER_TOLERANCE, **finer}
+def estimate(execution: Execution) -> Estimate:
+    """Compare a run with the same run made finer.
+
+    Raises
+    ------
+    UsageError
+        The execution was read from a file, so that it cannot be run again.
+    """
+    finer = execution.finer
+    if finer is None:
+        raise UsageError("an execution that was read from a file cannot be run again, so its error is not estimated")
+    given, tie = execution.settings, TIE * float(execution.time_span[1])
+    errors = Errors(execution, finer, float(given.get("tolerance") or 0), 0.0, tie)
+    changed = {
+        k: finer.settings[k] for k in ("step", "tolerance", "relaxation") if finer.settings.get(k) != given.get(k)
+    }
+    same = errors.parted is None
+    a, b = execution.final, finer.final
+    comparable = same and (a.mode, list(a.state)) == (b.mode, list(b.state))
+    return Estimate(
+        changed,
+        same,
+        _time(execution, finer) if same else None,
+        {name: abs(a.state[name] - b.state[name]) for name in a.state} if comparable else None,
+        _largest(execution, finer, float(errors.late[-1]) if len(errors.late) else 0.0) if same else None,
+    )
 
 
-def compare(coarse: Execution, fine: Execution, settings: dict[str, Number]) -> Estimate:
-    """Compare two runs of one model."""
-    same = [t.edge for t in coarse.transitions] == [t.edge for t in fine.transitions]
-    times = None
-    if same:
-        pairs = zip(corrected_times(coarse.transitions), corrected_times(fine.transitions), strict=True)
-        times = max((abs(a - b) for a, b in pairs), default=None)
-    a, b = coarse.final, fine.final
-    comparable = (a.mode, coarse.stop.reason, list(a.state)) == (b.mode, fine.stop.reason, list(b.state))
-    final = {name: abs(a.state[name] - b.state[name]) for name in a.state} if comparable else None
-    return Estimate(settings, same, times, final, _largest(coarse, fine, times) if same else None)
-
-
-def _largest(coarse: Execution, fine: Execution, apart: Number | None) -> dict[str, Number]:
-    """The largest difference of each state at times at which neither run has a transition nearby."""
+def _largest(coarse: Execution, fine: Execution, apart: float) -> dict[str, Number] | None:
     start, end = coarse.time_span[0], min(coarse.time_span[1], fine.time_span[1])
     step = (end - start) / SAMPLES
     grid = [start + step * k for k in range(SAMPLES)] + [end]
-    clear = [t for t in grid if not any(_close(run, t, 2 * (apart or 0)) for run in (coarse, fine))]
+    clear = [t for t in grid if not any(_close(run, t, 2 * apart) for run in (coarse, fine))]
     if not clear:
-        return {}
+        return None
     a, b = coarse.sample(clear), fine.sample(clear)
     found: dict[str, Number] = {}
     for name in (name for name in a.states if name in b.states):
         differences = [abs(x - y) for x, y in zip(a[name].tolist(), b[name].tolist(), strict=True)]
-        found[name] = max((d for d in differences if d == d), default=0.0)
-    return found
+        if known := [d for d in differences if d == d]:
+            found[name] = max(known)
+    return found or None
 
 
 def _close(run: Execution, t: Number, margin: Number) -> bool:
@@ -115,6 +119,11 @@ def _close(run: Execution, t: Number, margin: Number) -> bool:
         return False
     resumed = times[k].resumed
     return resumed is None or t - margin <= resumed
+
+
+def _time(execution: Execution, finer: Execution) -> Number | None:
+    pairs = zip(corrected_times(execution.transitions), corrected_times(finer.transitions), strict=False)
+    return max((abs(one - other) for one, other in pairs), default=None)
 
 
 def corrected_times(transitions: tuple[Transition, ...]) -> list[Number]:

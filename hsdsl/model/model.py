@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
-from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits
 from hsdsl.model.parts import Parts, parts_of
 from hsdsl.model.remembered import Remembered, key_of
@@ -284,15 +283,11 @@ class Model:
             self._smaller[names] = self if smaller is self.parts else Model(smaller)
         return self._smaller[names]
 
-    def estimate(self, execution: Execution, **asked: Any) -> Estimate:
-        """Run again, finer, and compare: ``asked`` is what :meth:`simulate` was given for ``execution``."""
-        from hsdsl.model.estimate import compare, finer_settings
+    def estimate(self, execution: Execution) -> Estimate:
+        """Compare an execution of this model with the same run made finer (see `hsdsl.model.estimate`)."""
+        from hsdsl.model.estimate import estimate
 
-        finer = finer_settings(execution)
-        asked |= {"step": None, "tolerance": None, "watch": None, **finer}
-        if execution.method in METHODS:
-            asked["method"] = execution.method
-        return compare(execution, self.simulate(**asked), finer)
+        return estimate(execution)
 
     def plot(
         self, execution: Execution, path: str | os.PathLike[str], parameters: Mapping[str, Any] | None = None

@@ -130,6 +130,11 @@ class CompiledKernel:
         self._program, self._compiled = program, compiled
         self._python = PythonKernel(program, FLOAT64)
 
+    @property
+    def enclosing(self) -> PythonKernel:
+        """The same program over interval arithmetic."""
+        return self._python.enclosing
+
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         return self._python.constant(name, parameters)

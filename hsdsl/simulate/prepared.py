@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +18,7 @@ from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
+from hsdsl.simulate.finer import finer_settings
 from hsdsl.simulate.recorder import Progress, Recorder
 from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.run import Here, Run
@@ -89,6 +90,17 @@ class Prepared:
         stop, rest = under_way.stream(sink)
         return stop, under_way.made, rest
 
+    def again(self) -> Execution:
+        """Make the same run finer."""
+        return self._finer.simulate()
+
+    @cached_property
+    def _finer(self) -> Prepared:
+        settings, plan = finer_settings(self.settings, self.kernel.arithmetic), self.plan
+        if plan is not None:
+            plan = CompiledPlan(self.program, plan.compiled, settings, self.timeline, self.mode, self.states, self.x)
+        return replace(self, settings=settings, plan=plan)
+
     @cached_property
     def _about(self) -> dict[str, Any]:
         return about(self.program, self.settings, self.kernel.arithmetic.digits, "c")
@@ -115,7 +127,7 @@ class Prepared:
                 raise
             stop = interrupted(run.recorder.now)
         spent["simulate"] = time.perf_counter() - began
-        return from_recorder(run, stop, spent)
+        return from_recorder(run, stop, spent, self.again)
 
     def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
         under_way = CompiledRun(plan, plan.desks.take(), self._fresh)
@@ -126,7 +138,7 @@ class Prepared:
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the desk for longer than the run lasts
             plan.desks.leave(under_way.desk)
-        return written(self._about, under_way, whole, stop, spent)
+        return written(self._about, under_way, whole, stop, spent, self.again)
 
 
 def prepare(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,8 +24,8 @@ from hsdsl.simulate.settings import Settings
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
 
-def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
-    """Make the execution of what the Python loop has recorded."""
+def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Callable[[], Execution]) -> Execution:
+    """Make the execution of what the Python loop has recorded; ``again`` makes the run finer."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
         {"verdict": _verdict},
@@ -33,6 +34,7 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
         seconds=seconds,
         output_function=partial(output_values, run),
         assessment=partial(_assessment, run),
+        repetition=again,
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs),
@@ -43,7 +45,12 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
 
 
 def written(
-    known: dict[str, Any], under_way: CompiledRun, columns: Columns, stop: Stop, seconds: dict[str, float]
+    known: dict[str, Any],
+    under_way: CompiledRun,
+    columns: Columns,
+    stop: Stop,
+    seconds: dict[str, float],
+    again: Callable[[], Execution],
 ) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 
@@ -63,6 +70,7 @@ def written(
         states=states,
         output_function=partial(_output_values, under_way),
         assessment=partial(_assessed, under_way),
+        repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         _of=_Written(under_way, columns),
         _made=under_way.made,
@@ -99,7 +107,10 @@ def _arcs(execution: Execution) -> tuple[Arc, ...]:
 
 def _verdict(execution: Execution) -> Verdict:
     assert execution.assessment is not None
-    return execution.assessment(execution, None)
+    began = time.perf_counter()
+    verdict = execution.assessment(execution, False)
+    execution.seconds["verdict"] = time.perf_counter() - began
+    return verdict
 
 
 _LATER: dict[str, Callable[[Execution], Any]] = {
@@ -170,13 +181,13 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
     }
 
 
-def _assessment(run: Run, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
+def _assessment(run: Run, execution: Execution, estimated: bool) -> Verdict:
     if run.settings.one_stop is not None:
         return Verdict("unknown", notes.TWO_STEP)
     from hsdsl.simulate.verdict import Looking, assess  # not every run is asked for it
 
-    return assess(Looking(run, execution, error), run.recorder.departures, run.recorder.doubts)
+    return assess(Looking(run, execution, estimated), run.recorder.departures, run.recorder.doubts)
 
 
-def _assessed(under_way: CompiledRun, execution: Execution, error: Mapping[str, Number] | None) -> Verdict:
-    return _assessment(under_way.run, execution, error)
+def _assessed(under_way: CompiledRun, execution: Execution, estimated: bool) -> Verdict:
+    return _assessment(under_way.run, execution, estimated)

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.simulate.verdict.allowed import Allowed
 
 MODELS = Path(__file__).parents[2] / "models"
 # A mass thrown up from 0 at speed v turns at v**2/2 after v seconds; a clock s beside it.
@@ -66,7 +65,7 @@ CASES = [
     ("missed by far", THROW, EASY | {"height": "0.6"}, "holds", "the nearest miss is of touch at t = 1, by"),
     ("missed by less than the error", THROW, EASY | {"height": "0.5 + 1e-12"}, "unknown", "turns back close to"),
     ("touched at the top", THROW, EASY | {"height": "0.5"}, ("unknown", "left"), "touch"),
-    ("nearly tangential", THROW, EASY | {"height": "0.5 - 1e-10"}, "unknown", "the error"),
+    ("nearly tangential", THROW, EASY | {"height": "0.5 - 1e-10"}, "unknown", "touch"),
     ("just before the end", THROW, EASY | {"until": "1 - sqrt(0.5) + 1e-11"}, "unknown", "within the error of the end"),
     ("just behind the end", THROW, EASY | {"until": "1 - sqrt(0.5) - 1e-11"}, "unknown", "within the error of the end"),
     ("condition clear", THROW, EASY | {"condition": "if: s <= 0.5, "}, "holds", "1 transition"),
@@ -98,17 +97,12 @@ def test_verdict(tmp_path, scheme, text, values, theorem, says):
     assert verdict.theorem in ("holds", "unknown", "left")
 
 
-def test_the_allowed_error_grows_with_steps_and_delays():
-    allowed = Allowed(1e-6, (1.0, 2.0), (0.25, 0.5))
-    assert [allowed.delay(t) for t in (0.5, 1.0, 1.5, 2.5)] == [0, 0.25, 0.25, 0.5]
-
-
-def test_a_measured_error_decides_where_a_fixed_step_cannot():
+def test_a_finer_run_decides_where_a_fixed_step_cannot():
     model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
-    asked = {"until": 20, "step": "1e-3", "relaxation": 1e-7, "method": "midpoint"}
-    run = model.simulate(**asked)
+    run = model.simulate(until=20, step="1e-3", relaxation=1e-7, method="midpoint")
     assert run.verdict.theorem == "unknown"
-    error = model.estimate(run, **asked).error
-    assert error is not None and 1e-5 < error["x"] < 1e-2
-    assert run.with_error(error).verdict.theorem == "holds"
-    assert run.with_error({name: 1.0 for name in error}).verdict.theorem == "unknown"
+    assert 1e-5 < model.estimate(run).largest["x"] < 1e-2
+    assert run.estimated().verdict.theorem == "holds"
+    wrong = model.simulate(until=20, step="0.2", relaxation=1e-7, method="euler")
+    assert not model.estimate(wrong).same_transitions
+    assert wrong.estimated().verdict.theorem == "unknown"

@@ -6,10 +6,13 @@ lead to the same point. A run shows its own neighbourhood of the execution, so e
 that the run allows itself.
 
 ================  ==============================================================================
-`allowed`         the error of a run, as far as its settings tell
+`agreement`       the errors of a run, by the same run made finer
 `looking`         a recorded run with its modes' routines, to be looked at anywhere
+`steps`           its steps as polynomials, many at once, with routines over intervals
 `crossings`       is each transition transversal, and its condition the same all around it?
-`misses`          surfaces that are almost reached, and what happens within the error of the end
+`landings`        does a reset land within the error of a surface, or jump?
+`misses`          surfaces that are almost reached or passed over, and what happens at the end
+`flows`           does the flow vary unseen, jump, or have a slope without bound?
 `choices`         do transitions that are reached together commute?
 `accumulation`    Zeno points and rest, which the relaxed scheme goes through without a word
 ================  ==============================================================================
@@ -25,8 +28,11 @@ from hsdsl.simulate.verdict.accumulation import accumulations
 from hsdsl.simulate.verdict.choices import choices
 from hsdsl.simulate.verdict.crossings import crossings
 from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.flows import flows
+from hsdsl.simulate.verdict.landings import landings
 from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.misses import misses
+from hsdsl.simulate.verdict.reliability import reliability
 
 __all__ = ["Looking", "assess"]
 
@@ -50,9 +56,9 @@ def assess(run: Looking, departures: Sequence[str], doubts: Sequence[str]) -> Ve
     if run.stop.reason in LEFT:
         left.append(run.stop.message)
     if left:
-        return Verdict("left", (*left, *unknown))
+        return Verdict("left", _once(left, unknown))
     found: list[Finding] = []
-    for look in (crossings, choices, misses):
+    for look in (reliability, crossings, choices, landings, misses, flows):
         findings, reasons = look(run)
         found += findings
         said += reasons
@@ -60,16 +66,20 @@ def assess(run: Looking, departures: Sequence[str], doubts: Sequence[str]) -> Ve
     unknown += _named(found, "unknown")
     unknown += _unchecked(run, run.stop, run.transitions)
     if left:
-        return Verdict("left", (*left, *unknown))
-    return Verdict("unknown", (*unknown, *said)) if unknown else Verdict("holds", tuple(said))
+        return Verdict("left", _once(left, unknown))
+    return Verdict("unknown", _once(unknown, said)) if unknown else Verdict("holds", _once(said))
+
+
+def _once(*sentences: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(sentence for each in sentences for sentence in each))
 
 
 def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
     """The sentences of one standing, the most telling of each kind first."""
     of = [f for f in found if f.theorem == theorem]
     for kind in dict.fromkeys(f.kind for f in of):
-        same = [f for f in of if f.kind == kind]
-        yield from (f.sentence for f in same[:MOST_NAMED])
+        same = list(dict.fromkeys(f.sentence for f in of if f.kind == kind))
+        yield from same[:MOST_NAMED]
         if len(same) > MOST_NAMED:
             yield f"and {len(same) - MOST_NAMED} more like the last"
 
@@ -77,11 +87,8 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
 def _unchecked(run: Looking, stop: Stop, transitions: Sequence[Transition]) -> Iterator[str]:
     if stop.reason in INCOMPLETE:
         yield f"the run did not get to its end: {stop.message}"
-    if run.allowed is None:
+    elif run.errors is None:
         yield "a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"
-    if jumps := run.jumping_flows():
-        names = ", ".join(jumps)
-        yield f"the flow of mode {names} jumps where sign or floor does, and the theorem is about continuous ones"
     at_once = [t for t in transitions if t.entry]
     if at_once:
         first = at_once[0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Arc, Transition
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
@@ -24,8 +25,7 @@ def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
     ends = {arc.jump: arc for arc in run.flows}
     made = [t for t in run.transitions if not t.entry]
     for transition in made:
-        place = run.place(transition.source, transition.time, tuple(transition.before.values()))
-        k = [edge.name for edge in place.mode.edges].index(transition.edge)
+        place, k = run.before(transition)
         try:
             rate = place.rate(k)
             slowest = rate if slowest is None else min(slowest, rate)
@@ -47,10 +47,10 @@ def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
 
 
 def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
-    """How often the allowed error fits into what keeps the crossing; None where nothing tells."""
-    shift = run.shift(place, k, run.row_at(made.time))
-    if shift is None:
+    """How often the error fits into what keeps the crossing; None where nothing tells."""
+    if run.errors is None:
         return None
+    shift = run.shift(place, k, run.row_at(made.time))
     rate, bend = place.rate(k), run.arithmetic.zero
     if arc is not None:
         before = run.between(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
@@ -70,7 +70,7 @@ def _findings(
         return [Finding("flat", "unknown", f"the surface of {where} has no slope there")]
     if not rate > TANGENT_UNITS * run.arithmetic.unit * size:
         return [Finding("tangency", "left", f"the flow is tangent to the surface of {where}")]
-    if margin is not None and margin < run.safe:
+    if margin is not None and margin < SAFE:
         found.append(
             Finding(
                 "tangency",
@@ -79,7 +79,9 @@ def _findings(
                 "the error",
             )
         )
-    error = run.error(place, run.row_at(made.time))
-    if error is not None and place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
+    if run.errors is None:
+        return found
+    error = run.around(place, run.row_at(made.time))
+    if place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found

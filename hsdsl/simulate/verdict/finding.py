@@ -27,8 +27,11 @@ class Finding:
     sentence: str
 
 
+MOST_NAMED = 10**6
+
+
 def times(margin: Number) -> str:
-    """Write a margin as so many times something."""
-    if not margin < 1e15:
-        return "any number of times"
-    return f"{float(margin):.2g} times"
+    """Write a margin as so many times something, in plain words."""
+    if not margin < MOST_NAMED:
+        return "more than a million times"
+    return f"{round(float(margin)):,} times" if margin >= 100 else f"{abs(float(margin)):.2g} times"

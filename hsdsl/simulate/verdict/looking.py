@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
-from hsdsl.kernel import ModeKernel, Vector
+from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.run import Run
-from hsdsl.simulate.surfaces import TIE, Surfaces, at
-from hsdsl.simulate.verdict.allowed import Allowed, Measured
+from hsdsl.simulate.surfaces import Surfaces, at
+from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
 
-JUMPS = re.compile(r"\b(?:sign|floor)\(")
+JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 
 
 @dataclass(frozen=True)
@@ -28,13 +27,13 @@ class Looking:
 
     Attributes
     ----------
-    measured : mapping or None
-        The error of each state, where it is known better than from the run's settings.
+    estimated : bool
+        Whether the run is held against a finer one although its steps are fixed.
     """
 
     run: Run
     execution: Execution
-    measured: Mapping[str, Number] | None = None
+    estimated: bool = False
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -63,25 +62,37 @@ class Looking:
         return [arc for arc in arcs if arc.kind == "flow" and self.times[arc.last] > self.times[arc.first]]
 
     @cached_property
-    def allowed(self) -> Allowed | Measured | None:
-        """The error the run allows itself or was measured to have; None where nothing tells."""
-        if self.measured is not None:
-            return Measured(self.measured)
+    def errors(self) -> Errors | None:
+        """How wrong the run is, by a finer one; None where steps are fixed and nobody asked for an estimate."""
         tolerance = self.run.settings.tolerance
-        if tolerance is None:
+        finer = self.execution.finer if tolerance is not None or self.estimated else None
+        if finer is None or finer.stop.reason == "interrupted":
             return None
-        waits = [t.resumed - t.time if t.resumed is not None else 0 for t in self.transitions]
-        return Allowed(tolerance, tuple(t.time for t in self.transitions), tuple(accumulate(waits)))
+        end = self.times[-1]
+        return Errors(self.execution, finer, float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(end)))
 
-    @property
-    def safe(self) -> int:
-        """Margins below so many errors are named."""
-        return self.allowed.safe if self.allowed else 1
+    @cached_property
+    def crossed(self) -> dict[int, int]:
+        """The surface whose transition ends an arc, by the arc's last row."""
+        found: dict[int, int] = {}
+        for arc in self.flows:
+            if arc.jump < len(self.transitions):
+                made = self.transitions[arc.jump]
+                if not made.time > self.times[arc.last] + self.tie(made.time):  # else it ends at a jump of an input
+                    found[arc.last] = self.edges(arc.mode).index(made.edge)
+        return found
 
-    def jumping_flows(self) -> list[str]:
-        """Modes visited whose flow is not continuous."""
-        visited = {arc.mode for arc in self.flows}
-        return [m.name for m in self.run.program.modes if m.name in visited and _jumps(m)]
+    def arc_of(self, row: int) -> Arc:
+        """The arc of the step that begins at a row."""
+        return self.flows[bisect_right(self.flows, row, key=lambda arc: arc.first) - 1]
+
+    def edges(self, mode: str) -> list[str]:
+        """The names of a mode's edges."""
+        return [edge.name for edge in self.run.program.modes[self.index(mode)].edges]
+
+    def index(self, mode: str) -> int:
+        """The number of a mode."""
+        return self._indices[mode]
 
     @cached_property
     def _indices(self) -> dict[str, int]:
@@ -102,18 +113,14 @@ class Looking:
         scale = tuple(abs(a) for a in x)
         return Place(program, kernel, Surfaces(kernel, program.edges, scale, self.arithmetic), t, x)
 
+    def before(self, made: Transition) -> tuple[Place, int]:
+        """Look at where a transition was made, and which surface it crossed."""
+        place = self.place(made.source, made.time, tuple(made.before.values()))
+        return place, self.edges(made.source).index(made.edge)
+
     def state(self, arc: Arc, row: int) -> State:
         """The state at a row."""
         return tuple(self.execution.values[row][: len(arc.states)].tolist())
-
-    def surfaces_along(self, arc: Arc) -> Iterator[Vector]:
-        """The values of the surfaces at an arc's rows."""
-        values: list[list[Number]] = self.execution.values[arc.first : arc.last + 1, : len(arc.states)].tolist()
-        bound = self.at_row(arc, arc.first)
-        end = self.run.timeline.at(bound.t).end
-        for t, x in zip(self.times[arc.first : arc.last + 1], values, strict=True):
-            surfaces = bound.kernel.surfaces if t <= end else self.place(arc.mode, t, tuple(x)).kernel.surfaces
-            yield surfaces(t, *x)
 
     def at_row(self, arc: Arc, row: int) -> Place:
         """Look at a row."""
@@ -126,34 +133,59 @@ class Looking:
         piece: Polynomial = tuple(tuple(c[:d]) for c in self.execution.coefficients[row].tolist())
         if not piece:
             piece = (tuple(b - a for a, b in zip(x, self.state(arc, row + 1), strict=True)),)
-        return lambda s: self.place(arc.mode, t + s * h, at(x, piece, s))
+        index, start, end = self.index(arc.mode), t, self.times[row + 1]
 
-    def error(self, place: Place, row: int) -> State | None:
-        """How wrong a state may be that is reached at a row; None where nothing tells."""
-        if self.allowed is None:
-            return None
-        try:
-            slope = place.kernel.flow(place.t, *place.x)
-        except DOMAIN_ERRORS:
-            return None
-        return self.allowed.error(row, place, slope)
+        def look(s: Number) -> Place:
+            time = min(t + s * h, end)
+            inner = self.place(index, start, x) if time == end else None  # the end belongs to the step's own segment
+            place = self.place(index, time, at(x, piece, s))
+            return place if inner is None else Place(place.mode, inner.kernel, inner.surfaces, time, place.x)
 
-    def shift(self, place: Place, k: int, row: int) -> Number | None:
-        """How much the error may move surface k; None where nothing tells."""
-        error = self.error(place, row)
-        if error is None:
-            return None
+        return look
+
+    def error(self, place: Place, row: int) -> State:
+        """How wrong each state of a place may be that is reached at a row."""
+        assert self.errors is not None
+        columns = self.errors.columns
+        return tuple(float(self.errors.by_row[row, columns[name]]) for name in place.mode.states)
+
+    def around(self, place: Place, row: int) -> State:
+        """The same, as many times over as a margin must be."""
+        return tuple(SAFE * e for e in self.error(place, row))
+
+    def shift(self, place: Place, k: int, row: int) -> Number:
+        """How much the error may move surface k."""
+        assert self.errors is not None
         gradient = place.kernel.gradients[k](place.t, *place.x)
-        return sum((abs(g) * e for g, e in zip(gradient[1:], error, strict=True)), self.arithmetic.zero)
+        errors = (self.errors.late_by(place.t), *self.error(place, row))
+        return sum((abs(g) * e for g, e in zip(gradient, errors, strict=True) if e), self.arithmetic.zero)
+
+    def roundoff(self, place: Place, k: int, row: int) -> Number:
+        """Round-off of surface k at a place, by the largest sizes that the states have had."""
+        assert self.errors is not None
+        columns = self.errors.columns
+        sizes = tuple(float(self.errors.sizes[row, columns[name]]) for name in place.mode.states)
+        return self.surfaces_of(place, sizes).noise(k, place.t, place.x, entry=True)
+
+    def surfaces_of(self, place: Place, scale: State) -> Surfaces:
+        """A place's surfaces, its states having been computed from numbers of these sizes."""
+        return Surfaces(place.kernel, place.mode.edges, scale, self.arithmetic)
 
     def row_at(self, t: Number) -> int:
-        """How many rows there are up to a time."""
+        """The last row before a time, or at it."""
         return max(0, bisect_right(self.times, t) - 1)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are the same instant."""
-        return TIE * max(1, abs(t))
+        return self.run.tie(t)
 
 
-def _jumps(mode: ModeProgram) -> bool:
-    return any(JUMPS.search(text) for text in mode.flow_texts)
+def jumps(text: str) -> bool:
+    """Whether an expression may jump."""
+    return JUMPS.search(text) is not None
+
+
+def visited(run: Looking) -> list[ModeProgram]:
+    """The modes that a run flowed in."""
+    names = {arc.mode for arc in run.flows}
+    return [mode for mode in run.run.program.modes if mode.name in names]

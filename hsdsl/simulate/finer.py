@@ -1,0 +1,35 @@
+"""Settings of the same run made finer: the difference of the two runs estimates the error of the first.
+
+The tolerance falls to a tenth, so the finer run is wrong by about a tenth of what the run is. A fixed step is halved;
+a method of order 1 needs a quarter, or the difference would be no larger than the error of the finer run. The
+relaxed scheme's strips shrink to a tenth: the delay of a transition is known only up to a factor. Below round-off the
+other run is coarser instead, and the difference is that much larger than the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hsdsl.arithmetic import Arithmetic
+from hsdsl.integrators import ButcherTableau, TaylorMethod
+from hsdsl.simulate.settings import Settings
+
+FINER = 10
+LEAST_UNITS = 32  # of round-off: a tolerance that a finer run may still have
+
+
+def finer_settings(settings: Settings, arithmetic: Arithmetic) -> Settings:
+    """Return the settings of the run to compare with."""
+    finer = settings
+    if settings.scheme != "located":
+        finer = replace(finer, relaxation=settings.relaxation / FINER)
+    if settings.step is not None:
+        first = isinstance(settings.method, ButcherTableau) and settings.method.order == 1
+        return replace(finer, step=settings.step / (4 if first else 2))
+    assert settings.tolerance is not None
+    smaller = settings.tolerance / FINER
+    tolerance = smaller if smaller >= LEAST_UNITS * arithmetic.unit else settings.tolerance * FINER
+    method = settings.method
+    if isinstance(method, TaylorMethod):
+        method = method.for_tolerance(tolerance, arithmetic)
+    return replace(finer, tolerance=tolerance, method=method)

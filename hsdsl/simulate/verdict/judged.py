@@ -1,0 +1,59 @@
+"""One surface at one place of a run: could the error make another execution of it?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hsdsl.arithmetic import Number
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import SAFE
+from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.place import Place
+
+ROUNDS = 48  # of closing in on a zero
+TWICE = 2  # as deep as a strip: beyond a surface
+
+
+def has_condition(place: Place, k: int) -> bool:
+    return k < len(place.mode.edges) and place.mode.edges[k].conditional
+
+
+def judged(run: Looking, place: Place, k: int, row: int, how: str) -> Finding | None:
+    """Say whether the error could make another execution of a surface that the run is close to, or beyond."""
+    value, shift, conditional = place.value(k), run.shift(place, k, row), has_condition(place, k)
+    if conditional and place.conditions(k, run.around(place, row)) == {False}:
+        return None
+    where = f"the surface of {place.name(k)} at t = {show(place.t)}"
+    if value > _level(run, place, k) and not conditional:
+        sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
+        return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
+    if value > 0 and conditional:
+        return None
+    margin = abs(value) / shift if shift > 0 else run.arithmetic.zero + float("inf")
+    if margin < SAFE:
+        return Finding("miss", "unknown", f"the run {how} {where}, {times(margin)} the error away")
+    return None
+
+
+def _level(run: Looking, place: Place, k: int) -> Number:
+    """Below this a surface value is none: round-off, and a strip of the relaxed scheme."""
+    level = place.noise(k)
+    if run.run.settings.scheme == "relaxed":
+        slopes = place.kernel.gradients[k](place.t, *place.x)
+        level = level + TWICE * run.run.settings.relaxation * sum((abs(g) for g in slopes), level * 0)
+    return level
+
+
+def closed_in(look: Callable[[Number], Place], of: Callable[[Place], Number]) -> Place:
+    """Close in on where a function of the place rises through zero between the ends of a step (bisection)."""
+    a = 0.0
+    b, place = 1.0, look(1.0)
+    for _ in range(ROUNDS):
+        s = (a + b) / 2
+        found = look(s)
+        if of(found) <= 0:
+            a = s
+        else:
+            b, place = s, found
+    return place

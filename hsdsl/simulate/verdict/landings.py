@@ -1,0 +1,143 @@
+"""Where arcs begin: does a reset land on, or within the error of, a surface that it need not land on?
+
+A reset may put every state of its guard onto a surface, as a touchdown puts a foot onto its lift-off guard: states
+moved by the error along the guard land on it too. Where they do not, an error decides on which side the run goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.enclosures import Range
+from hsdsl.execution import Arc, Transition
+from hsdsl.integrators.stepper import State
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import SAFE
+from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.looking import Looking, jumps
+from hsdsl.simulate.verdict.place import Place
+
+TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
+ALONG = 1e-3  # of what a surface may change by: less is along it
+ROUNDS = 3  # of Newton's method, back onto a guard
+WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
+
+
+def landings(run: Looking) -> tuple[list[Finding], list[str]]:
+    """Look at where every arc of flow begins, and at every reset."""
+    if run.errors is None:
+        return [], []
+    found: list[Finding] = []
+    for arc in run.flows:
+        place = run.at_row(arc, arc.first)
+        made = run.transitions[arc.jump - 1] if arc.jump else None
+        for k in range(len(place.mode.edges) + len(place.mode.walls)):
+            try:
+                found += _on(run, arc, place, k, made)
+            except DOMAIN_ERRORS:
+                continue  # `misses` looks along the arc
+    for made in run.transitions:
+        try:
+            found += _continuous(run, made)
+        except DOMAIN_ERRORS:
+            continue
+    return found, []
+
+
+def _on(run: Looking, arc: Arc, place: Place, k: int, made: Transition | None) -> Iterator[Finding]:
+    value, rate, noise = place.value(k), place.rate(k), place.noise(k)
+    where = f"the surface of {place.name(k)} at t = {show(place.t)}"
+    conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
+    if arc.first == 0:
+        if abs(value) <= noise and (conditional or abs(rate) <= _still(run, place, k)):
+            how = "which has an `if`" if conditional else "to which the flow is tangent"
+            yield Finding("start", "unknown", f"the run starts on {where}, {how}")
+        return
+    shift = run.shift(place, k, arc.first)
+    if made is None or _tied(run, made) or abs(value) > SAFE * shift + noise:
+        return
+    if rate > _still(run, place, k) and not conditional:
+        return  # it is crossed at once, on either side of it
+    if _keeps(run, made, k, value):
+        return
+    if conditional and place.conditions(k, run.around(place, arc.first)) == {False}:
+        return
+    margin = abs(value) / shift if shift > 0 else 0.0
+    yield Finding("landing", "unknown", f"the reset of {made.edge} lands {times(margin)} the error away from {where}")
+
+
+def _tied(run: Looking, made: Transition) -> bool:
+    """Whether a transition follows another at one instant: `choices` looks at these."""
+    before = run.transitions[made.index - 1] if made.index else None
+    return before is not None and before.resumed is not None and made.time - before.resumed <= run.tie(made.time)
+
+
+def _still(run: Looking, place: Place, k: int) -> Number:
+    gradient, slope = place.kernel.gradients[k](place.t, *place.x), place.kernel.flow(place.t, *place.x)
+    size = abs(gradient[0]) + sum((abs(g * f) for g, f in zip(gradient[1:], slope, strict=True)), run.arithmetic.zero)
+    return TANGENT_UNITS * run.arithmetic.unit * size
+
+
+def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
+    """Whether states near the one before a transition, moved along its guard, land where surface k has its value."""
+    before, edge = run.before(made)
+    target = before.mode.edges[edge].target
+    for moved in _along(run, before, edge, run.around(before, run.row_at(made.time))):
+        landed = before.kernel.resets[edge](made.time, *moved)
+        after = run.place(target, made.time, landed)
+        here = before.kernel.resets[edge](made.time, *before.x)
+        slopes = after.kernel.gradients[k](after.t, *after.x)[1:]
+        change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, landed, here, strict=True)), run.arithmetic.zero)
+        if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_at(made.time)):
+            return False
+    return True
+
+
+def _along(run: Looking, place: Place, edge: int, error: State) -> Iterator[State]:
+    """The state moved by the error in each component, and then back onto the guard."""
+    for moved in place.moved_by(error):
+        x = moved
+        for _ in range(ROUNDS):
+            value = place.kernel.surfaces(place.t, *x)[edge]
+            slopes = place.kernel.gradients[edge](place.t, *x)[1:]
+            norm = sum((g * g for g in slopes), run.arithmetic.zero)
+            if not norm > 0:
+                break
+            x = tuple(a - value * g / norm for a, g in zip(x, slopes, strict=True))
+        yield x
+
+
+def _continuous(run: Looking, made: Transition) -> Iterator[Finding]:
+    """Whether the reset of a transition, and the inputs, are continuous around it."""
+    assert run.errors is not None
+    place, k = run.before(made)
+    where = f"{made.edge} at t = {show(made.time)}"
+    late = SAFE * run.errors.late_by(made.time)
+    if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
+        yield Finding("input", "unknown", f"an input jumps within the error of the time of {where}")
+    edge = place.mode.edges[k]
+    if made.after is None or not any(map(jumps, edge.reset_texts)):
+        return
+    error = run.around(place, run.row_at(made.time))
+    narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
+    least = [64 * float(run.arithmetic.unit) * abs(float(v)) for v in made.after.values()]
+    if any(a > b and c < a * WIDER / 2 for a, b, c in zip(narrow, least, wide, strict=True)):
+        yield Finding("reset", "unknown", f"the reset of {where} jumps within the error")
+
+
+def _samples_near(run: Looking, t: Number) -> Iterator[tuple[float, bool]]:
+    """The boundaries of the input segments on either side of a time, and whether an input jumps there."""
+    segment = run.run.timeline.at(t)
+    yield float(segment.start), segment.jump
+    if segment.end < run.run.settings.until:
+        yield float(segment.end), run.run.timeline.at(segment.end).jump
+
+
+def _spread(run: Looking, place: Place, k: int, error: list[float], late: float) -> list[float]:
+    """How far apart the results of a reset may be over a box around a place."""
+    data = [Range(float(v), float(v)) for v in run.run.timeline.at(place.t).data]
+    kernel = run.run.kernel.enclosing.bind(run.index(place.mode.name), data)
+    box = [Range(float(a) - e, float(a) + e) for a, e in zip(place.x, error, strict=True)]
+    results = kernel.resets[k](Range(float(place.t) - late, float(place.t) + late), *box)
+    return [float(r.high - r.low) if isinstance(r, Range) else 0.0 for r in results]

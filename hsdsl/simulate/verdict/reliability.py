@@ -1,0 +1,57 @@
+"""From when on a run cannot be relied on: where a finer run parts from it, or an error outgrows its state."""
+
+from __future__ import annotations
+
+from hsdsl.enclosures import Range, as_range
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS, SAFE
+from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.looking import Looking
+
+PLACES = 64  # of a run where the round-off of its flow is looked at
+ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
+
+
+def reliability(run: Looking) -> tuple[list[Finding], list[str]]:
+    """Say from when on the run and its finer repetition differ in more than digits."""
+    if run.errors is None:
+        return [], []
+    found: list[Finding] = []
+    parted = run.errors.parted
+    if parted is not None:
+        sentence = f"the run is unreliable from t = {show(parted)} on: a finer run makes other transitions from there"
+        found.append(Finding("reliability", "unknown", sentence))
+    grown = run.errors.unreliable
+    floor = _roundoff(run) if grown else {}
+    columns = run.errors.columns
+    beyond = {k: t for k, t in grown.items() if run.errors.by_row[-1, columns[k]] > SAFE * floor.get(k, 0.0)}
+    if beyond:
+        name = min(beyond, key=lambda k: beyond[k])
+        time = show(beyond[name])
+        sentence = f"the run is unreliable from t = {time} on: the error of {name} exceeds a tenth of its size"
+        found.append(Finding("reliability", "unknown", sentence))
+    return found, []
+
+
+def _roundoff(run: Looking) -> dict[str, float]:
+    """What round-off in the flow alone may move each state by over the run.
+
+    A state that stays near zero by cancellation has no digit right, and nothing is wrong with it.
+    """
+    moved: dict[str, float] = {}
+    span, unit = float(run.times[-1] - run.times[0]), ROUNDOFF_UNITS * float(run.arithmetic.unit)
+    rows = [(arc, row) for arc in run.flows for row in (arc.first, arc.last)]
+    for _ in range(ROUNDS):
+        found = dict(moved)
+        for arc, row in rows[:: max(1, len(rows) // PLACES)]:
+            place = run.at_row(arc, row)
+            data = [Range(float(v), float(v)) for v in run.run.timeline.at(place.t).data]
+            kernel = run.run.kernel.enclosing.bind(run.index(arc.mode), data)
+            t, x = float(place.t), [float(a) for a in place.x]
+            wide = [unit * abs(a) + moved.get(name, 0.0) for name, a in zip(arc.states, x, strict=True)]
+            box = [Range(a - e, a + e) for a, e in zip(x, wide, strict=True)]
+            flow = map(as_range, kernel.flow(Range(t - unit * abs(t), t + unit * abs(t)), *box))
+            for name, f in zip(arc.states, flow, strict=False):
+                found[name] = max(found.get(name, 0.0), span * float(f.high - f.low))
+        moved = found
+    return moved

@@ -1,0 +1,201 @@
+"""Steps of a run, many at once, as polynomials over [0, 1] in Bernstein form, and parts of them cut in halves.
+
+A polynomial lies between the least and the largest of its Bernstein coefficients, so a part of a step lies in a box.
+Routines over interval arithmetic then enclose what a surface or the flow is anywhere on that part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import groupby
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsdsl.enclosures import Range, as_range
+from hsdsl.kernel import ModeKernel
+from hsdsl.simulate.verdict.looking import Looking
+
+Array = NDArray[np.float64]
+MOST_PARTS = 1 << 15  # looked at together
+COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
+ROUNDING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of steps in one mode.
+
+    Attributes
+    ----------
+    mode : int
+    row : array of int, shape (N,)
+        The row each step begins at.
+    start, width : array, shape (N,)
+        Which share of the step each part is.
+    time, length : array, shape (N,)
+        When the step begins and how long it takes.
+    bernstein : array, shape (N, n, degree + 1)
+        The states along the part.
+    error : array, shape (N, n)
+        How wrong the states may be, as often as a margin must be.
+    data : array, shape (N or 1, numbers)
+        Parameters and input segments; one row where they are the same for all.
+    """
+
+    mode: int
+    row: NDArray[np.int64]
+    start: Array
+    width: Array
+    time: Array
+    length: Array
+    bernstein: Array
+    error: Array
+    data: Array
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def take(self, which: Any) -> Parts:
+        """Some of them."""
+        data = self.data if len(self.data) == 1 else self.data[which]
+        return Parts(self.mode, **{name: getattr(self, name)[which] for name in COLUMNS}, data=data)
+
+    def halves(self) -> Parts:
+        """Both halves of each, the first ones before the second ones."""
+        left, right = _halving(self.bernstein.shape[2] - 1)
+        both = replace(self, bernstein=self.bernstein @ left, width=self.width / 2)
+        other = replace(both, bernstein=self.bernstein @ right, start=self.start + both.width)
+        return _joined([both, other])
+
+    @property
+    def times(self) -> Range:
+        """The times of each part."""
+        low, high = self.time + self.start * self.length, self.time + (self.start + self.width) * self.length
+        return Range(np.nextafter(low, -np.inf), np.nextafter(high, np.inf))
+
+    def states(self, wider: float = 0.0) -> list[Range]:
+        """The states along each part, ``wider`` times the error either way."""
+        low, high = self.bernstein.min(axis=2), self.bernstein.max(axis=2)
+        more = wider * self.error + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        return [Range(low[:, i] - more[:, i], high[:, i] + more[:, i]) for i in range(low.shape[1])]
+
+    def ends(self) -> tuple[list[Range], list[Range]]:
+        """Time and states at the first and at the last point of each part."""
+        first, last = self.time + self.start * self.length, self.time + (self.start + self.width) * self.length
+        states = self.bernstein[:, :, 0], self.bernstein[:, :, -1]
+        both = ((first, states[0]), (last, states[1]))
+        one, other = ([Range(t, t), *(Range(column, column) for column in x.T)] for t, x in both)
+        return one, other
+
+    def moved(self, states: Sequence[Range]) -> list[Range]:
+        """States and all that are no further away than the error."""
+        return [Range(x.low - e, x.high + e) for x, e in zip(states, self.error.T, strict=True)]
+
+    def slopes(self) -> tuple[Array, Array]:
+        """The derivatives of the states along each part, from least to largest; shape (N, n) each."""
+        degree = self.bernstein.shape[2] - 1
+        slopes = degree * np.diff(self.bernstein, axis=2) / (self.width * self.length)[:, None, None]
+        return slopes.min(axis=2), slopes.max(axis=2)
+
+    @property
+    def bound_data(self) -> list[Range]:
+        """The data as a kernel over intervals takes them."""
+        return [Range(column, column) for column in self.data.T]
+
+    def bound(self, run: Looking) -> ModeKernel:
+        """The mode's routines over intervals, with the data of these parts."""
+        return run.run.kernel.enclosing.bind(self.mode, self.bound_data)
+
+
+def steps_of(run: Looking) -> Iterator[Parts]:
+    """Give the steps of all arcs of flow, those of a mode together, as many at once as memory allows."""
+    times = np.asarray(run.execution.times, dtype=float)
+    ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
+    for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
+        if states != run.run.program.modes[mode].states:
+            continue  # a final mode flows as the one before it
+        rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
+        rows = rows[times[rows + 1] > times[rows]]
+        for first in range(0, len(rows), MOST_PARTS):
+            yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
+
+
+def _steps(run: Looking, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
+    execution, n, errors = run.execution, len(states), run.errors
+    times = np.asarray(execution.times, dtype=float)
+    values = np.asarray(execution.values[rows, :n], dtype=float)
+    powers = np.asarray(execution.coefficients[rows, :, :n], dtype=float)
+    if powers.shape[1] == 0:
+        powers = (np.asarray(execution.values[rows + 1, :n], dtype=float) - values)[:, None, :]
+    whole = np.concatenate([values[:, None, :], np.nan_to_num(powers)], axis=1).transpose(0, 2, 1)
+    error = np.zeros((len(rows), n))
+    if errors is not None:
+        error = errors.by_row[rows + 1][:, [errors.columns[name] for name in states]]
+    one = np.ones(len(rows))
+    data = _data(run, times[rows])
+    length = times[rows + 1] - times[rows]
+    return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ _to_bernstein(whole.shape[2] - 1), error, data)
+
+
+def _data(run: Looking, times: Array) -> Array:
+    segments = run.run.timeline.segments
+    if len(segments) == 1:
+        return np.array([segments[0].data], dtype=float)
+    starts = np.array([float(s.start) for s in segments])
+    which = np.maximum(np.searchsorted(starts, times, "right") - 1, 0)
+    return np.array([s.data for s in segments], dtype=float)[which]
+
+
+def _joined(parts: Sequence[Parts]) -> Parts:
+    first = parts[0]
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    data = first.data if len(first.data) == 1 else np.concatenate([part.data for part in parts])
+    return Parts(mode=first.mode, **joined, data=data)
+
+
+@cache
+def _to_bernstein(degree: int) -> Array:
+    """From coefficients of powers to Bernstein coefficients: b_i = sum_k C(i, k)/C(n, k) c_k."""
+    return np.array([[comb(i, k) / comb(degree, k) for i in range(degree + 1)] for k in range(degree + 1)])
+
+
+@cache
+def _halving(degree: int) -> tuple[Array, Array]:
+    """From Bernstein coefficients to those of both halves (de Casteljau)."""
+    left = np.array([[comb(i, k) / 2.0**i for i in range(degree + 1)] for k in range(degree + 1)])
+    return left, left[::-1, ::-1]
+
+
+def undecided(
+    parts: Parts, decides: Callable[[Parts], NDArray[np.bool_]], halvings: int
+) -> tuple[Parts, NDArray[np.bool_]]:
+    """Cut parts in halves until a test decides them, or so many times; return what is left, and what is open there.
+
+    ``decides`` gives for each part which of its questions are still open, shape (N, questions); once decided for a
+    part, a question is decided for its halves.
+    """
+    open_ = decides(parts)
+    for _ in range(halvings):
+        left = open_.any(axis=1)
+        if not left.any() or left.sum() > MOST_PARTS // 2:
+            break
+        parts = parts.take(left).halves()
+        asked = np.concatenate([open_[left]] * 2)
+        open_ = asked & decides(parts)
+    left = open_.any(axis=1)
+    return parts.take(left), open_[left]
+
+
+def high(value: Any, count: int) -> Array:
+    """The upper end of a range, for so many parts."""
+    return np.broadcast_to(as_range(value).high, (count,))
+
+
+def low(value: Any, count: int) -> Array:
+    """The lower end of a range, for so many parts."""
+    return np.broadcast_to(as_range(value).low, (count,))

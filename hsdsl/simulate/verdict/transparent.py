@@ -1,0 +1,50 @@
+"""Surfaces that a run passes while the `if` of their edge is false: does it stay false within the error?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsdsl.arithmetic import Number
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import SAFE
+from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.judged import closed_in
+from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.steps import Parts, high, low
+
+
+def transparent(run: Looking, steps: Parts, passed: dict[str, list[Number]]) -> Iterator[Finding]:
+    """Surfaces passed where their condition does not hold: does it all around? Notes in ``passed`` where it does."""
+    edges = run.run.program.modes[steps.mode].edges
+    if not any(edge.conditional for edge in edges):
+        return
+    with np.errstate(all="ignore"):
+        kernel, (first, last) = steps.bound(run), steps.ends()
+        before, after = (kernel.surfaces(*end) for end in (first, last))
+    for k, edge in enumerate(edges):
+        if not edge.conditional:
+            continue
+        rising = (low(before[k], len(steps)) <= 0) & (high(after[k], len(steps)) > 0)
+        for i in np.flatnonzero(rising).tolist():
+            row = int(steps.row[i])
+            arc = run.arc_of(row)
+            if run.crossed.get(arc.last) == k and row + 1 == arc.last:
+                continue
+            place = closed_in(run.between(arc, row), lambda place: place.value(k))  # noqa: B023
+            if place.value(k) > 0 or abs(place.value(k)) <= SAFE * run.shift(place, k, row + 1) + place.noise(k):
+                if place.conditions(k, run.around(place, row + 1)) == {False}:
+                    passed.setdefault(edge.name, []).append(place.t)
+                else:
+                    where = f"{place.name(k)} at t = {show(place.t)}"
+                    sentence = f"whether the condition of {where} holds is within the error"
+                    yield Finding("condition", "unknown", sentence)
+
+
+def passed_at(name: str, at: list[Number]) -> str:
+    more = f" and {len(at) - 1} more times" if len(at) > 1 else ""
+    return (
+        f"the surface of {name} was passed at t = {show(at[0])}{more} while its `if` was false: "
+        "it fires only where it is reached again from inside"
+    )
