@@ -91,7 +91,7 @@ def test_what_was_picked_is_said_and_estimates_keep_it(tmp_path: Path) -> None:
     run = model.simulate(engine="python")
     assert run.method == "taylor" and run.settings["method_chosen"].startswith("taylor: every flow is smooth")
     assert "method_chosen" not in model.simulate(method="taylor", engine="python").settings
-    assert model.estimate(run, engine="python").same_transitions
+    assert model.estimate(run).same_transitions
     assert "method auto is taylor: every flow is smooth" in summary(run)
     run.save(tmp_path / "run.npz")
     assert load(tmp_path / "run.npz").settings == run.settings

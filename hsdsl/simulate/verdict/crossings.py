@@ -23,7 +23,7 @@ def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
     slowest: Number | None = None
     least: Number | None = None
     ends = {arc.jump: arc for arc in run.flows}
-    made = [t for t in run.transitions if not t.entry]
+    made = [t for t in run.relied_transitions if not t.entry]
     for transition in made:
         place, k = run.before(transition)
         try:

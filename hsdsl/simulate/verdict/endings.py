@@ -46,7 +46,7 @@ def at_its_end(run: Looking, arc: Arc, crossed: int | None) -> Iterator[Finding]
 
 def at_the_end(run: Looking) -> Iterator[Finding]:
     """Surfaces that would be reached just behind the end, and a transition just before it."""
-    if run.errors is None or run.stop.reason != "until" or not run.flows:
+    if run.errors is None or run.unreliable or run.stop.reason != "until" or not run.flows:
         return
     arc, until = run.flows[-1], run.times[-1]
     place = run.at_row(arc, arc.last)

@@ -49,8 +49,8 @@ def _jumping(modes: Sequence[ModeProgram]) -> Finding:
 
 def _named(run: Looking, what: str, how: str, parts: Parts, _: Any) -> Iterator[Finding]:
     if len(parts):
-        time = parts.times
-        first, name = float(time.low.min()), run.run.program.modes[parts.mode].name
+        first = float((parts.time + parts.start * parts.length).min())
+        name = run.run.program.modes[parts.mode].name
         yield Finding("flow", "unknown", f"{what} of mode {name} {how} close to t = {show(first)}")
 
 

@@ -29,7 +29,7 @@ def landings(run: Looking) -> tuple[list[Finding], list[str]]:
     if run.errors is None:
         return [], []
     found: list[Finding] = []
-    for arc in run.flows:
+    for arc in run.relied_flows:
         place = run.at_row(arc, arc.first)
         made = run.transitions[arc.jump - 1] if arc.jump else None
         for k in range(len(place.mode.edges) + len(place.mode.walls)):
@@ -37,7 +37,7 @@ def landings(run: Looking) -> tuple[list[Finding], list[str]]:
                 found += _on(run, arc, place, k, made)
             except DOMAIN_ERRORS:
                 continue  # `misses` looks along the arc
-    for made in run.transitions:
+    for made in run.relied_transitions:
         try:
             found += _continuous(run, made)
         except DOMAIN_ERRORS:

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.execution import Arc, Execution, Stop, Transition
@@ -70,6 +71,28 @@ class Looking:
             return None
         end = self.times[-1]
         return Errors(self.execution, finer, float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(end)))
+
+    @cached_property
+    def unreliable(self) -> tuple[float, str] | None:
+        """From when on the run cannot be relied on, and why; None where it can."""
+        from hsdsl.simulate.verdict.reliability import unreliable
+
+        return unreliable(self)
+
+    @property
+    def upto(self) -> float:
+        """Until when the run can be relied on."""
+        return self.unreliable[0] if self.unreliable else inf
+
+    @property
+    def relied_flows(self) -> list[Arc]:
+        """The arcs that begin before the run becomes unreliable."""
+        return [arc for arc in self.flows if self.times[arc.first] < self.upto]
+
+    @property
+    def relied_transitions(self) -> list[Transition]:
+        """The transitions made before the run becomes unreliable."""
+        return [made for made in self.transitions if made.time < self.upto]
 
     @cached_property
     def crossed(self) -> dict[int, int]:

@@ -60,7 +60,7 @@ def misses(run: Looking) -> tuple[list[Finding], list[str]]:
             found.append(Finding("misses", "unknown", more))
         found += transparent(run, steps, passed)
         nearest = min(filter(None, (nearest, _nearest(run, steps))), default=None)
-    for arc in run.flows:
+    for arc in run.relied_flows:
         try:
             found += at_its_end(run, arc, run.crossed.get(arc.last))
         except DOMAIN_ERRORS:

@@ -14,23 +14,25 @@ ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in
 
 def reliability(run: Looking) -> tuple[list[Finding], list[str]]:
     """Say from when on the run and its finer repetition differ in more than digits."""
-    if run.errors is None:
+    if run.unreliable is None:
         return [], []
-    found: list[Finding] = []
-    parted = run.errors.parted
-    if parted is not None:
-        sentence = f"the run is unreliable from t = {show(parted)} on: a finer run makes other transitions from there"
-        found.append(Finding("reliability", "unknown", sentence))
-    grown = run.errors.unreliable
+    time, why = run.unreliable
+    return [Finding("reliability", "unknown", f"the run is unreliable from t = {show(time)} on: {why}")], []
+
+
+def unreliable(run: Looking) -> tuple[float, str] | None:
+    """From when on the run is unreliable, and why; None where it is not."""
+    if run.errors is None:
+        return None
+    found: list[tuple[float, str]] = []
+    if run.errors.parted is not None:
+        found.append((run.errors.parted, "from there a finer run makes other transitions"))
+    grown, columns = run.errors.unreliable, run.errors.columns
     floor = _roundoff(run) if grown else {}
-    columns = run.errors.columns
-    beyond = {k: t for k, t in grown.items() if run.errors.by_row[-1, columns[k]] > SAFE * floor.get(k, 0.0)}
-    if beyond:
-        name = min(beyond, key=lambda k: beyond[k])
-        time = show(beyond[name])
-        sentence = f"the run is unreliable from t = {time} on: the error of {name} exceeds a tenth of its size"
-        found.append(Finding("reliability", "unknown", sentence))
-    return found, []
+    for name, time in grown.items():
+        if run.errors.by_row[-1, columns[name]] > SAFE * floor.get(name, 0.0):
+            found.append((time, f"the error of {name} exceeds a tenth of its size"))
+    return min(found, default=None)
 
 
 def _roundoff(run: Looking) -> dict[str, float]:

@@ -120,7 +120,7 @@ def steps_of(run: Looking) -> Iterator[Parts]:
         if states != run.run.program.modes[mode].states:
             continue  # a final mode flows as the one before it
         rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
-        rows = rows[times[rows + 1] > times[rows]]
+        rows = rows[(times[rows + 1] > times[rows]) & (times[rows + 1] <= run.upto)]
         for first in range(0, len(rows), MOST_PARTS):
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
