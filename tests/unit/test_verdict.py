@@ -1,5 +1,6 @@
 """The verdict: what is found about the theorem's hypotheses, on scenes whose answer is known by hand."""
 
+import math
 import textwrap
 from pathlib import Path
 
@@ -106,3 +107,117 @@ def test_a_finer_run_decides_where_a_fixed_step_cannot():
     wrong = model.simulate(until=20, step="0.2", relaxation=1e-7, method="euler")
     assert not model.estimate(wrong).same_transitions
     assert wrong.estimated().verdict.theorem == "unknown"
+
+
+LORENZ = "x: 10*(y - x), y: x*(28 - z) - y, z: x*y - 8/3*z"
+NOT_TO_RELY_ON = {
+    "chaos": (f"m: {{flow: {{{LORENZ}}}}}", "x: 1, y: 1, z: 1", 60, "the run is unreliable from t = 2"),
+    "chaos with impacts": (
+        "m: {flow: {x: v, v: x - x**3 - 0.3*v + 0.5*cos(1.2*t)}, transitions: [{when: x >= 1.2, to: m, "
+        "reset: {v: -0.9*v}}]}",
+        "x: 0.5, v: 0", 200, "the run is unreliable from t = 1",
+    ),
+    "a reset that jumps": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n, reset: {y: floor(y)}}]}, n: {flow: {x: 1, y: 1}}",
+        "x: 0, y: 1", 2, "the reset of m->n at t = 1 jumps",
+    ),
+    "a reset on the cut of atan2": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n, reset: {y: 'atan2(y, -1)'}}]}, "
+        "n: {flow: {x: 1, y: 1}}",
+        "x: 0, y: -1", 2, "the reset of m->n at t = 1 jumps",
+    ),
+    "a condition that jumps": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, if: floor(y) >= 2, to: n}]}, n: {flow: {x: 1, y: 1}}",
+        "x: 0, y: 1", 2, "whether the condition of m->n at t = 1",
+    ),
+    "a landing on another surface": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n}]}, "
+        "n: {flow: {x: 1, y: -1}, transitions: [{when: y >= 2, to: m}]}",
+        "x: 0, y: 1", 1.9, "the reset of m->n lands",
+    ),
+    "a landing on a wall": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n}]}, n: {flow: {x: 1, y: -1}, domain: [y <= 2]}",
+        "x: 0, y: 1", 2, "the reset of m->n lands",
+    ),
+    "a start on a guard with a condition": (
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 0, if: y >= 1, to: n}]}, n: {flow: {x: 1, y: 1}}",
+        "x: 0, y: 0", 3, "the run starts on the surface of m->n",
+    ),
+    "a start at a tangency": (
+        "m: {flow: {x: v, v: -1}, transitions: [{when: x >= 0, to: n}]}, n: {flow: {x: v, v: -1}}",
+        "x: 0, v: 0", 3, "the run starts on the surface of m->n",
+    ),
+    "a slope without bound at the start": ("m: {flow: {y: 2*sqrt(y)}}", "y: 0", 3, "the slope of the flow of mode m"),
+    "a slope without bound on the way": (
+        "m: {flow: {y: sqrt(abs(y)) - 1 - y*y}}", "y: 1", 3, "the slope of the flow of mode m"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["dopri5", "taylor"])
+@pytest.mark.parametrize(("modes", "start", "until", "says"), NOT_TO_RELY_ON.values(), ids=NOT_TO_RELY_ON)
+def test_a_run_not_to_rely_on_is_unknown(tmp_path, modes, start, until, says, method):
+    file = tmp_path / "model.yaml"
+    file.write_text(f"hsdsl: 1\nmodes: {{{modes}}}\ninitial: {{mode: m, {start}}}\nexperiment: {{until: {until}}}\n")
+    try:
+        run = hsdsl.load(file).simulate(method=method)
+    except hsdsl.UsageError:  # a kinked flow has no Taylor series
+        return
+    if not run.stop.complete:  # as where there is no series at the start
+        return
+    assert run.verdict.theorem == "unknown"
+    assert any(says in reason for reason in run.verdict.reasons), run.verdict
+
+
+@pytest.mark.parametrize("method", ["dopri5", "taylor", "radau", "dop853"])
+@pytest.mark.parametrize("clock", ["t", "s"])
+@pytest.mark.parametrize(("middle", "width"), [(57.3, 0.3), (33.3, 0.03), (4.44, 0.003)])
+def test_a_pulse_is_integrated_or_named(tmp_path, middle, width, clock, method):
+    file = tmp_path / "model.yaml"
+    file.write_text(
+        f"hsdsl: 1\nmodes: {{m: {{flow: {{s: 1, x: exp(-(({clock} - {middle})/{width})**2)}}}}}}\n"
+        f"initial: {{mode: m, s: 0, x: 0}}\nexperiment: {{until: 100, method: {method}}}\n"
+    )
+    run = hsdsl.load(file).simulate()
+    right = abs(run.final["x"] - width * math.sqrt(math.pi)) < 1e-6 * width
+    assert right or run.verdict.theorem == "unknown"
+
+
+NARROW = [("cos(s - 3.76)**400 >= 0.41", 12), ("exp(-((s - 7.7)/0.02)**2) >= 1/2", 20), ("abs(s - 5) <= 0.003", 31)]
+
+
+@pytest.mark.parametrize("method", ["dopri5", "taylor", "radau"])
+@pytest.mark.parametrize("scheme", ["located", "relaxed"])
+@pytest.mark.parametrize(("when", "until"), NARROW)
+def test_a_narrow_visit_is_found_or_named(tmp_path, when, until, scheme, method):
+    file = tmp_path / "model.yaml"
+    file.write_text(
+        f"hsdsl: 1\nmodes: {{m: {{flow: {{s: 1}}, transitions: [{{when: '{when}', to: n}}]}}, n: {{flow: {{s: 1}}}}}}\n"
+        f"initial: {{mode: m, s: 0}}\nexperiment: {{until: {until}, scheme: {scheme}, method: {method}}}\n"
+    )
+    run = hsdsl.load(file).simulate()
+    assert run.transitions or run.verdict.theorem == "unknown", run.verdict
+
+
+def test_a_surface_passed_while_its_condition_is_false_is_named(tmp_path):
+    file = tmp_path / "model.yaml"
+    file.write_text(
+        "hsdsl: 1\nmodes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, if: x >= 5, to: n}]}, n: {flow: {x: 1}}}\n"
+        "initial: {mode: m, x: 0}\nexperiment: {until: 3}\n"
+    )
+    run = hsdsl.load(file).simulate()
+    assert run.verdict.theorem == "holds"
+    assert any("was passed at t = 1 while its `if` was false" in reason for reason in run.verdict.reasons)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e12])
+def test_verdicts_do_not_depend_on_units(tmp_path, scale):
+    file = tmp_path / "model.yaml"
+    file.write_text(
+        f"hsdsl: 1\nmodes: {{m: {{flow: {{x: v, v: -x}}, transitions: [{{when: x >= {scale}/2, to: m, "
+        "reset: {v: -v/2}}]}}\n"
+        f"initial: {{mode: m, x: 0, v: {scale}}}\nexperiment: {{until: 3}}\n"
+    )
+    run = hsdsl.load(file).simulate()
+    assert len(run.transitions) == 1
+    assert run.verdict.theorem == "holds", run.verdict

@@ -15,7 +15,7 @@ from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
 
-SAME = 1e-9  # relative to 1 + abs(x): one point
+SAME = 1e-9  # relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
 
 Landed = tuple[str, State]
@@ -60,13 +60,16 @@ def commute(run: Looking, place: Place, tied: Sequence[int], since: Number = 0) 
         landed = [settle(run, place, k, since) for k in tied]
     except DOMAIN_ERRORS:
         return False
-    return None not in landed and all(_same(landed[0], other) for other in landed[1:])
+    return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
 
 
-def _same(one: Landed | None, other: Landed | None) -> bool:
+def _same(run: Looking, one: Landed | None, other: Landed | None) -> bool:
     if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
         return False
-    return all(abs(a - b) <= SAME * (1 + abs(a)) for a, b in zip(one[1], other[1], strict=True))
+    names = run.run.program.modes[run.index(one[0])].states
+    sizes = [run.sizes.get(name, 0.0) for name in names] or [0.0] * len(one[1])
+    pairs = zip(one[1], other[1], sizes, strict=True)
+    return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
 
 
 def settle(run: Looking, place: Place, k: int, since: Number) -> Landed | None:

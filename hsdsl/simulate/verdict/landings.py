@@ -83,6 +83,8 @@ def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
     """Whether states near the one before a transition, moved along its guard, land where surface k has its value."""
     before, edge = run.before(made)
     target = before.mode.edges[edge].target
+    if k == edge and target == run.index(made.source) and _untouched(before, edge):
+        return True
     for moved in _along(run, before, edge, run.around(before, run.row_at(made.time))):
         landed = before.kernel.resets[edge](made.time, *moved)
         after = run.place(target, made.time, landed)
@@ -92,6 +94,13 @@ def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
         if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_at(made.time)):
             return False
     return True
+
+
+def _untouched(place: Place, edge: int) -> bool:
+    """Whether an affine surface depends on no state that its own reset changes."""
+    slopes = place.kernel.gradients[edge](place.t, *place.x)[1:]
+    rows = zip(place.mode.states, place.mode.edges[edge].reset_texts, slopes, strict=True)
+    return place.mode.affine and all(text == name for name, text, slope in rows if slope)
 
 
 def _along(run: Looking, place: Place, edge: int, error: State) -> Iterator[State]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
+import numpy as np
+
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
@@ -71,6 +73,16 @@ class Looking:
             return None
         end = self.times[-1]
         return Errors(self.execution, finer, float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(end)))
+
+    @cached_property
+    def sizes(self) -> dict[str, float]:
+        """The largest size that each state has in the run."""
+        found: dict[str, float] = {}
+        for arc in self.execution.arcs:
+            rows = np.abs(np.asarray(self.execution.values[arc.first : arc.last + 1, : len(arc.states)], dtype=float))
+            for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
+                found[name] = max(found.get(name, 0.0), size)
+        return found
 
     @cached_property
     def unreliable(self) -> tuple[float, str] | None:
