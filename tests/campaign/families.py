@@ -132,20 +132,27 @@ def _narrow() -> Family:
 
 
 def _fast() -> Family:
-    modes = {"m": Mode({"x": "v", "v": "-x", "n": "0"}, (Edge("tick", "sin(w*t + p) - a", "m", {"n": "n + 1"}),))}
+    modes = {
+        "m": Mode({"x": "v", "v": "-x"}, (Edge("up", "sin(w*t + p) - a", "n"),)),
+        "n": Mode({"x": "v", "v": "-x"}, (Edge("down", "a - sin(w*t + p)", "m"),)),
+    }
 
     def draw(r: random.Random) -> Values:
         return {"w": 10 ** r.uniform(0, 2.5), "a": r.uniform(-0.9, 0.9), "p": r.uniform(-3, 3)}
 
     def right(values: Values) -> Outcome:
-        w, first = values["w"], math.asin(values["a"]) - values["p"]
-        while first < 0:
-            first += 2 * math.pi
-        times = [(first + 2 * math.pi * k) / w for k in range(int((5 * w - first) // (2 * math.pi)) + 1)]
-        beyond = math.sin(values["p"]) > values["a"]
-        return Outcome(("tick",) * (len(times) + beyond), (0.0,) * beyond + tuple(times), "until")
+        w, p, rise = values["w"], values["p"], math.asin(values["a"])
+        turns = [
+            (n * 2 * math.pi + at, name)
+            for n in range(-1, int(w) + 2)
+            for at, name in ((rise, "up"), (math.pi - rise, "down"))
+        ]
+        made = sorted(((at - p) / w, name) for at, name in turns if 0 < at - p < 5 * w)
+        if math.sin(p) > values["a"]:
+            made = [(0.0, "up"), *made]
+        return Outcome(tuple(name for _, name in made), tuple(t for t, _ in made), "until")
 
-    text = _yaml(modes, ("m", {"x": "1", "v": "0", "n": "0"}), "w: 3, a: 0.5, p: 0", "5")
+    text = _yaml(modes, ("m", {"x": "1", "v": "0"}), "w: 3, a: 0.5, p: 0", "5")
     return Family(text, draw, right, ordinary=False)
 
 

@@ -105,7 +105,7 @@ def _flow(
                 for s, y in zip(grid.tolist(), along, strict=True):
                     value = g(s, *y)
                     if inside[k] and value > 0:
-                        root = brentq(lambda u, g=g: g(u, *dense(u)), before, s, xtol=1e-15, rtol=1e-15)
+                        root = brentq(lambda u, g=g, y=dense: g(u, *y(u)), before, s, xtol=1e-15, rtol=1e-15)
                         if k >= len(mode.edges) or conditions[k](root, *dense(root)):
                             hits.append((root, k))
                             break

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from campaign.families import FAMILIES, Family
-from campaign.reference import Outcome
 
 import hsdsl
+from campaign.families import FAMILIES, Family
+from campaign.reference import Outcome
 
 METHODS = ("auto", "taylor", "dopri5", "dop853", "radau")
 MANY, FEW = 450, 6

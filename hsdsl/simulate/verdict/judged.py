@@ -19,10 +19,15 @@ def has_condition(place: Place, k: int) -> bool:
     return k < len(place.mode.edges) and place.mode.edges[k].conditional
 
 
+def may_hold(run: Looking, place: Place, k: int, row: int) -> bool:
+    """Whether the `if` of an edge holds at a place or at a state that the error moves it to."""
+    return place.conditions(k, run.around(place, row)) != {False}
+
+
 def judged(run: Looking, place: Place, k: int, row: int, how: str) -> Finding | None:
     """Say whether the error could make another execution of a surface that the run is close to, or beyond."""
     value, shift, conditional = place.value(k), run.shift(place, k, row), has_condition(place, k)
-    if conditional and place.conditions(k, run.around(place, row)) == {False}:
+    if conditional and not may_hold(run, place, k, row):
         return None
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     if value > _level(run, place, k) and not conditional:

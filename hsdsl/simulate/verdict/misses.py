@@ -18,12 +18,12 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged
+from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold
 from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 from hsdsl.simulate.verdict.transparent import passed_at, transparent
 
-HALVINGS = 12
+HALVINGS = 20
 MOST_LOOKED_AT = 256  # turning points, one by one
 LOOKS = 9  # at one turning point
 
@@ -124,7 +124,12 @@ def _turned(run: Looking, arc: Arc, each: Open) -> Finding | None:
     try:
         places = [look(run.arithmetic.zero + s) for s in _shares(each)]
         place = max(places, key=lambda place: place.value(k))
-        return judged(run, place, k, each.row + 1, "turns back close to")
+        if has_condition(place, k) and not may_hold(run, place, k, each.row + 1):
+            return None
+        if finding := judged(run, place, k, each.row + 1, "turns back close to"):
+            return finding
+        sentence = f"whether {place.name(k)} is reached close to t = {show(place.t)} could not be decided"
+        return Finding("undecided", "unknown", sentence)
     except DOMAIN_ERRORS:
         time = show(run.times[each.row])
         return Finding("no value", "unknown", f"a surface of {arc.mode} has no value close to t = {time}")
