@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
+from hsdsl.backends.enclosures import ENCLOSED, Array, as_range, hull
 from hsdsl.backends.python import compile_routines
-from hsdsl.metrics.enclosures import ENCLOSED, Array, as_range, hull
 from hsdsl.program import Routines
 
 Boxes = Callable[[Array, Array], tuple[Array, Array]]

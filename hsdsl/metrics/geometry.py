@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.enclosures import Array
+from hsdsl.backends.enclosures import Array
 from hsdsl.metrics.formulas import Formula
 
 TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the numbers

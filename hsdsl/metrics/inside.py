@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.enclosures import Array
+from hsdsl.backends.enclosures import Array
 from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Space
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.enclosures import Array
+from hsdsl.backends.enclosures import Array
 from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.sides import to_side
