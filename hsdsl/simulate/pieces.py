@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 Found = list[tuple[int, Number, Number]]  # the number of the part, and two times in it
-UNDER_WAY = 64  # intervals for each change that the limit allows
+UNDER_WAY = 8  # intervals for each change that the limit allows
 NO_VALUE = 2.0**-10  # of the run: an interval without values at its ends and middle is taken to have none
 STILL = 2.0**-1000  # a slope below this is none
 
@@ -95,25 +95,30 @@ class _Enclosed:
         with np.errstate(all="ignore"):
             along, middle = Range(low, high), Range((low + high) / 2, (low + high) / 2)
             value, slope = self._at(along, owner)
-            at = [self._at(t, owner)[0] for t in (Range(low, low), middle, Range(high, high))]
-            mean = at[1] + slope * (along - middle)
+            centre = self._at(middle, owner)[0]
+            mean = centre + slope * (along - middle)
             meets = self._meets(Range(np.fmax(value.low, mean.low), np.fmin(value.high, mean.high)))
             meets &= ~_still(slope)
-            bounded = np.isfinite(value.low) & np.isfinite(value.high)  # no pole is inside
+            bounded = _bounded(value)  # no pole is inside
             one_way = meets & bounded & ((slope.low > 0) | (slope.high < 0))
-            nothing = [~(np.isfinite(v.low) & np.isfinite(v.high)) for v in at]
-            return meets, one_way, nothing[0] & nothing[1] & nothing[2]
+            nothing = ~bounded & ~_bounded(centre)
+            for end in (low, high):
+                nothing[nothing] = ~_bounded(self._at(Range(end[nothing], end[nothing]), owner[nothing])[0])
+            return meets, one_way, nothing
 
     def on_level(self, t: Array, owner: Array) -> tuple[Array, Array]:
         """Whether the argument may be on a level at times, and whether it has no slope there."""
         with np.errstate(all="ignore"):
             value, slope = self._at(Range(t, t), owner)
-            nothing = ~(np.isfinite(value.low) & np.isfinite(value.high))
-            return self._meets(value) & ~nothing, _still(slope)
+            return self._meets(value) & _bounded(value), _still(slope)
 
 
 def _still(slope: Range) -> Array:
     return (np.abs(slope.low) <= STILL) & (np.abs(slope.high) <= STILL)
+
+
+def _bounded(value: Range) -> Array:
+    return np.isfinite(value.low) & np.isfinite(value.high)
 
 
 def _spread(value: Range, count: int) -> Range:
