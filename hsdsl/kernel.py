@@ -6,9 +6,9 @@ the code generator's by exchanging one of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from hsdsl.arithmetic import Arithmetic, Number
 
@@ -73,8 +73,16 @@ class Kernel(Protocol):
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         ...
 
+    def switching(self, data: Sequence[Number]) -> Mapping[str, Routine]:
+        """Return the routines of ``Program.switching`` by name."""
+        ...
+
+    def enclosed_switching(self, data: Sequence[Any]) -> Mapping[str, Routine]:
+        """Return them over ranges of numbers (`backends.enclosures`), many at once."""
+        ...
+
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
-        """Bind a mode to ``data``: parameter values, then (a, b, c) of each sampled input's segment."""
+        """Bind a mode to ``data``: parameters, (a, b, c) of each sampled input's segment, numbers of switches."""
         ...
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:

@@ -2,7 +2,7 @@
 
 This is all that `simulate` knows of a model. Names of the file appear only as strings for people; the routines know
 states as ``x0, x1, ...``, parameters as ``p0, p1, ...`` and a sampled input i as the line
-``a_i + b_i (t - c_i)`` of the segment that time is in.
+``a_i + b_i (t - c_i)`` of the segment that time is in, and the number ``k_i`` of a switch, which is constant on it.
 
 A routine's text is a Python function body in which every constant that is not an integer exponent stands as a name
 ``q_N_D`` (the exact fraction N/D, ``q_mN_D`` when negative), so that each number type can put its own value there.
@@ -90,6 +90,20 @@ class SampledInput:
 
 
 @dataclass(frozen=True)
+class Switch:
+    """A function of time that changes its branch at times no state decides: the floor or the sign of something.
+
+    Where it ``jumps`` so does what it stands in; elsewhere that bends.
+    """
+
+    kind: Literal["floor", "sign"]
+    jumps: bool
+
+
+NOTHING = Routines((), "def bind():\n    return ()\n")
+
+
+@dataclass(frozen=True)
 class EdgeProgram:
     """An edge. ``conditional`` says whether it has an `if`; indices count modes in file order."""
 
@@ -159,6 +173,10 @@ class Program:
     and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions`` and ``sample_count`` or
     ``sample_times``.
 
+    ``switching`` has, for each of ``switches``, ``argument_i(t)``: what it is the floor or sign of, and the derivative
+    of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
+    of its slope. A switch depends on earlier ones only.
+
     ``left_out`` names the states of the file that are not here, since nothing that was asked for depends on them.
     """
 
@@ -177,3 +195,5 @@ class Program:
     method: str | None
     constants: Routines
     left_out: tuple[str, ...] = ()
+    switches: tuple[Switch, ...] = ()
+    switching: Routines = NOTHING

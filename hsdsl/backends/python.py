@@ -44,6 +44,7 @@ class PythonKernel:
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
         self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
 
@@ -57,6 +58,22 @@ class PythonKernel:
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         return self._constants[name](*parameters)
+
+    def switching(self, data: Sequence[Number]) -> dict[str, Routine]:
+        """Return the routines of ``Program.switching`` by name."""
+        return self._switching(self.arithmetic, data)
+
+    def enclosed_switching(self, data: Sequence[Any]) -> dict[str, Routine]:
+        """Return them over ranges of numbers."""
+        from hsdsl.enclosures import ENCLOSED  # only models with switches that are not linear pay for it
+
+        return self._switching(ENCLOSED, data)
+
+    def _switching(self, arithmetic: Arithmetic, data: Sequence[Any]) -> dict[str, Routine]:
+        routines = self._program.switching
+        if arithmetic.name not in self._switches:
+            self._switches[arithmetic.name] = compile_routines(routines, arithmetic, "switches")
+        return dict(zip(routines.names, self._switches[arithmetic.name](*data), strict=True))
 
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""

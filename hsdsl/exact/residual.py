@@ -30,10 +30,10 @@ def residual(program: Program, run: Execution) -> float:
     Raises
     ------
     ValueError
-        The model has no such mode, states or transition, or has sampled inputs.
+        The model has no such mode, states or transition, or has inputs that jump or bend.
     """
-    if program.inputs:
-        raise ValueError("a model with sampled inputs is not compared")
+    if program.inputs or program.switches:
+        raise ValueError("a model with inputs that jump or bend is not compared")
     check = _Check(program)
     flows = max((check.flow(run, arc) for arc in run.arcs if arc.kind == "flow"), default=0.0)
     return max(flows, *(check.jump(t) for t in run.transitions), 0.0)

@@ -19,6 +19,7 @@ from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.functions import absolute, maximum
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
 from hsdsl.lower.tape import make_tape
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
 
@@ -31,7 +32,7 @@ class Names:
 
     parameters: tuple[sp.Symbol, ...]
     data: tuple[sp.Symbol, ...]
-    shared: dict[sp.Symbol, sp.Expr]  # parameters and sampled inputs
+    shared: dict[sp.Symbol, sp.Expr]  # parameters, sampled inputs and switches
 
     def of_states(self, states: tuple[str, ...], letter: str = "x") -> tuple[sp.Symbol, ...]:
         """Number a mode's states."""
@@ -60,7 +61,8 @@ def lower(system: HybridSystem) -> lowered.Program:
 
 
 def _lower(system: HybridSystem) -> lowered.Program:
-    names = _number(system)
+    system, switches = with_switches(system)
+    names = _number(system, switches.symbols)
     experiment = system.experiment
     return lowered.Program(
         path=system.path,
@@ -77,6 +79,8 @@ def _lower(system: HybridSystem) -> lowered.Program:
         scheme=experiment.scheme,
         method=experiment.method,
         constants=print_routines(_constants(system, names), ()),
+        switches=switch_programs(switches),
+        switching=print_routines(switch_routines(switches, names.shared), names.data),
     )
 
 
@@ -93,7 +97,7 @@ def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
 
 
-def _number(system: HybridSystem) -> Names:
+def _number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
     parameters = tuple(_symbol(f"p{i}") for i in range(len(system.parameters)))
     shared: dict[sp.Symbol, sp.Expr] = dict(zip((_symbol(p.name) for p in system.parameters), parameters, strict=True))
     data = list(parameters)
@@ -101,6 +105,9 @@ def _number(system: HybridSystem) -> Names:
         start, slope, since = (_symbol(f"{letter}{i}") for letter in "abc")
         shared[_symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
         data += [start, slope, since]
+    numbers = tuple(_symbol(f"k{i}") for i in range(len(switches)))
+    shared.update(zip(switches, numbers, strict=True))
+    data += numbers
     return Names(parameters, tuple(data), shared)
 
 

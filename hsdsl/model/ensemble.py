@@ -29,7 +29,6 @@ from hsdsl.names import did_you_mean
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.ensemble import Instances, Kept
 from hsdsl.simulate.layouts import Layouts
-from hsdsl.simulate.timeline import make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
@@ -204,7 +203,7 @@ def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Pre
     start = initial_rows(columns, base.states, asked.initial, asked.arrays(initial=True))
     settings = settings_rows(columns, base.settings, request)
     places = [k for k in range(columns.count) if k not in columns.refused]
-    timeline = partial(make_timeline, model.program, values.kernel)
+    timeline = partial(model.parts.timeline, values)
     instances = Instances(
         settings=[settings[k] for k in places],
         timelines=[timeline(columns.rows[k], settings[k].until) for k in places],

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.arithmetic import Arithmetic
+from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
@@ -22,7 +22,7 @@ from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, prepare
-from hsdsl.simulate.timeline import make_timeline
+from hsdsl.simulate.timeline import Timeline, make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
@@ -154,11 +154,16 @@ class Parts:
             from hsdsl.model.mechanical import one_stop
 
             chosen = replace(chosen, one_stop=one_stop(values, x))
+        timeline = self.timeline(values, values.parameters, chosen.until)
         if request.automatic:
-            timeline = make_timeline(self.program, values.kernel, values.parameters, chosen.until)
             chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
         compiled = engines.choose(engine, chosen, precision, self._compile)
-        return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
+        return prepare(self.program, values.kernel, chosen, timeline, mode, states, x, compiled)
+
+    def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
+        """Return the inputs over time."""
+        with applied(self._limits):
+            return make_timeline(self.program, values.kernel, parameters, until)
 
     def prepare_single(self, asked: dict[str, Any]) -> Prepared:
         """Prepare a run in float64 from what a call asks, by name."""

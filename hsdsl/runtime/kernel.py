@@ -96,7 +96,8 @@ class CompiledModel:
     """
 
     def __init__(self, program: Program) -> None:
-        sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
+        data = len(program.parameters), len(program.inputs), len(program.switches)
+        sizes = *data, len(program.outputs), program.initial_states
         self._library = load(repr((sizes, program.modes)), lambda: _source(program), MODEL)
         self.table = tables.Model.in_dll(self._library, "hs_the_model")
         self._shared: dict[Hashable, Any] = {}
@@ -142,6 +143,14 @@ class CompiledKernel:
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
         return self._python.expressions(mode, data)
+
+    def switching(self, data: Sequence[Number]) -> dict[str, Routine]:
+        """Return the routines of ``Program.switching`` by name."""
+        return self._python.switching(data)
+
+    def enclosed_switching(self, data: Sequence[Any]) -> dict[str, Routine]:
+        """Return them over ranges of numbers."""
+        return self._python.enclosed_switching(data)
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""

@@ -21,6 +21,10 @@ MOST_PIECES = 1000  # before what is left is taken as it is, or it is refused
 Function = Callable[[Number], Number]
 
 
+class TooFast(ValueError):
+    """Functions vary too fast for one step."""
+
+
 @dataclass(frozen=True)
 class Piece:
     """A surface on the part [start, start + width] of a step, by powers of the share of that part.
@@ -132,8 +136,8 @@ def interpolated(
 
     Raises
     ------
-    ValueError
-        It ``may_refuse`` and the functions vary too fast: the first piece would be too short, or there are too many.
+    TooFast
+        It ``may_refuse``, and the first piece would be too short, or there are too many.
     """
     by, zero = interpolation(degree, arithmetic), arithmetic.zero
     nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
@@ -150,7 +154,7 @@ def interpolated(
             for k, (c, check, enough) in enumerate(zip(pieces, checks, off, strict=True))
         ]
         if may_refuse and not all(settled) and (len(found[0]) >= most or (start == 0 and halvings == MOST_FIRST)):
-            raise ValueError("too fast for one step")
+            raise TooFast("too fast for one step")
         if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < most:
             half = width / 2
             parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]

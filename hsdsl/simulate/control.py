@@ -5,6 +5,9 @@ step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/o
 above 1 after a rejection), order being the power of h that the estimate falls with. A step whose equations could not
 be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
 
+Where surfaces of a mode vary too fast along a step it is halved as well, and this length is kept: the next step in the
+mode, also of another stretch of flow, begins with it, or with twice the last one that they allowed.
+
 An implicit method pays for each change of the step. For one the factor is also held down by what the ratio did over
 the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and one from 0.9 to 1.2 counts as 1. A
 stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) (1 + |x|).
@@ -13,7 +16,7 @@ stretch of flow begins with a step in which no state moves by more than toleranc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators import RadauMethod
@@ -32,7 +35,8 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
-    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method.
+    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``reach`` has the
+    step that the surfaces of a mode allow, where they do not allow any; those of a mode in ``lost`` cannot be followed.
     """
 
     h: Number
@@ -44,6 +48,21 @@ class Control:
     before: tuple[Number, Number] | None = None
     accepted: int = 0
     rejected: int = 0
+    reach: dict[str, Number] = field(default_factory=dict[str, Number])
+    lost: set[str] = field(default_factory=set[str])
+
+    def within_reach(self, mode: str, h: Number) -> Number:
+        """Cut a step to what the surfaces of a mode allow."""
+        return min(h, self.reach.get(mode, h))
+
+    def too_fast(self, mode: str, tried: Number) -> None:
+        """Learn that surfaces vary too fast for a step."""
+        self.reach[mode] = tried / 2
+
+    def slow_enough(self, mode: str, taken: Number) -> None:
+        """Learn that they do not for another one."""
+        if taken >= self.reach.get(mode, 2 * taken):
+            self.reach[mode] = 2 * taken
 
     def ratio(self, error: State, x: State, z: State) -> Number:
         """Error ratio of a step; at most 1 is acceptable."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import Polynomial, State
+from hsdsl.simulate import notes
 from hsdsl.simulate.along import Piece, affine_curve, interpolated
 from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import at
 
-IN_A_STEP = 250  # pieces of a surface, at most
-LONG = 2**9  # in a run: steps that are made shorter where surfaces vary too fast along them
+IN_A_STEP = 64  # pieces of a surface, at most
+SHORTEST = 2**16  # in a run: steps that are still made shorter where surfaces vary too fast along them
+LOST_IN_A_STEP, LOST_SHORTEST = 16, 2**9  # the same in a mode whose surfaces even such steps cannot follow
 Curves = list[list[Piece]]
 
 
@@ -19,8 +21,10 @@ def curves_along(run: Run, here: Here, t: Number, h: Number, x: State, z: State,
 
     Raises
     ------
+    TooFast
+        A surface varies too fast for one step.
     ValueError
-        A surface varies too fast for one step, or has no value.
+        One has no value.
     """
     degree, share = along_steps(run.settings)
     if here.mode.affine:
@@ -33,8 +37,21 @@ def curves_along(run: Run, here: Here, t: Number, h: Number, x: State, z: State,
     def allowed(k: int) -> Number:
         return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
 
-    refuse = h * LONG > run.settings.until
-    return interpolated(values, count, degree, allowed, share, run.arithmetic, most=IN_A_STEP, may_refuse=refuse)
+    lost = here.mode.name in run.control.lost
+    most, shortest = (LOST_IN_A_STEP, LOST_SHORTEST) if lost else (IN_A_STEP, SHORTEST)
+    refuse = h * shortest > run.settings.until
+    curves = interpolated(values, count, degree, allowed, share, run.arithmetic, most=most, may_refuse=refuse)
+    if not refuse and curves and len(curves[0]) >= most:
+        _lose(run, here, t, curves)
+    return curves
+
+
+def _lose(run: Run, here: Here, t: Number, curves: Curves) -> None:
+    """Give up following a mode's surfaces: visits beyond them may be missed from here on."""
+    run.control.lost.add(here.mode.name)
+    for k, pieces in enumerate(curves):
+        if not all(piece.certain for piece in pieces):
+            notes.unsettled(run.recorder, here.mode.name, k, t)
 
 
 def _affine_curves(here: Here, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Execution, Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
@@ -24,7 +23,7 @@ from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted
-from hsdsl.simulate.timeline import Timeline, make_timeline
+from hsdsl.simulate.timeline import Timeline
 
 
 def _relaxed(run: Run, here: Here | Stop) -> Stop:
@@ -145,13 +144,12 @@ def prepare(
     program: Program,
     kernel: Kernel,
     settings: Settings,
-    parameters: Sequence[Number],
+    timeline: Timeline,
     mode: int,
     states: tuple[str, ...],
     x: State,
     compiled: CompiledModel | None = None,
 ) -> Prepared:
     """Prepare a run from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given."""
-    timeline = make_timeline(program, kernel, parameters, settings.until)
     plan = None if compiled is None else CompiledPlan(program, compiled, settings, timeline, mode, states, x)
     return Prepared(program, kernel, settings, timeline, mode, states, x, plan)

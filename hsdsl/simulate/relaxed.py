@@ -183,7 +183,11 @@ def go_on(run: Run, here: Here) -> Here | Stop:
     """Enter the next segment of the inputs: anew where one of them jumps."""
     t, x, mode, surfaces = here.t, here.x, run.program.modes.index(here.mode), here.surfaces
     if run.timeline.at(t).jump:
-        return enter(run, mode, here.mode.states, t, x, surfaces.scale)
+        try:
+            inside = surfaces.inside(t, x)
+        except DOMAIN_ERRORS:
+            return not_finite(run, here, t, (x,))
+        return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside)
     return run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
 
 

@@ -16,7 +16,7 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
-from hsdsl.simulate.along import Piece, settles, without_zeros
+from hsdsl.simulate.along import Piece, TooFast, settles, without_zeros
 from hsdsl.simulate.curves import Curves, curves_along
 from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE
 from hsdsl.simulate.isolate import value
@@ -25,6 +25,7 @@ from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
+TOO_FAST = Obstacle("not finite")  # a surface, for one step
 BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
@@ -92,7 +93,8 @@ class TableSteps:
             return NOT_FINITE
         if self.slope is None:
             control.begin(x, slope)
-        h = control.h
+        mode = self.here.mode.name
+        h = control.within_reach(mode, control.h)
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
@@ -100,12 +102,15 @@ class TableSteps:
                 ratio, span = tried
                 if control.tolerance is not None and halvings == 0:
                     control.accept(h, ratio)
+                control.slow_enough(mode, h)
                 self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
                 return span if self._creeping <= MOST_CREEPING else Obstacle("creeping")
             if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
                 control.reject(h, None if tried is UNSOLVED else self._ratio)
-                h = control.h
+                h = control.within_reach(mode, control.h)
             else:
+                if tried is TOO_FAST:
+                    control.too_fast(mode, h)
                 h, halvings = h / 2, halvings + 1
             if halvings > most_halvings(self.run) or not t + h > t or control.struggles:
                 return tried
@@ -131,6 +136,8 @@ class TableSteps:
                 curves = self._blurred(curves, t1, z, method.error(h, stages, end), ends)
         except NoConvergence:
             return UNSOLVED
+        except TooFast:
+            return TOO_FAST
         except DOMAIN_ERRORS:
             return NOT_FINITE
         self.slope, self.at_time = end, t1
@@ -178,20 +185,23 @@ class SeriesSteps:
 
     def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
         """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
-        run, order = self.run, self.method.order
+        run, order, mode = self.run, self.method.order, self.here.mode.name
         try:
             lines = self.series.flow(order, t, x)
         except DOMAIN_ERRORS:
             return NOT_FINITE
         stages = tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
-        h = self._longest(stages, x)
+        h = run.control.within_reach(mode, self._longest(stages, x))
         for _ in range(most_halvings(run)):
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             if not t1 > t:
                 break
             tried = self._try(t, h, t1, x, stages, lines)
             if isinstance(tried, Span):
+                run.control.slow_enough(mode, h)
                 return tried
+            if tried is TOO_FAST:
+                run.control.too_fast(mode, h)
             h = h / 2
         return NOT_FINITE
 
@@ -222,6 +232,8 @@ class SeriesSteps:
                 return TOO_WRONG
             ends = here.kernel.surfaces(t1, *z)
             curves = self._curves(t, h, t1, x, z, piece, lines, ends)
+        except TooFast:
+            return TOO_FAST
         except DOMAIN_ERRORS:
             return NOT_FINITE
 

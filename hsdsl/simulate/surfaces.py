@@ -99,13 +99,13 @@ def shortened(piece: Polynomial, theta: Number) -> Polynomial:
     return tuple(parts)
 
 
-def roundoff(unit: Number, magnitude: Number, gradient: Vector, x: State, scale: State) -> Number:
-    """Below this a surface value counts as zero: 32 u (|L| + |R| + sum |dr/dx_i| |x_i|).
+def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: State, scale: State) -> Number:
+    """Below this a surface value counts as zero: 32 u (|L| + |R| + |dr/dt| |t| + sum |dr/dx_i| |x_i|).
 
     ``scale`` holds the sizes of the numbers a state was computed from (see `Here.scale`): a state that a reset or a
     cancellation made small carries the round-off of what made it.
     """
-    total = magnitude
+    total = magnitude + abs(gradient[0]) * abs(t)
     for g, a, s in zip(gradient[1:], x, scale, strict=True):
         total = total + abs(g) * max(abs(a), s)
     return ROUNDOFF_UNITS * unit * total
@@ -135,23 +135,30 @@ class Surfaces:
         except DOMAIN_ERRORS:
             return ROUNDOFF_UNITS * unit * magnitude
         scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
-        return roundoff(unit, magnitude, gradient, x, scale)
+        return roundoff(unit, magnitude, gradient, t, x, scale)
 
-    def enter(self, t: Number, x: State, values: Vector, since: Number = 0) -> list[int]:
+    def enter(
+        self, t: Number, x: State, values: Vector, since: Number = 0, inside: frozenset[int] = frozenset()
+    ) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.
 
-        A surface that the flow passes within the time ``since`` counts as stood on.
+        A surface that the flow passes within the time ``since`` counts as stood on; on one ``inside`` as beyond.
         """
         beyond: list[int] = []
         for k, r in enumerate(values):
             noise = self.noise(k, t, x, entry=True)
             if since and abs(r) > noise:
                 noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
-            if r > noise:
+            if r > noise or (k in inside and r >= -noise):
                 beyond.append(k)
             elif r >= -noise:
                 self.stood_on.add(k)
         return beyond
+
+    def inside(self, t: Number, x: State) -> frozenset[int]:
+        """Edges without an `if` whose surfaces the state has not reached."""
+        values, plain = self.kernel.surfaces(t, *x), [k for k, edge in enumerate(self.edges) if not edge.conditional]
+        return frozenset(k for k in plain if values[k] < -self.noise(k, t, x))
 
     def leave(self, t: Number, x: State) -> None:
         """Forget the surfaces that the state stood on and has left inwards."""

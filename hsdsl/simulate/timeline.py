@@ -1,7 +1,7 @@
-"""Sampled inputs over time: the segments between their samples, each a boundary no step may cross.
+"""Inputs over time: the segments between samples and between switches of time, each a boundary no step may cross.
 
-On a segment an input is a line ``a + b (t - c)``, so every stage of a step sees the values of the step's own open
-interval, and the stage at its right end takes the left limit.
+On a segment a sampled input is a line ``a + b (t - c)`` and a switch a number, so every stage of a step sees the values
+of the step's own open interval, and the stage at its right end takes the left limit.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.errors import UsageError
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program, SampledInput
+from hsdsl.simulate.surfaces import TIE
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,12 @@ class Timeline:
 
 
 def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number], until: Number) -> Timeline:
-    """Cut time at every sample of every sampled input.
+    """Cut time at every sample of every sampled input, and where a switch changes.
 
     Raises
     ------
     UsageError
-        An input's sample times do not increase, or a sample is not finite.
+        An input's sample times do not increase, a sample is not finite, or a switch changes too often.
     """
     samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
     zero = kernel.arithmetic.zero
@@ -57,10 +58,28 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
             _line(given, times, values, start) for given, (times, values) in zip(program.inputs, samples, strict=True)
         ]
         held = tuple(a for given, (a, _, _) in zip(program.inputs, lines, strict=True) if given.hold == "zero")
-        data = (*parameters, *(number for line in lines for number in line))
+        data = (*parameters, *(number for line in lines for number in line), *(zero for _ in program.switches))
         segments.append(Segment(start, end, data, jump=bool(segments) and held != held_before))
         held_before = held
-    return Timeline(tuple(segments))
+    return Timeline(_switched(program, kernel, segments) if program.switches else tuple(segments))
+
+
+def _switched(program: Program, kernel: Kernel, segments: list[Segment]) -> tuple[Segment, ...]:
+    """Cut segments where a switch changes, each with the switches before it known."""
+    from hsdsl.simulate.switches import Changes, same  # only models with switches pay for it
+
+    tie, first = TIE * segments[-1].end, len(segments[0].data) - len(program.switches)
+    for place, switch in enumerate(program.switches, first):
+        found, before = list[Segment](), None
+        jumps = {segment.start: segment.jump for segment in segments}
+        for piece in Changes(kernel, switch, place - first, tie).pieces(segments):
+            changed = before is not None and not same(piece.number, before)
+            data = (*piece.part.data[:place], piece.number, *piece.part.data[place + 1 :])
+            jump = jumps.get(piece.start, False) or (switch.jumps and changed)
+            found.append(Segment(piece.start, piece.end, data, jump))
+            before = piece.number
+        segments = found
+    return tuple(segments)
 
 
 def _samples(

@@ -46,8 +46,8 @@ def test_fifty_digits_are_fifty_digits():
 
 def test_roundoff_is_32_units_of_the_parts():
     u = 2.0**-53
-    assert roundoff(u, 28.0, (0.0, 1.0, -3.0), (14.0, 2.0), (0.0, 0.0)) == 32 * u * (28 + 14 + 6)
-    assert roundoff(u, 0.0, (0.0, 1.0), (1e-18,), (2.0,)) == 32 * u * 2
+    assert roundoff(u, 28.0, (0.0, 1.0, -3.0), 5.0, (14.0, 2.0), (0.0, 0.0)) == 32 * u * (28 + 14 + 6)
+    assert roundoff(u, 0.0, (0.0, 1.0), 5.0, (1e-18,), (2.0,)) == 32 * u * 2
 
 
 def test_shortened_pieces_are_the_same_curve():

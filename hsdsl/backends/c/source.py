@@ -76,6 +76,7 @@ class _Writer:
     def __init__(self, program: Program) -> None:
         names = [f"p{i}" for i in range(len(program.parameters))]
         names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
+        names += [f"k{i}" for i in range(len(program.switches))]
         self.data = {name: f"p[{i}]" for i, name in enumerate(names)}
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []

@@ -167,7 +167,7 @@ static void straighten(hs_run *run, int degree) {
 
 /* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
    `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. It may refuse what varies too
-   fast: the step is to be shorter. */
+   fast: run->refused says so, and the step is to be shorter. */
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
                         hs_allowed *allowed, int far, int most, int may_refuse) {
   struct {
@@ -183,7 +183,8 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     const int halvings = parts[open].halvings;
     curves->start[curves->parts] = start, curves->width[curves->parts] = width;
     if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
-    if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST))) return RAISED;
+    if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST)))
+      return run->refused = 1, RAISED;
     if (!settled && halvings < MOST_SPLITS && curves->parts < most) {
       const double half = width / 2;
       parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;

@@ -60,6 +60,21 @@ static void reject(hs_control *control, double taken, double ratio) {
   control->h = ratio != ratio ? taken / 2 : taken * hs_min(1.0, factor(control, ratio));
 }
 
+/* Cut a step to what the surfaces of the mode allow. */
+static double within_reach(const hs_run *run, double h) {
+  const double reach = run->reach[run->here.mode];
+  return reach > 0 ? hs_min(h, reach) : h;
+}
+
+/* Learn that surfaces vary too fast for a step. */
+static void too_fast(hs_run *run, double tried) { run->reach[run->here.mode] = tried / 2; }
+
+/* Learn that they do not for another one. */
+static void slow_enough(hs_run *run, double taken) {
+  double *const reach = &run->reach[run->here.mode];
+  if (*reach > 0 && taken >= *reach) *reach = 2 * taken;
+}
+
 static int struggles(const hs_control *control) {
   return control->rejected > MOST_REJECTIONS && 4 * control->rejected > control->accepted;
 }

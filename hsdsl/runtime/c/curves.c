@@ -1,8 +1,10 @@
 /* All surfaces of a mode along one step, by the interpolant of its states: exactly where they are affine.
    See hsdsl/simulate/curves.py. */
 
-#define LONG 512.0
-#define IN_A_STEP 250
+#define IN_A_STEP 64
+#define SHORTEST 0x1p16
+#define LOST_IN_A_STEP 16
+#define LOST_SHORTEST 0x1p9
 
 /* The surfaces at the share s of the step, by its interpolant. */
 static int surfaces_along(hs_run *run, double s, double *values) {
@@ -39,10 +41,24 @@ static int affine_curves(hs_run *run, double share) {
   return 0;
 }
 
+/* Give up following a mode's surfaces: visits beyond them may be missed from here on. */
+static void lose(hs_run *run) {
+  const hs_curves *curves = &run->curves;
+  run->lost[run->here.mode] = 1;
+  for (int k = 0; k < curves->count; k++) {
+    int certain = 1;
+    for (int part = 0; part < curves->parts; part++) certain &= curves->certain[part * curves->count + k];
+    if (!certain) doubt(run, k, run->span.t);
+  }
+}
+
 /* All surfaces along the step's interpolant. */
 static int curves_along(hs_run *run) {
   const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
   if (run->here.table->affine) return affine_curves(run, by->share);
-  const int long_enough = run->span.h * LONG > run->until;
-  return interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, IN_A_STEP, long_enough);
+  const int lost = run->lost[run->here.mode], most = lost ? LOST_IN_A_STEP : IN_A_STEP;
+  const int refuse = run->span.h * (lost ? LOST_SHORTEST : SHORTEST) > run->until;
+  if (interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, most, refuse)) return RAISED;
+  if (!refuse && run->curves.parts >= most) lose(run);
+  return 0;
 }

@@ -156,6 +156,9 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   }
   run->doubted = take(store, (int64_t)run->model->modes * m, sizeof(int));
   for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->doubted[i] = 0;
+  run->reach = numbers(store, run->model->modes);
+  run->lost = take(store, run->model->modes, sizeof(int));
+  for (int i = 0; store->numbers && i < run->model->modes; i++) run->reach[i] = 0.0, run->lost[i] = 0;
   run->curves.room = most + 1;
   run->curves.start = numbers(store, MOST_PARTS);
   run->curves.width = numbers(store, MOST_PARTS);
@@ -202,7 +205,7 @@ void hs_simulate(hs_task *task) {
   run.polled = clock();
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
-  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0);
+  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0);
   if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else

@@ -253,7 +253,7 @@ static int jump(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since);
+  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0);
   return entered == GOES_ON ? close_tail(run, k) : entered;
 }
 

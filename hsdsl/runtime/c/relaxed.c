@@ -195,7 +195,7 @@ static int through_strip(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  return enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0);
+  return enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0);
 }
 
 /* Enter the next segment of the inputs: anew where one of them jumps. */
@@ -203,7 +203,10 @@ static int go_on(hs_run *run) {
   const double t = run->here.t;
   const int standing_before = run->here.standing;
   const int64_t segment = segment_at(run->task->timeline, t);
-  if (run->task->timeline->jump[segment]) return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0);
+  if (run->task->timeline->jump[segment]) {
+    if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
+    return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1);
+  }
   place(run, run->here.mode, run->here.dimension, t, 0);
   run->here.standing = standing_before;
   return GOES_ON;

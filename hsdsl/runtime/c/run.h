@@ -162,6 +162,8 @@ typedef struct {
   int has_middle;
   int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
+  double *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
+  int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
   hs_made made[FREE];
 } hs_run;
 

@@ -113,22 +113,25 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
   if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
   if (!run->sloped) begin_steps(run);
   run->sloped = 1;
-  double h = control->h, t1;
+  double h = within_reach(run, control->h), t1;
   for (;;) {
     if (h < (limit - t) * ALMOST)
       t1 = t + h;
     else
       h = limit - t, t1 = limit;
+    run->refused = 0;
     const hs_obstacle tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
+      slow_enough(run, h);
       run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
       return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
     }
     if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
       reject(control, h, tried == HS_UNSOLVED ? NAN : run->ratio);
-      h = control->h;
+      h = within_reach(run, control->h);
     } else {
+      if (run->refused) too_fast(run, h);
       h = h / 2, halvings++;
     }
     if (halvings > MOST_HALVINGS || !(t + h > t) || struggles(control)) return tried;
@@ -244,14 +247,16 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
 HS_INLINE hs_obstacle next_series(hs_run *run, const int n, double limit) {
   const double t = run->here.t;
   if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
-  double h = longest(run, n), t1;
+  double h = within_reach(run, longest(run, n)), t1;
   for (int i = 0; i < MOST_HALVINGS; i++) {
     if (h < (limit - t) * ALMOST)
       t1 = t + h;
     else
       h = limit - t, t1 = limit;
     if (!(t1 > t)) break;
-    if (try_series(run, n, h, t1) == HS_CLEAR) return HS_CLEAR;
+    run->refused = 0;
+    if (try_series(run, n, h, t1) == HS_CLEAR) return slow_enough(run, h), HS_CLEAR;
+    if (run->refused) too_fast(run, h);
     h = h / 2;
   }
   return HS_NOT_FINITE;

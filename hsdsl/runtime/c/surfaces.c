@@ -71,6 +71,7 @@ static int noise_of(hs_run *run, int k, double t, const double *x, int entry, do
   double total = run->magnitudes[k];
   double *const g = run->gradient;
   if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
+    total = total + fabs(g[0]) * fabs(t);
     const int scaled = entry || run->stood_on[k];
     for (int s = 0; s < n; s++) total = total + fabs(g[s + 1]) * hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0);
   }
@@ -79,20 +80,36 @@ static int noise_of(hs_run *run, int k, double t, const double *x, int entry, do
 }
 
 /* Look at the surfaces on entry: mark in `beyond` those the state is beyond, and note those it stands on.
-   A surface that the flow passes within the time `since` counts as stood on. */
-static int enter_surfaces(hs_run *run, double t, const double *values, double since, int *beyond) {
+   A surface that the flow passes within the time `since` counts as stood on; where an input `jumped`, one that `beyond`
+   marks as not reached before counts as beyond. */
+static int enter_surfaces(hs_run *run, double t, const double *values, double since, int jumped, int *beyond) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double noise, rate;
+    const int inside = jumped && beyond[k];
     run->stood_on[k] = beyond[k] = 0;
     if (noise_of(run, k, t, run->x, 1, &noise)) return RAISED;
     if (since != 0 && fabs(values[k]) > noise) {
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
     }
-    if (values[k] > noise)
+    if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
     else if (values[k] >= -noise)
       run->stood_on[k] = 1, run->here.standing++;
+  }
+  return 0;
+}
+
+/* Mark the edges without an `if` whose surfaces the state has not reached. */
+static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
+  const hs_mode *mode = run->here.table;
+  if (mode->values(run->here.p, t, x, run->values)) return RAISED;
+  for (int k = 0; k < mode->surfaces; k++) {
+    double noise;
+    inside[k] = 0;
+    if (k >= mode->edges || mode->edge[k].conditional) continue;
+    if (noise_of(run, k, t, x, 0, &noise)) return RAISED;
+    inside[k] = run->values[k] < -noise;
   }
   return 0;
 }

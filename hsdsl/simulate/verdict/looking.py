@@ -224,3 +224,8 @@ def visited(run: Looking) -> list[ModeProgram]:
     """The modes that a run flowed in."""
     names = {arc.mode for arc in run.flows}
     return [mode for mode in run.run.program.modes if mode.name in names]
+
+
+def jumping(mode: ModeProgram) -> bool:
+    """Whether a mode's flow may jump, but for switches of time alone: those are boundaries of steps."""
+    return jumps(mode.routines.source.partition("def flow(")[2].partition("    def ")[0])

@@ -1,0 +1,143 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportCallIssue=false
+"""Switches of time: what jumps or bends at times that no state decides, as numbers that stay the same between them.
+
+`floor`, `sign`, `abs`, `min`, `max` and `atan2` of time, parameters and inputs alone change their branch at times that
+are known before a run. Each gets a number k_i that is constant between these times, its floor or its sign, and is
+written with it as a smooth function: |u| is k u, and max(a, b) is the one of both that k names. A run then has a step
+boundary at each of the times, and an expression on either side of it has derivatives up to the boundary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.functions import absolute, floor, maximum, minimum, rebuilt, sign
+from hsdsl.lower.routines import Definition
+from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.program import Switch
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
+
+_HALF = sp.Rational(1, 2)
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+@dataclass
+class Switches:
+    """The switches of a system, in an order in which each depends on earlier ones only.
+
+    Attributes
+    ----------
+    arguments : dict
+        What each switch is the floor or the sign of: expressions over the file's names and the symbols of switches.
+    jumping : set of sympy.Symbol
+        The switches whose change is a jump of what they stand in; at the others it bends.
+    """
+
+    moving: frozenset[sp.Symbol]  # time, and inputs that move between their samples
+    known: frozenset[sp.Symbol]  # parameters and inputs
+    arguments: dict[tuple[str, sp.Expr], sp.Symbol] = field(default_factory=dict)
+    jumping: set[sp.Symbol] = field(default_factory=set)
+    _done: dict[sp.Basic, sp.Basic] = field(default_factory=dict)
+
+    @property
+    def symbols(self) -> tuple[sp.Symbol, ...]:
+        """What stands for the numbers in expressions."""
+        return tuple(self.arguments.values())
+
+    def out_of(self, expr: Any) -> Any:
+        """Write an expression with switches."""
+        if expr is None or not expr.args:
+            return expr
+        if expr not in self._done:
+            args = tuple(map(self.out_of, expr.args))
+            new = expr if args == expr.args else rebuilt(expr, args)
+            branch = _BRANCHES.get(type(new))
+            self._done[expr] = branch(self, *new.args) if branch and self._of_time(new) else new
+        return self._done[expr]
+
+    def _of_time(self, expr: sp.Basic) -> bool:
+        found = expr.free_symbols
+        return bool(found & self.moving) and found <= self.moving | self.known | set(self.symbols)
+
+    def number(self, kind: str, argument: sp.Expr, jumps: bool = False) -> sp.Expr:
+        """The number of a switch: the floor or the sign of its argument."""
+        if not argument.free_symbols & self.moving:  # what moves has cancelled
+            return {"floor": floor, "sign": sign}[kind](argument)
+        symbol = self.arguments.setdefault((kind, argument), _symbol(f"switch {len(self.arguments)}"))
+        if jumps:
+            self.jumping.add(symbol)
+        return symbol
+
+    def between(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        """The larger of two."""
+        first = _HALF + _HALF * self.number("sign", a - b)
+        return first * a + (1 - first) * b
+
+    def angle(self, y: sp.Expr, x: sp.Expr) -> sp.Expr:
+        """The angle of (x, y): behind the origin that of the opposite point, and a half turn."""
+        side, behind = self.number("sign", y, jumps=True), self.number("sign", x, jumps=True)
+        return side * sp.pi * (_HALF - _HALF * behind) + sp.atan2(behind * y, behind * x)
+
+
+_BRANCHES: dict[type, Callable[..., sp.Expr]] = {
+    floor: lambda switches, u: switches.number("floor", u, jumps=True),
+    sign: lambda switches, u: switches.number("sign", u, jumps=True),
+    absolute: lambda switches, u: switches.number("sign", u) * u,
+    maximum: lambda switches, a, b: switches.between(a, b),
+    minimum: lambda switches, a, b: -switches.between(-a, -b),
+    sp.atan2: lambda switches, y, x: switches.angle(y, x),
+}
+
+
+def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
+    """Write a system's expressions with switches, and return these."""
+    inputs = {_symbol(i.name): i.hold for i in system.inputs}
+    moving = frozenset({TIME, *(symbol for symbol, hold in inputs.items() if hold == "linear")})
+    found = Switches(moving, frozenset({*inputs, *(_symbol(p.name) for p in system.parameters)}))
+    modes = tuple(_mode(mode, found.out_of) for mode in system.modes)
+    return replace(system, modes=modes), found
+
+
+def _mode(mode: Mode, out_of: Callable[[Any], Any]) -> Mode:
+    return replace(
+        mode,
+        flow=tuple(map(out_of, map(sp.sympify, mode.flow))),
+        walls=tuple(_surface(wall, out_of) for wall in mode.walls),
+        edges=tuple(_edge(edge, out_of) for edge in mode.edges),
+        outputs=tuple(None if output is None else out_of(sp.sympify(output)) for output in mode.outputs),
+    )
+
+
+def _surface(surface: Surface, out_of: Callable[[Any], Any]) -> Surface:
+    left, right, residual = (out_of(sp.sympify(e)) for e in (surface.left, surface.right, surface.residual))
+    return replace(surface, left=left, right=right, residual=residual)
+
+
+def _edge(edge: Edge, out_of: Callable[[Any], Any]) -> Edge:
+    condition, reset = out_of(edge.condition), tuple(map(out_of, map(sp.sympify, edge.reset)))
+    return replace(edge, surface=_surface(edge.surface, out_of), condition=condition, reset=reset)
+
+
+def switch_programs(switches: Switches) -> tuple[Switch, ...]:
+    """What a simulator knows of the switches without numbers."""
+    return tuple(Switch(kind, symbol in switches.jumping) for (kind, _), symbol in switches.arguments.items())
+
+
+def switch_routines(switches: Switches, mapping: dict):
+    """The routines of `Program.switching`, over the symbols of generated code."""
+    done: dict[sp.Basic, sp.Basic] = {}
+    for i, (_, argument) in enumerate(switches.arguments):
+        placed = replaced(argument, mapping, done)
+        slope = Gradient((placed,), (TIME,))
+        yield Definition(f"argument_{i}", (TIME,), (placed, slope.rows[0][0]), slope.statements)
+        if not slope.statements and placed.is_polynomial(TIME) and not slope.rows[0][0].has(TIME):
+            over, under = sp.fraction(sp.together(slope.rows[0][0]))
+            yield Definition(f"line_{i}", (), (replaced(placed, {TIME: sp.S.Zero}, {}), over, under))
