@@ -19,6 +19,10 @@ A model is one YAML document. `schemas/model.schema.json` is this page for edito
 An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers, names, `+ - * / **`,
 parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
 
+`floor`, `sign`, `abs`, `min`, `max` and `atan2` of `t`, parameters and inputs alone switch at boundaries of steps,
+[each at its own time](../meaning.md#m9-inputs): `floor(t) - floor(t - 0.01)` is a pulse of 0.01 every second, and
+`sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where a state stands in them they are looked at within steps.
+
 ## Model
 
 """

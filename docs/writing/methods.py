@@ -22,8 +22,8 @@ embedded error estimate is adaptive and keeps a `tolerance`; any method takes fi
 
 TAYLOR = """The coefficients of the solution's own series come from recurrences, and inside a step the polynomial is the
 answer. With the tolerance e the order is 3 - log(e)/2, rounded up: 14 for 1e-9, 61 for 1e-50; a fixed step takes the
-order of round-off, 22 for float64. Flows must be smooth: with `abs`, `sign`, `min`, `max` or `floor` in one the method
-is refused, and a run stops where a flow has a value but no series (the square root of 0)."""
+order of round-off, 22 for float64. Flows must be smooth: with `abs`, `sign`, `min`, `max` or `floor` of a
+state in one the method is refused, and a run stops where a flow has a value but no series (the square root of 0)."""
 
 RADAU = """A step is implicit: its increments solve a system of equations, by Newton's method with the derivatives of
 the flow, which come from the model's expressions. Derivatives and factored matrices are kept from step to step as long

@@ -5,7 +5,7 @@ With a fixed step it is the table `dopri5`. With a tolerance it is
 ========= ============================================================================================
 `radau`   where the mode of the start, or one that its edges lead to, is stiff (below)
 `taylor`  where every flow is smooth
-`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor`, or no derivatives at the start
+`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor` of a state, or no derivatives at the start
 ========= ============================================================================================
 
 A mode is called stiff where both hold, near the start, once what decays fast has decayed:
@@ -79,7 +79,7 @@ def _chosen(
             return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
     for each in program.modes:
         if each.tape is None:
-            return METHODS[AUTO], f"the flow of {each.name} has abs, sign, min, max or floor"
+            return METHODS[AUTO], f"the flow of {each.name} has abs, sign, min, max or floor of a state"
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 

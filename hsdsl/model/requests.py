@@ -145,7 +145,8 @@ def check_smooth(method: Method | None, program: Program) -> None:
     for mode in program.modes:
         if mode.tape is None:
             raise UsageError(
-                f"method '{method.name}' needs smooth flows; that of mode {mode.name} has abs, sign, min, max or floor",
+                f"method '{method.name}' needs smooth flows; that of mode {mode.name} has abs, sign, min, max or floor "
+                "of a state",
                 f"use method '{AUTO}'",
             )
 

@@ -11,7 +11,8 @@
 `surfaces`          round-off, depth, and where a step crossed a surface
 `control`           the step size
 `patience`          when to stop trying shorter steps
-`timeline`          sampled inputs as segments no step crosses
+`timeline`          inputs as segments no step crosses
+`switches`          when floor, sign, abs, min and max of time change; `pieces` proves that they do not elsewhere
 `paoli_schatzman`   the rival: a two-step formula for one mass and one stop
 `run`               what stays for a whole run, and where it stands
 `recorder`          rows, arcs and transitions, and the execution's columns
