@@ -187,7 +187,7 @@ CODES: dict[str, str] = {
     "HS312": "a data file with wrong content",
     "HS313": "a unit for something that does not exist",
     "HS314": "a reference to something that does not exist",
-    "HS315": "a transition or a domain in a mode that has no states of its own",
+    "HS315": "a transition, a domain or an output in a mode that has no states of its own",
     "HS316": "two units for one name",
     "HS317": "a data file outside the model's folder",
     "HS320": "both a step and a tolerance",

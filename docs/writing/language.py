@@ -19,6 +19,10 @@ A model is one YAML document. `schemas/model.schema.json` is this page for edito
 An *expression* is a number or a text such as `u - 2*a*v - omega**2*x`: numbers, names, `+ - * / **`,
 parentheses and functions. An *inequality* has an expression on either side of one of `>= > <= <`.
 
+An *output* belongs to the modes in which all its names mean something. One of the whole model is read in each mode with
+that mode's own `let`; one of a mode goes before it. Elsewhere it has no value: not-a-number in arrays, an empty cell in
+tables, `null` in JSON. A final mode without `flow` has the outputs of the mode it is entered from.
+
 ## Model
 
 """
