@@ -157,3 +157,7 @@ def _check_target(path: Path | None, option: str, suffixes: tuple[str, ...]) -> 
         raise UsageError(f"{option} {path}: the name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}")
     if not path.parent.is_dir():
         raise UsageError(f"{option} {path}: there is no folder {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        from hsdsl.execution.samples import optional
+
+        optional("pyarrow", f"{option} {path}")

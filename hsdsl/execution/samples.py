@@ -142,5 +142,6 @@ def optional(library: str, what: str) -> Any:
     try:
         return import_module(library)
     except ImportError:
-        message = f"{what} needs {library}, which is not installed: pip install 'hsdsl[table]'"
+        package = library.partition(".")[0]
+        message = f"{what} needs {package}, which is not installed: pip install 'hsdsl[table]', or {package} alone"
         raise UsageError(message) from None

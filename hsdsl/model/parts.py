@@ -27,6 +27,8 @@ from hsdsl.simulate.timeline import make_timeline
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
+NO_FILE = "<text>"  # the path of a model that is in no file
+
 
 def parts_of(path: str | os.PathLike[str], limits: Limits | None) -> Parts:
     """Read a model file, or find what was kept of it."""
@@ -40,11 +42,19 @@ def parts_of(path: str | os.PathLike[str], limits: Limits | None) -> Parts:
     return Parts(system, time.perf_counter() - began, limits, key=key)
 
 
-def _elaborated(path: str | os.PathLike[str], limits: Limits | None) -> HybridSystem:
+def parts_of_text(text: str, folder: str | os.PathLike[str] | None, limits: Limits | None) -> Parts:
+    """Read the text of a model; nothing of it is kept."""
+    began = time.perf_counter()
+    path = NO_FILE if folder is None else Path(folder) / NO_FILE
+    system = _elaborated(path, limits, text.encode("utf-8", errors="surrogatepass"))
+    return Parts(system, time.perf_counter() - began, limits)
+
+
+def _elaborated(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> HybridSystem:
     from hsdsl.elaborate import elaborate
 
     with applied(limits):
-        return elaborate(path)
+        return elaborate(path, text=text)
 
 
 def _read(path: str | os.PathLike[str]) -> bytes | None:
