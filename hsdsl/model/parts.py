@@ -16,6 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, seen
+from hsdsl.model.overrides import recorded
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.settings import arithmetic_of, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
@@ -158,7 +159,7 @@ class Parts:
         request = self.resolve(settings, asked)
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
-        chosen = settings_of(request, values)
+        chosen = replace(settings_of(request, values), overrides=recorded(parameters, initial, request))
         mode, states, x = initial_state(values, initial)
         if request.method is None:
             from hsdsl.model.mechanical import one_stop

@@ -19,7 +19,7 @@ def html(execution: Execution, *, limit: int = 60) -> str:
         ("time", words.seconds(execution)),
     ]
     rows = "".join(f"<tr><th>{label}</th><td>{escape(text)}</td></tr>" for label, text in facts if text)
-    settings = escape(", ".join(words.settings(execution)))
+    settings = escape(", ".join((*words.settings(execution), *filter(None, (words.overrides(execution),)))))
     return (
         f'<div class="hsdsl"><p><strong>{escape(words.heading(execution))}</strong><br>{settings}</p>'
         f"<table>{rows}</table>{_transitions(execution, limit)}</div>"

@@ -33,6 +33,11 @@ def settings(execution: Execution) -> list[str]:
     return [*chosen, f"engine {execution.engine}"]
 
 
+def overrides(execution: Execution) -> str:
+    """Write which parameters and initial values are not those of the file; settings are told with the others."""
+    return values({n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")})
+
+
 def left_out(execution: Execution) -> str:
     """Say which states were not integrated, and why that cannot matter."""
     found = execution.settings["left_out"]
