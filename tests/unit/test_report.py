@@ -47,7 +47,8 @@ def test_json_has_the_keys_of_the_contract_in_order():
         "seconds": {"load": 0.25, "compile": 0.01, "simulate": 0.5},
     }
     assert list(run) == [
-        "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "verdict", "seconds",
+        "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "verdict",
+        "seconds",
     ]  # fmt: skip
     assert list(run["transitions"][0]) == [
         "index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives",
