@@ -33,6 +33,10 @@ A call or an option counts before `--set`, `--set` before the file, the file bef
 exclude each other: the stronger one removes the other, and a method that only the file names and that cannot
 serve gives way to `auto`.
 
+With `--precision` D the default tolerance of `taylor` is 10^(7 - D), which keeps all digits but seven. Methods of
+a fixed order keep 1e-9, since their steps would have to be shorter by orders of magnitude. The summary says how
+many digits a tolerance keeps where these are fewer.
+
 """
 
 SCALARS = {

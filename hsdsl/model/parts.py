@@ -18,7 +18,7 @@ from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, seen
 from hsdsl.model.overrides import recorded
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
-from hsdsl.model.settings import arithmetic_of, settings_of
+from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
@@ -168,6 +168,7 @@ class Parts:
         if request.automatic:
             timeline = make_timeline(self.program, values.kernel, values.parameters, chosen.until)
             chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
+        chosen = following_digits(chosen, request, values.kernel.arithmetic)
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return prepare(self.program, values.kernel, chosen, values.parameters, mode, states, x, compiled)
 
