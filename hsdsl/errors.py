@@ -65,13 +65,18 @@ class Diagnostic:
         if self.severity == "error" and self.code not in CODES:
             raise ValueError(f"unregistered diagnostic code {self.code}")
 
+    def __str__(self) -> str:
+        """``path:line:column: error HS012: sentence``."""
+        where = f"{self.span.path}:{self.span.line}:{self.span.column}: " if self.span else ""
+        return f"{where}{self.severity} {self.code}: {self.message}"
+
 
 class ModelError(Exception):
     """The model has errors (exit code 1). Carries every diagnostic found, in source order."""
 
     def __init__(self, diagnostics: list[Diagnostic] | tuple[Diagnostic, ...]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("\n".join(f"{d.code}: {d.message}" for d in self.diagnostics))
+        super().__init__("\n".join(f"{d}" + (f" ({d.hint})" if d.hint else "") for d in self.diagnostics))
 
 
 class UsageError(Exception):

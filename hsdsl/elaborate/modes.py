@@ -55,7 +55,7 @@ def mode_scope(world: World, name: Key, document: ModeDocument) -> Scope:
     place = f"the mode '{name}'"
     own: Values = {}
     refused: Values = {}
-    scope = Scope(ChainMap(refused, own, world.values), states, place)  # pyright: ignore[reportArgumentType]
+    scope = Scope(ChainMap(refused, own, world.values, world.elsewhere), states, place)  # pyright: ignore[reportArgumentType]
     for key in in_turn(document.let, "`let` names", refused):
         kind = world.names.get(key)
         if kind not in (None, "let"):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hsdsl.elaborate.world import World
-from hsdsl.expression.scope import Scope, Value, state
+from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.schema import Mode as ModeDocument
 from hsdsl.source import Key
 
@@ -52,7 +52,7 @@ def _here(world: World, name: str, value: Value | None, scope: Scope) -> Value |
     if value is None:
         return None
     inner = value.uses & world.inner_lets
-    if not all(name in scope.values for name in inner):
+    if any(isinstance(scope.values[name], Refusal) for name in inner):
         return None
     if inner:
         value = world.reader.number(world.document.outputs[name], replace(scope, states=None))  # pyright: ignore[reportArgumentType]

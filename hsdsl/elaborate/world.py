@@ -118,6 +118,12 @@ class World:
         """Every `let` name that some mode defines for itself."""
         return frozenset(str(key) for mode in self.document.modes.values() for key in mode.let)
 
+    @cached_property
+    def elsewhere(self) -> Values:
+        """Refusals of those names for modes that do not define them."""
+        hint = "give it to this mode too, or define it once in the `let` of the whole model"
+        return {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
+
     def without_states(self, mode: Mode) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""
         return mode.final and mode.flow is None

@@ -114,6 +114,14 @@ def test_outputs_of_modes_with_faults(mode, rest, expected):
     assert codes(HEAD + body + rest + TAIL) == expected
 
 
+def test_a_let_of_another_mode():
+    with pytest.raises(ModelError) as raised:
+        model("  B:\n    flow: {y: p}\n  C: {flow: {z: 1}, let: {p: z}}\n")
+    (fault,) = raised.value.diagnostics
+    assert fault.message == "'p' is a `let` name of other modes" and "`let` of the whole model" in str(fault.hint)
+    assert str(raised.value) == f"m.yaml:6:15: error HS111: {fault.message} ({fault.hint})"
+
+
 def test_a_misspelt_let_of_a_mode_in_an_output():
     with pytest.raises(ModelError) as raised:
         model("    let: {force: -x}\n", "outputs: {o: forse*v}\n")
