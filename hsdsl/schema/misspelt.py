@@ -14,7 +14,7 @@ from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
 
 _WORD = re.compile(r"[^\W\d]\w*")
 _FOR_PEOPLE = ("title", "source", "units")
-_SHARED = ("parameters", "inputs", "let")
+_OF_STATES = ("modes", "initial", "experiment", "outputs", "units", "reference", "flow", "transitions", "reset")
 
 
 def respell(root: Node, findings: Findings) -> None:
@@ -23,14 +23,14 @@ def respell(root: Node, findings: Findings) -> None:
     if not isinstance(root, Mapping) or not isinstance(modes, Mapping):
         return
     counts = Counter(word for key, part in root if key not in _FOR_PEOPLE for word in _words(part))
-    known = {*RESERVED, *(str(key) for section in _SHARED for key in _keys(under(root, section)))}
+    known = {*RESERVED, *_defined(root)}
     given = _given(root, modes)
     for name, mode in modes:
         flow = under(mode, "flow")
         alone = [key for key in _keys(flow) if counts[str(key)] == 1 and is_identifier(key)]
         if alone and isinstance(flow, Mapping):
             used = dict.fromkeys((*given.get(str(name), ()), *(word for part in _read(mode) for word in _words(part))))
-            here = known.union(map(str, (*_keys(flow), *_keys(under(mode, "let")))))
+            here = known.union(map(str, _keys(flow)), _defined(mode))
             unknown = [word for word in used if counts[word] > 1 and word not in here]
             _rename(flow, alone, unknown, str(name), findings)
 
@@ -47,6 +47,13 @@ def _rename(flow: Mapping, alone: list[Key], unknown: list[str], mode: str, find
         entries = {str(k): (k, value) for k, value in renamed}
         flow.entries.clear()
         flow.entries.update(entries)
+
+
+def _defined(node: Node) -> Iterator[str]:
+    """What the sections of a model or a mode define, whatever they are called there."""
+    for section, part in node if isinstance(node, Mapping) else ():
+        if section not in _OF_STATES:
+            yield from map(str, _keys(part))
 
 
 def _given(root: Mapping, modes: Mapping) -> dict[str, list[str]]:
