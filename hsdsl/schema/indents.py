@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hsdsl.errors import Findings
-from hsdsl.names import shown
+from hsdsl.names import closest, shown
 from hsdsl.schema.documents import SHAPES
 from hsdsl.schema.habits import under
 from hsdsl.schema.meant import named_elsewhere
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
 
+_OF_MAPPINGS = ("parameters", "inputs", "experiment")
+_REQUIRED = frozenset(("modes", "initial", "experiment", "when", "to"))
 _SECTIONS = ("parameters", "inputs", "let", "outputs", "units", "initial", "experiment", "flow", "reset")
 
 
@@ -56,13 +58,23 @@ def _below_empty(parent: Mapping, fields: frozenset[str], findings: Findings) ->
     for key, value in parent:
         if key in fields:
             section = str(key) if key in _SECTIONS and _empty(value) else ""
-        elif section and not named_elsewhere(key, fields):
+        elif section and _fits(section, value) and not _misnamed(key, parent, fields):
             below.setdefault(section, []).append(key)
     for section, keys in below.items():
         inner = Mapping({}, parent.entries[section][0].place)
         parent.entries[section] = (parent.entries[section][0], inner)
         message = f"`{shown(keys[0])}` stands beside `{section}`, and nothing stands under `{section}`"
         _moved(parent, keys, inner, message, f"under `{section}`", findings)
+
+
+def _fits(section: str, value: Node) -> bool:
+    return isinstance(value, Scalar) or section in _OF_MAPPINGS
+
+
+def _misnamed(key: str, parent: Mapping, fields: frozenset[str]) -> bool:
+    """Whether a key is rather a field of the mapping by another name: another tool's, or a required one misspelt."""
+    lacking = _REQUIRED & fields - set(parent.entries)
+    return named_elsewhere(key, fields) or closest(key, lacking) is not None
 
 
 def _among_modes(modes: Mapping, findings: Findings) -> None:

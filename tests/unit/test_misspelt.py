@@ -69,6 +69,13 @@ def test_a_mode_and_all_its_sections_too_far_left():
     assert (code, line, hint) == ("HS201", 5, "indent these lines, to stand in the mode 'm'")
 
 
+def test_a_key_misspelt_behind_an_empty_section():
+    text = MODEL.replace("{x: vel, vel: -c*x}", "").replace("    transitions", "    transition") + TAIL
+    assert (said(text)[0][0], said(text)[0][2]) == ("HS201", "did you mean 'transitions'?")
+    text = MODEL.replace("parameters: {c: 1}", "parameters:") + TAIL.replace("initial:", "initail:")
+    assert ("HS201", 7, "did you mean 'initial'?") in said(text)
+
+
 def test_a_section_that_is_there_twice_is_not_moved():
     found = said(MODEL + "  domain: [x >= 0]\n  transitions: []\n" + TAIL)
     assert found[0][1] >= 7 and all(code.startswith("HS2") for code, _, _ in found)
