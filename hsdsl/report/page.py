@@ -11,6 +11,7 @@ from hsdsl.report import words
 def html(execution: Execution, *, limit: int = 60) -> str:
     """Sum a run up in HTML (a ``div``), with at most ``limit`` transitions; every text of the model is escaped."""
     facts = [
+        ("with", words.overrides(execution)),
         ("stop", words.stop(execution)),
         ("final", words.final(execution.final)),
         ("state", words.values(execution.final.state)),
@@ -19,7 +20,7 @@ def html(execution: Execution, *, limit: int = 60) -> str:
         ("time", words.seconds(execution)),
     ]
     rows = "".join(f"<tr><th>{label}</th><td>{escape(text)}</td></tr>" for label, text in facts if text)
-    settings = escape(", ".join((*words.settings(execution), *filter(None, (words.overrides(execution),)))))
+    settings = escape(", ".join(words.settings(execution)))
     return (
         f'<div class="hsdsl"><p><strong>{escape(words.heading(execution))}</strong><br>{settings}</p>'
         f"<table>{rows}</table>{_transitions(execution, limit)}</div>"
