@@ -15,13 +15,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__version__", "distance", "load"]
+__all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__version__", "distance", "load", "loads"]
 
 if TYPE_CHECKING:
     from hsdsl.errors import ModelError, UsageError
     from hsdsl.execution import Execution
     from hsdsl.limits import Limits
-    from hsdsl.model import Model, load
+    from hsdsl.model import Model, load, loads
     from hsdsl.model.distances import distance
 
 _HOMES = {
@@ -32,6 +32,7 @@ _HOMES = {
     "UsageError": "hsdsl.errors",
     "distance": "hsdsl.model.distances",
     "load": "hsdsl.model",
+    "loads": "hsdsl.model",
 }
 
 

@@ -12,3 +12,9 @@ DEFAULTS: dict[str, Any] = {
     "max_transitions": 10**6,
 }
 DEFAULT_TOLERANCE = Fraction("1e-9")
+_FOR_ROUNDOFF = 7  # digits: of the 16 of float64 the default tolerance keeps 9
+
+
+def kept_digits(digits: int) -> int:
+    """How many of so many decimal digits the default tolerance of a method of any order keeps."""
+    return digits - _FOR_ROUNDOFF

@@ -65,13 +65,18 @@ class Diagnostic:
         if self.severity == "error" and self.code not in CODES:
             raise ValueError(f"unregistered diagnostic code {self.code}")
 
+    def __str__(self) -> str:
+        """``path:line:column: error HS012: sentence``."""
+        where = f"{self.span.path}:{self.span.line}:{self.span.column}: " if self.span else ""
+        return f"{where}{self.severity} {self.code}: {self.message}"
+
 
 class ModelError(Exception):
     """The model has errors (exit code 1). Carries every diagnostic found, in source order."""
 
     def __init__(self, diagnostics: list[Diagnostic] | tuple[Diagnostic, ...]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("\n".join(f"{d.code}: {d.message}" for d in self.diagnostics))
+        super().__init__("\n".join(f"{d}" + (f" ({d.hint})" if d.hint else "") for d in self.diagnostics))
 
 
 class UsageError(Exception):
@@ -80,6 +85,8 @@ class UsageError(Exception):
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
         self.hint = hint
+        if hint is not None:
+            self.add_note(f"hint: {hint}")
 
 
 MOST_DIAGNOSTICS = 500
@@ -187,7 +194,7 @@ CODES: dict[str, str] = {
     "HS312": "a data file with wrong content",
     "HS313": "a unit for something that does not exist",
     "HS314": "a reference to something that does not exist",
-    "HS315": "a transition or a domain in a mode that has no states of its own",
+    "HS315": "a transition, a domain or an output in a mode that has no states of its own",
     "HS316": "two units for one name",
     "HS317": "a data file outside the model's folder",
     "HS320": "both a step and a tolerance",

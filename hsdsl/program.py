@@ -128,7 +128,7 @@ class ModeProgram:
     flow           n derivatives
     surfaces       m values r
     magnitudes     m values |L| + |R|, the part of the round-off bound that r alone cannot show
-    outputs        k values, NaN where the mode lacks a state the output needs
+    outputs        k values, NaN where the mode does not define the output
     gradient_K     n + 1 slopes (dr/dt, dr/dx0, ...) of surface K
     rate_K         one value, L_f r = dr/dt + grad r . f of surface K
     condition_K_I  one boolean, part I of the `if` of edge K, which holds where all its parts do
@@ -187,7 +187,6 @@ class Program:
     inputs: tuple[SampledInput, ...]
     modes: tuple[ModeProgram, ...]
     outputs: tuple[str, ...]
-    output_texts: tuple[str, ...]
     units: dict[str, str]
     initial_mode: int
     initial_states: tuple[str, ...]

@@ -87,7 +87,7 @@ class Edge:
 class Mode:
     """A mode: states in file order, their flow, walls, outgoing edges in file order, and outputs.
 
-    ``outputs`` has one entry for each output of the system, None where the mode lacks a state it needs.
+    ``outputs`` has one entry for each output of the system, None where the mode does not define it.
     A final mode without flow has ``states == ()`` here: it has the states it is entered with.
     """
 
@@ -142,7 +142,6 @@ class HybridSystem:
     inputs: tuple[SampledInput, ...]
     modes: tuple[Mode, ...]
     outputs: tuple[str, ...]
-    output_texts: tuple[str, ...]
     units: dict[str, str]
     initial: Initial
     experiment: Experiment

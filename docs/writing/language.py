@@ -23,6 +23,10 @@ parentheses and functions. An *inequality* has an expression on either side of o
 [each at its own time](../meaning.md#m9-inputs): `floor(t) - floor(t - 0.01)` is a pulse of 0.01 every second, and
 `sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where a state stands in them they are looked at within steps.
 
+An *output* belongs to the modes in which all its names mean something. One of the whole model is read in each mode with
+that mode's own `let`; one of a mode goes before it. Elsewhere it has no value: not-a-number in arrays, an empty cell in
+tables, `null` in JSON. A final mode without `flow` has the outputs of the mode it is entered from.
+
 ## Model
 
 """
@@ -32,6 +36,10 @@ DEFAULTS_OF_EXPERIMENT = """## Defaults of `experiment`
 A call or an option counts before `--set`, `--set` before the file, the file before these. `step` and `tolerance`
 exclude each other: the stronger one removes the other, and a method that only the file names and that cannot
 serve gives way to `auto`.
+
+With `--precision` D the default tolerance of `taylor` is 10^(7 - D), which keeps all digits but seven. Methods of
+a fixed order keep 1e-9, since their steps would have to be shorter by orders of magnitude. The summary says how
+many digits a tolerance keeps where these are fewer.
 
 """
 

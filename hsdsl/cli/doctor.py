@@ -11,7 +11,7 @@ import click
 from click.exceptions import Exit
 
 NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "click", "matplotlib")
-OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
+OPTIONAL = {"pandas": "data frames", "pyarrow": "Parquet files"}
 
 
 @click.command()
@@ -77,7 +77,9 @@ def _text(found: dict[str, Any]) -> str:
         f"hsdsl {found['hsdsl']}, Python {found['python']} on {found['platform']}",
         *(f"  {name} {value or 'MISSING'}" for name, value in found["packages"].items()),
         *(
-            f"  {name} {value}" if value else f"  {name}: not installed, needed for {OPTIONAL[name]}"
+            f"  {name} {value}"
+            if value
+            else f"  {name}: not installed, needed for {OPTIONAL[name]}: pip install 'hsdsl[table]'"
             for name, value in found["optional"].items()
         ),
         f"engines: {', '.join(found['engines'])}",

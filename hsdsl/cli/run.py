@@ -37,7 +37,12 @@ OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".h
 @click.option("--tolerance", metavar="TOL", help="Bound on the local error relative to 1 + |x|; adaptive steps.")
 @click.option("--relaxation", metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
 @click.option("--engine", metavar="ENGINE", default="auto", help="auto, c or python.")
-@click.option("--precision", type=int, metavar="DIGITS", help="Compute with this many decimal digits (mpmath).")
+@click.option(
+    "--precision",
+    type=int,
+    metavar="DIGITS",
+    help="Compute with this many decimal digits (mpmath); the default tolerance of taylor follows.",
+)
 @click.option("--outputs", metavar="A,B", help="Only these states and outputs in files and final outputs.")
 @click.option("--estimate", is_flag=True, help="Run again, finer, and say how far apart the two runs are.")
 @click.option("--out", type=FILE, metavar="FILE", help="Save the execution: .csv, .parquet or .npz.")
@@ -157,3 +162,7 @@ def _check_target(path: Path | None, option: str, suffixes: tuple[str, ...]) -> 
         raise UsageError(f"{option} {path}: the name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}")
     if not path.parent.is_dir():
         raise UsageError(f"{option} {path}: there is no folder {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        from hsdsl.execution.samples import optional
+
+        optional("pyarrow", f"{option} {path}")

@@ -52,6 +52,7 @@ def as_json(run: Streamed) -> dict[str, Any]:
         "engine": run.engine,
         "scheme": run.scheme,
         "method": run.method,
+        "overrides": run.overrides,
         "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
         "transition_count": run.transitions,
         "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},

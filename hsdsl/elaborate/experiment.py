@@ -10,7 +10,7 @@ from hsdsl.elaborate.edges import known_mode
 from hsdsl.elaborate.world import World
 from hsdsl.errors import STEP_AND_TOLERANCE
 from hsdsl.expression.scope import Scope, Value
-from hsdsl.names import did_you_mean, shown
+from hsdsl.names import closest, did_you_mean, shown
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Experiment, Initial
 
@@ -34,19 +34,18 @@ def _check_states(world: World, mode: str, given: dict[Key, Scalar]) -> None:
     document = world.document.modes[mode]  # pyright: ignore[reportArgumentType]
     if document.flow is None:
         return  # entered with whatever is given, or reported
-    states = world.states[mode]
+    lacking = [s for s in world.states[mode] if s not in given]
     for key in given:
-        if key not in states:
+        if key not in world.states[mode]:
             message = f"the mode '{mode}' has no state '{shown(key)}'"
-            near = did_you_mean(key, [s for s in states if s not in given])
-            world.reader.add(key.place, "HS308", message, near or _without_flow(mode, key))
-    lacking = [f"'{s}'" for s in states if s not in given]
+            world.reader.add(key.place, "HS308", message, did_you_mean(key, lacking) or _without_flow(mode, key))
+            meant = closest(key, lacking)
+            lacking = [s for s in lacking if s != meant]
     if lacking:
-        noun = "state" if len(lacking) == 1 else "states"
-        message = f"the {noun} {', '.join(lacking)} of the mode '{mode}' has no initial value"
-        if len(lacking) > 1:
-            message = message.replace(" has no ", " have no ")
-        hint = "add " + ", ".join(f"{s}: ..." for s in states if s not in given)
+        noun, verb = ("state", "has") if len(lacking) == 1 else ("states", "have")
+        names = ", ".join(f"'{s}'" for s in lacking)
+        message = f"the {noun} {names} of the mode '{mode}' {verb} no initial value"
+        hint = "add " + ", ".join(f"{s}: ..." for s in lacking)
         world.reader.add(world.document.initial.mode.place, "HS308", message, hint)
 
 

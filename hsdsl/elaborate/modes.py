@@ -21,30 +21,30 @@ def elaborate_modes(world: World, outputs: dict[str, Value | None]) -> tuple[Mod
     return tuple(mode for mode in modes if mode is not None)
 
 
-def _mode(world: World, name: Key, document: ModeDocument, outputs: dict[str, Value | None]) -> Mode | None:
+def _mode(world: World, name: Key, document: ModeDocument, shared: dict[str, Value | None]) -> Mode | None:
     if document.flow is None and not document.final:
         message = f"the mode '{name}' has no `flow`"
         world.reader.add(name.place, "HS304", message, "write `flow: {}` for a mode without states, or `final: true`")
         return None
-    if world.without_states(document) and (document.transitions or document.domain):
-        message = f"the final mode '{name}' has no states of its own, and so neither a domain nor transitions"
+    if world.without_states(document) and (document.transitions or document.domain or document.outputs):
+        message = f"the final mode '{name}' has no states of its own, and so no domain, transitions or outputs"
         world.reader.add(name.place, "HS315", message, "give it a `flow`, or leave them out")
         return None
     scope = world.scopes[str(name)] = mode_scope(world, name, document)
     flow = all_of([world.reader.number(scalar, scope) for scalar in (document.flow or {}).values()])
     walls = all_of([surface(world.reader, scalar, scope, "domain") for scalar in document.domain])
     edges = all_of(elaborate_edges(world, name, document, scope))
+    outputs = outputs_of(world, shared, document, scope)
     if flow is None or walls is None or edges is None:
         return None
-    states = world.states[name]
     return Mode(
         name=str(name),
-        states=states,
+        states=world.states[name],
         flow=tuple(value.expr for value in flow),
         flow_texts=tuple(scalar.value for scalar in (document.flow or {}).values()),
         walls=tuple(walls),
         edges=tuple(edges),
-        outputs=outputs_of(outputs, frozenset(states)),
+        outputs=outputs,
         final=document.final,
     )
 
@@ -55,7 +55,7 @@ def mode_scope(world: World, name: Key, document: ModeDocument) -> Scope:
     place = f"the mode '{name}'"
     own: Values = {}
     refused: Values = {}
-    scope = Scope(ChainMap(refused, own, world.values), states, place)  # pyright: ignore[reportArgumentType]
+    scope = Scope(ChainMap(refused, own, world.values, world.elsewhere), states, place)  # pyright: ignore[reportArgumentType]
     for key in in_turn(document.let, "`let` names", refused):
         kind = world.names.get(key)
         if kind not in (None, "let"):

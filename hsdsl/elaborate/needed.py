@@ -31,7 +31,6 @@ def only(system: HybridSystem, asked: Iterable[str]) -> HybridSystem:
         system,
         modes=tuple(_mode(mode, needed, outputs, own) for mode in system.modes),
         outputs=tuple(system.outputs[k] for k in outputs),
-        output_texts=tuple(system.output_texts[k] for k in outputs),
         initial=replace(
             system.initial,
             values=tuple(v for v in system.initial.values if system.initial.mode not in own or v[0] in start),

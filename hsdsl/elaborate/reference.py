@@ -34,7 +34,7 @@ class _Checker:
     def __init__(self, world: World, modes: tuple[Mode, ...]) -> None:
         self.world = world
         self.scope: Scope = parameter_scope(world, "a reference has numbers or expressions of parameters")
-        self.columns = [*world.all_states(), *map(str, world.document.outputs)]
+        self.columns = [*world.all_states(), *world.all_outputs]
         self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
         self.complete = len(modes) == len(world.document.modes)
 

@@ -9,7 +9,7 @@ from hsdsl.schema import ParameterEntry
 
 def elaborate_units(world: World) -> dict[str, str]:
     """The unit of each name that has one."""
-    known = [name for name, kind in world.names.items() if kind != "let"] + [*world.document.outputs, "t"]
+    known = [name for name, kind in world.names.items() if kind != "let"] + [*world.all_outputs, "t"]
     found: dict[str, str] = {}
     for key, scalar in world.document.units.items():
         if key not in known:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from hsdsl.elaborate.reader import Reader
@@ -105,6 +106,23 @@ class World:
     def all_states(self) -> tuple[str, ...]:
         """Every state of every mode, once."""
         return tuple(name for name, kind in self.names.items() if kind == "states")
+
+    @cached_property
+    def all_outputs(self) -> tuple[str, ...]:
+        """Every output of the model, then every further one of a mode, once."""
+        inner = (key for mode in self.document.modes.values() for key in mode.outputs)
+        return tuple(dict.fromkeys(map(str, (*self.document.outputs, *inner))))
+
+    @cached_property
+    def inner_lets(self) -> frozenset[str]:
+        """Every `let` name that some mode defines for itself."""
+        return frozenset(str(key) for mode in self.document.modes.values() for key in mode.let)
+
+    @cached_property
+    def elsewhere(self) -> Values:
+        """Refusals of those names for modes that do not define them."""
+        hint = "give it to this mode too, or define it once in the `let` of the whole model"
+        return {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
 
     def without_states(self, mode: Mode) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""

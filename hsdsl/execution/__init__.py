@@ -12,7 +12,7 @@ The columns, with N rows, A arcs, W states in the largest mode and K outputs:
 ============== ============== ===============================================================================
 times          (N,)           time of the row, never decreasing
 values         (N, W)         states in the order of the arc's ``states``, NaN beyond them
-outputs        (N, K)         outputs, NaN where the mode lacks a state the output needs
+outputs        (N, K)         outputs, NaN where the mode does not define the output
 depth          (N,)           0 in flow arcs; how deep in the strip otherwise
 coefficients   (N, P, W)      the piece from row k to row k+1 of one flow arc is
                               x_k + sum_{m=1..P} c_m s^m, s in [0, 1]; unused in an arc's last row and in

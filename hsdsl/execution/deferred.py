@@ -33,6 +33,11 @@ class Deferred:
             value = self.__dict__[name] = make(self)
             return value
 
+    def __dir__(self) -> list[str]:
+        """List the public names: fields, whether made yet or not, and what can be asked."""
+        own = {field.name for field in fields(self)}  # pyright: ignore[reportArgumentType]
+        return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name != "deferred")
+
     def __getstate__(self) -> dict[str, Any]:
         """Give every field: what makes them does not travel."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]

@@ -32,6 +32,9 @@ class Execution(Deferred):
 
     Attributes
     ----------
+    overrides : dict
+        What the run was asked beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
+        ``experiment.until``), each value as it was written.
     output_function : callable or None
         ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only: between rows
         this function gives them from the state there (not-a-number where they have no value); without it (an
@@ -65,6 +68,7 @@ class Execution(Deferred):
     seconds: dict[str, float] = field(compare=False)
     digits: int | None = None  # decimal digits of the numbers, None for float64
     title: str | None = None
+    overrides: dict[str, Any] = field(default_factory=dict[str, Any])
     output_function: OutputFunction | None = field(default=None, compare=False)
     sampler: Sampler | None = field(default=None, compare=False)
     assessment: Assessment | None = field(default=None, compare=False)

@@ -31,7 +31,7 @@ class Samples(Deferred):
     states, outputs : tuple of str
         Names, in the order in which the execution first has them.
     state_columns, output_columns : array, shape (n, number of names)
-        Values, NaN where the mode lacks the state (or a state that the output needs).
+        Values, NaN where the mode lacks the state (or does not define the output).
     present : array of bool, shape (n, number of states)
         Whether the mode has the state, so that a state that *is* NaN can be told from one that is not there.
 
@@ -142,5 +142,6 @@ def optional(library: str, what: str) -> Any:
     try:
         return import_module(library)
     except ImportError:
-        message = f"{what} needs {library}, which is not installed: pip install 'hsdsl[table]'"
+        package = library.partition(".")[0]
+        message = f"{what} needs {package}, which is not installed: pip install 'hsdsl[table]', or {package} alone"
         raise UsageError(message) from None

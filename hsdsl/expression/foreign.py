@@ -151,7 +151,6 @@ NAMES = {
     "pre": _MEMORY,
     "delay": _MEMORY,
     "edge": _MEMORY,
-    "after": "write t >= 5 for a time; for the time since a mode was entered, a state with the flow 1 that resets to 0",
     "reinit": "a state is set by `reset` in a transition",
     "interp": _SAMPLES,
     "interp1": _SAMPLES,
@@ -216,6 +215,10 @@ SIGNS: tuple[tuple[str, str, str, str], ...] = (
     ("√", "HS101", "`√` is not a function of the language", "write `sqrt(x)`"),
 )
 
+_TIMED = {**dict.fromkeys(("after", "at", "wait"), ">="), "before": "<"}
+_COUNTED = ("elapsed", "temporalCount", "count", "timer")
+_REPEATED = ("every", "sample")
+
 _FAR = 100  # characters before a sign that are looked at
 _WORD_BEFORE = re.compile(r"([^\W\d]\w*)\s*$")
 _NUMBER_BEFORE = re.compile(r"([0-9]+\.?[0-9]*)\s*$")
@@ -254,6 +257,24 @@ def better(sign: str, text: str, at: int) -> str | None:
 def power_of(function: str) -> str:
     """The hint for ``sin**2(x)``."""
     return f"write {function}(...)**2 for a power of a function"
+
+
+def timed(function: str, time: str | None) -> str | None:
+    """The hint for ``after(2, sec)`` and the like: the time since a mode was entered is a state here."""
+    state = "a state with the flow 1 that the resets to this mode set to 0"
+    if function in _COUNTED:
+        return f"write clock, {state}"
+    if function in _REPEATED:
+        return f"write clock >= {time or 'T'}, where clock is a state with the flow 1 that the reset sets to 0"
+    if function not in _TIMED:
+        return None
+    limit = f"{_TIMED[function]} {time or 'T'}"
+    return f"write clock {limit}, where clock is {state}; from the start of the run, t {limit}"
+
+
+def unit(name: str) -> str | None:
+    """The hint for a name that is a unit's, and nothing else here."""
+    return "leave the unit out: units stand under `units`" if len(name) > 1 and name.lower() in _UNITS else None
 
 
 def side_by_side(number: str, name: str) -> str | None:

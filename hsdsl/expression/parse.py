@@ -6,7 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
-from hsdsl.expression.foreign import CASES, compared, power_of, side_by_side
+from hsdsl.expression.foreign import CASES, compared, power_of, side_by_side, timed
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import (
     Call,
@@ -240,6 +240,7 @@ def _joined(before: Token, token: Token, left: str, right: str) -> str:
     if before.kind == token.kind == "number":
         return "a number has one decimal point, and no blanks"
     known = side_by_side(left, right) if (before.kind, token.kind) == ("number", "name") else compared(left, right)
+    known = known or timed(left, right)
     return known or f"write {left}*{right} for a product"
 
 

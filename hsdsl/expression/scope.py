@@ -10,8 +10,8 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.expression.foreign import NAMES, derivative_of
-from hsdsl.expression.syntax import Call, ExpressionError, Name, Tree, walk
+from hsdsl.expression.foreign import NAMES, derivative_of, timed, unit
+from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Tree, walk
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import WORDS, closest, did_you_mean, shown
 
@@ -77,12 +77,16 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         found: list[ExpressionError] = []
+        end = 0
         for node in walk(tree):
+            if node.start < end:
+                continue
             fault = None
             if isinstance(node, Name):
                 fault = self._name(node)
             elif isinstance(node, Call):
                 fault = self._call(node)
+                end = node.end if fault and timed(node.function, None) else end  # its units mean nothing here
             if fault and fault.message not in [other.message for other in found]:
                 found.append(fault)
         return found
@@ -108,9 +112,11 @@ class Scope:
             return None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
         message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
+        hint = None
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
-        return ExpressionError("HS117", message, node.start, node.end)
+            hint = did_you_mean(node.name, sorted(self.states))
+        return ExpressionError("HS117", message, node.start, node.end, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:
         if node.function not in FUNCTIONS:
@@ -119,7 +125,14 @@ class Scope:
                 message, hint = f"'{shown(node.function)}' is not a function", _product_or_value(node)
             else:
                 message = f"there is no function '{shown(node.function)}'"
-                hint = NAMES.get(node.function) or _nearest(node.function) or "functions: " + " ".join(FUNCTIONS)
+                first = node.arguments[0] if node.arguments else None
+                time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
+                hint = (
+                    timed(node.function, time)
+                    or NAMES.get(node.function)
+                    or _nearest(node.function)
+                    or "functions: " + " ".join(FUNCTIONS)
+                )
             return ExpressionError("HS112", message, node.start, end, hint)
         _, fewest, most = FUNCTIONS[node.function]
         given = len(node.arguments)
@@ -132,9 +145,11 @@ class Scope:
         return ExpressionError("HS113", message, node.start, node.end, f"write {node.function}({arguments})")
 
     def _hint(self, name: str) -> str | None:
+        known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
+        if unit(name) and closest(name, known) is None:
+            return unit(name)
         if name in NAMES:
             return NAMES[name]
-        known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
         near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS])
         return near or "define it, under `parameters`, `inputs` or `let`"
 

@@ -33,11 +33,13 @@ class Names:
 
     def used(self, expression: Written) -> Iterator[Definition]:
         """What an expression names, but for `t`, `pi` and the like."""
-        own = self.own.get(expression.mode or "", {})
+        everywhere = expression.role == "output" and expression.mode is None  # it is read in every mode
+        inner = self.own.values() if everywhere else [self.own.get(expression.mode or "", {})]
         for name in expression.names:
-            found = own.get(name) or self.top.get(name)
-            if found is not None:
-                yield found
+            own = [table[name] for table in inner if name in table]
+            if name in self.top and (everywhere or not own):
+                own.append(self.top[name])
+            yield from own
 
 
 def unused(document: Model, expressions: Iterable[Written]) -> frozenset[Definition]:

@@ -22,7 +22,7 @@ Role = Literal[
     "when",  # the surface of a transition
     "if",  # its condition
     "reset",  # its new value of the state `name`
-    "output",  # the output `name`
+    "output",  # the output `name`, of `mode` or of the whole model
     "initial",  # the initial value of the state `name`
     "experiment",  # the setting `name`
     "reference",  # a number in `reference`
@@ -116,6 +116,8 @@ def _of_mode(name: str, mode: Mode) -> Iterator[Written]:
             yield Written("if", transition.condition, "", name, index)
         for key, scalar in transition.reset.items():
             yield Written("reset", scalar, key, name, index)
+    for key, scalar in mode.outputs.items():
+        yield Written("output", scalar, key, name)
 
 
 def _of_reference(reference: Reference) -> Iterator[Scalar | None]:

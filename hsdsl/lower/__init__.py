@@ -72,7 +72,6 @@ def _lower(system: HybridSystem) -> lowered.Program:
         inputs=tuple(_sampled(i) for i in system.inputs),
         modes=tuple(_mode(system, mode, names) for mode in system.modes),
         outputs=system.outputs,
-        output_texts=system.output_texts,
         units=system.units,
         initial_mode=[m.name for m in system.modes].index(system.initial.mode),
         initial_states=tuple(name for name, _ in system.initial.values),

@@ -1,7 +1,7 @@
 """A model: a YAML file turned into something that runs.
 
 ============= ===========================================================================================
-``model``     :func:`load` and :class:`Model`: what can be done with a model
+``model``     :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
 ``parts``     what it is made of, each part made once: the pipeline in one place
 ``seen``      programs of models read before, so that to run one again needs no SymPy
 ``requests``  what a run is asked, from four places: the file, ``--set``, options and a call
@@ -14,7 +14,7 @@
 ============= ===========================================================================================
 """
 
-from hsdsl.model.model import Model, load
+from hsdsl.model.model import Model, load, loads
 from hsdsl.model.overrides import split_overrides
 
-__all__ = ["Model", "load", "split_overrides"]
+__all__ = ["Model", "load", "loads", "split_overrides"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,8 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.table import Request, between, check_same_model
+from hsdsl.model.overrides import parameters_of
+from hsdsl.simulate.stops import show
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
@@ -59,8 +62,8 @@ def distance(
     model : Model or path, optional
         The model that the space is made of; left out, the file that the first run names.
     parameters : mapping, optional
-        Overrides the runs were made with. Runs do not record them, and the space is made of guards and resets at these
-        values: runs whose parameters differ are compared in the space of these.
+        Overrides by name, beyond those that the first run was made with: the space is made of guards and resets at
+        these values. Where the second run has others, the note says so.
     coordinates : names, optional
         For ``rho-hat``: the states that count as the position.
     seconds : float
@@ -79,22 +82,25 @@ def distance(
         Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
         since.
     """
-    source = _Source(run, model, parameters or {}, budget_of(seconds, watch))
+    source = _Source(run, other, model, parameters or {}, budget_of(seconds, watch))
     depth = None if relaxation is None else source.number(relaxation)
-    return between(metric, Request(run, other, source.space, depth, coordinates))
+    found = between(metric, Request(run, other, source.space, depth, coordinates))
+    return replace(found, note="\n".join(filter(None, (found.note, source.note))))
 
 
 class _Source:
-    """The model behind a run, read when it is first needed."""
+    """The model behind a run, read when it is first needed; ``note`` says where the other run has other parameters."""
 
     def __init__(
         self,
         run: Execution,
+        other: Execution,
         model: Model | str | os.PathLike[str] | None,
         parameters: Mapping[str, Any],
         budget: Budget,
     ) -> None:
-        self.run, self.model, self.parameters, self.budget = run, model, parameters, budget
+        self.run, self.other, self.model, self.parameters, self.budget = run, other, model, parameters, budget
+        self.note = ""
 
     @cached_property
     def values(self) -> Values:
@@ -108,7 +114,12 @@ class _Source:
                 f"{given.system.path} is not the model that the run is of, or was edited since",
                 "run it again, or give the model as it was",
             )
-        return with_parameters(given.parts.values(FLOAT64), self.parameters)
+        first, second = (parameters_of(run.overrides) | dict(self.parameters) for run in (self.run, self.other))
+        plain = given.parts.values(FLOAT64)
+        values = with_parameters(plain, first)
+        if first != second:
+            self.note = _differ(values, with_parameters(plain, second))
+        return values
 
     def number(self, relaxation: Any) -> float:
         number = float(self.values.number(relaxation, "relaxation") if isinstance(relaxation, str) else relaxation)
@@ -125,11 +136,22 @@ class _Source:
         return SpaceMetric(space, depth, self.budget)
 
 
+def _differ(first: Values, second: Values) -> str:
+    """Say which parameters two runs have different values of."""
+    pairs = zip(first.program.parameters, first.parameters, second.parameters, strict=True)
+    apart = [f"{name} = {show(one)} and {show(two)}" for name, one, two in pairs if one != two]
+    if not apart:
+        return ""
+    return f"The runs have different parameters ({', '.join(apart)}): guards and resets are those of the first."
+
+
 def _load(path: str | os.PathLike[str] | None, run: Execution) -> Model:
     from hsdsl.model import load
 
     if path is None and not os.path.exists(run.model):
-        raise UsageError(f"the run is of {run.model}, which is not there: the distance needs the model")
+        raise UsageError(
+            f"the run is of {run.model}, which is not there: the distance needs the model", "give it as model="
+        )
     return load(run.model if path is None else path)
 
 
@@ -156,7 +178,7 @@ def plot_distance(
     from hsdsl.plot.over_time import plot_over_time
 
     check_same_model(run, other)
-    source = _Source(run, model, parameters or {}, budget_of(seconds))
+    source = _Source(run, other, model, parameters or {}, budget_of(seconds))
     depth = None if relaxation is None else source.number(relaxation)
     found = profiles(run, other, source.space(depth), depth)
     words = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}

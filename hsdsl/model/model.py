@@ -11,7 +11,7 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
-from hsdsl.model.parts import Parts, parts_of
+from hsdsl.model.parts import Parts, parts_of, parts_of_text
 from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import Request
 from hsdsl.model.values import with_parameters
@@ -47,6 +47,26 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
         The file cannot be read.
     """
     return Model(parts_of(path, limits))
+
+
+def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
+    """Read a model from its text.
+
+    Parameters
+    ----------
+    text : str
+        What a model file would hold.
+    folder : path, optional
+        Where data files are that the model names; left out, the present folder.
+    limits : Limits, optional
+        As for :func:`load`.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; all of them are carried.
+    """
+    return Model(parts_of_text(text, folder, limits))
 
 
 class Model:

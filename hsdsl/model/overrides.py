@@ -1,10 +1,13 @@
-"""``--set NAME=VALUE``: what an override reaches."""
+"""``--set NAME=VALUE``: what an override reaches, and how a run records what it was asked."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
+from hsdsl import decimals
 from hsdsl.errors import UsageError
+from hsdsl.model.requests import DEFAULT, FILE, Request
 from hsdsl.names import did_you_mean
 
 
@@ -34,3 +37,27 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
             hint = did_you_mean(group, ("initial", "experiment"))
             raise UsageError(f"--set reaches NAME, initial.NAME and experiment.NAME, not '{name}'", hint)
     return parameters, initial, settings
+
+
+def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], request: Request) -> dict[str, Any]:
+    """Gather what a run is asked beyond its file, by the names of `--set`, each value as it was written."""
+    asked = {key: given.value for key, given in request.values.items() if given.place not in (FILE, DEFAULT)}
+    found = {**parameters, **_below("initial", initial), **_below("experiment", asked)}
+    return {name: _written(value) for name, value in found.items()}
+
+
+def _below(group: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"{group}.{name}": value for name, value in given.items()}
+
+
+def _written(value: Any) -> Any:
+    """A value as plain data: what has no such form, such as a fraction, becomes the text of an expression."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, (list, tuple)):
+        return [_written(item) for item in cast("Sequence[Any]", value)]
+    return value if isinstance(value, (str, int, float)) or decimals.is_multiprecision(value) else str(value)
+
+
+def parameters_of(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters among recorded overrides."""
+    return {name: value for name, value in overrides.items() if "." not in name}

@@ -16,8 +16,9 @@ from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, seen
+from hsdsl.model.overrides import recorded
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
-from hsdsl.model.settings import arithmetic_of, settings_of
+from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
@@ -26,6 +27,8 @@ from hsdsl.simulate.timeline import Timeline, make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
+
+NO_FILE = "<text>"  # the path of a model that is in no file
 
 
 def parts_of(path: str | os.PathLike[str], limits: Limits | None) -> Parts:
@@ -40,11 +43,19 @@ def parts_of(path: str | os.PathLike[str], limits: Limits | None) -> Parts:
     return Parts(system, time.perf_counter() - began, limits, key=key)
 
 
-def _elaborated(path: str | os.PathLike[str], limits: Limits | None) -> HybridSystem:
+def parts_of_text(text: str, folder: str | os.PathLike[str] | None, limits: Limits | None) -> Parts:
+    """Read the text of a model; nothing of it is kept."""
+    began = time.perf_counter()
+    path = NO_FILE if folder is None else Path(folder) / NO_FILE
+    system = _elaborated(path, limits, text.encode("utf-8", errors="surrogatepass"))
+    return Parts(system, time.perf_counter() - began, limits)
+
+
+def _elaborated(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> HybridSystem:
     from hsdsl.elaborate import elaborate
 
     with applied(limits):
-        return elaborate(path)
+        return elaborate(path, text=text)
 
 
 def _read(path: str | os.PathLike[str]) -> bytes | None:
@@ -148,7 +159,7 @@ class Parts:
         request = self.resolve(settings, asked)
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
-        chosen = settings_of(request, values)
+        chosen = replace(settings_of(request, values), overrides=recorded(parameters, initial, request))
         mode, states, x = initial_state(values, initial)
         if request.method is None:
             from hsdsl.model.mechanical import one_stop
@@ -157,6 +168,7 @@ class Parts:
         timeline = self.timeline(values, values.parameters, chosen.until)
         if request.automatic:
             chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
+        chosen = following_digits(chosen, request, values.kernel.arithmetic)
         compiled = engines.choose(engine, chosen, precision, self._compile)
         return prepare(self.program, values.kernel, chosen, timeline, mode, states, x, compiled)
 

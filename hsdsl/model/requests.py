@@ -21,7 +21,7 @@ from hsdsl.simulate import SCHEMES
 
 KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
 OWN_FORMULA = ("paoli-schatzman",)
-FILE = "the file"
+FILE, DEFAULT = "the file", "default"
 # what other tools call methods of this order
 ELSEWHERE = {
     **dict.fromkeys(("ode45", "rk45", "dopri", "dormandprince", "tsit5"), "dopri5"),
@@ -71,7 +71,7 @@ def resolve(sources: Sequence[Source]) -> Request:
     UsageError
         Step and tolerance in one place, an unknown name, or a method that cannot serve.
     """
-    values = {key: Asked(value, "default") for key, value in DEFAULTS.items()}
+    values = {key: Asked(value, DEFAULT) for key, value in DEFAULTS.items()}
     for source in sources:
         given = {key: value for key, value in source.values.items() if value is not None}
         for key in given:
@@ -87,7 +87,7 @@ def resolve(sources: Sequence[Source]) -> Request:
                 values.pop(other, None)
         values |= {key: Asked(value, source.place) for key, value in given.items()}
     if "step" not in values:
-        values.setdefault("tolerance", Asked(DEFAULT_TOLERANCE, "default"))
+        values.setdefault("tolerance", Asked(DEFAULT_TOLERANCE, DEFAULT))
     size = "step" if "step" in values else "tolerance"
     scheme = _scheme(values["scheme"])
     if scheme in OWN_FORMULA:
@@ -99,7 +99,7 @@ def resolve(sources: Sequence[Source]) -> Request:
 
 def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:
     for key, without in (("method", "auto"), ("relaxation", None)):
-        if values[key].place not in (FILE, "default") and values[key].value != without:
+        if values[key].place not in (FILE, DEFAULT) and values[key].value != without:
             raise UsageError(f"scheme '{scheme}' has its own formula and no {key} ({values[key].place})")
     if "step" not in values:
         raise UsageError(f"scheme '{scheme}' needs a step, and keeps no tolerance", "give a step, for example 1e-3")
@@ -130,7 +130,7 @@ def _method(asked: Asked, size_asked: Asked, size: str) -> Method | None:
     table = METHODS[asked.value]
     if size == "step" or table.adaptive:
         return table
-    if asked.place == FILE and size_asked.place not in (FILE, "default"):
+    if asked.place == FILE and size_asked.place not in (FILE, DEFAULT):
         return None
     raise UsageError(
         f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from fractions import Fraction
+
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
+from hsdsl.defaults import kept_digits
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
-from hsdsl.model.requests import FILE, Request, check_digits, check_smooth
+from hsdsl.model.requests import DEFAULT, FILE, Request, check_digits, check_smooth
 from hsdsl.model.values import Values, samples
 from hsdsl.simulate import Settings
 
@@ -58,6 +62,18 @@ def settings_of(request: Request, values: Values) -> Settings:
         max_transitions=int(most),
         samples=_samples(request, values),
     )
+
+
+def following_digits(settings: Settings, request: Request, arithmetic: Arithmetic) -> Settings:
+    """Return the settings with a default tolerance that follows the digits of the numbers.
+
+    A method of fixed order would need steps shorter by as many orders of magnitude: with one the tolerance stays.
+    """
+    left_open = request.size == "tolerance" and request.values["tolerance"].place == DEFAULT
+    if not left_open or arithmetic.digits is None or not isinstance(settings.method, TaylorMethod):
+        return settings
+    tolerance = arithmetic.constant(Fraction(1, 10 ** kept_digits(arithmetic.digits)))
+    return replace(settings, tolerance=tolerance, method=settings.method.for_tolerance(tolerance, arithmetic))
 
 
 def _samples(request: Request, values: Values) -> int | tuple[Number, ...] | None:

@@ -51,6 +51,7 @@ class Streamed:
     scheme: str
     method: str
     seconds: float
+    overrides: dict[str, Any]
 
 
 class Rows:
@@ -182,6 +183,7 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
         scheme=settings.scheme,
         method=settings.method.name,
         seconds=time.perf_counter() - began,
+        overrides=dict(settings.overrides),
     )
 
 

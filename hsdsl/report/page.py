@@ -11,6 +11,7 @@ from hsdsl.report import words
 def html(execution: Execution, *, limit: int = 60) -> str:
     """Sum a run up in HTML (a ``div``), with at most ``limit`` transitions; every text of the model is escaped."""
     facts = [
+        ("with", words.overrides(execution)),
         ("stop", words.stop(execution)),
         ("final", words.final(execution.final)),
         ("state", words.values(execution.final.state)),

@@ -20,8 +20,9 @@ WIDTH = 100
 def as_json(execution: Execution) -> dict[str, Any]:
     """Return the object of `run --json`; numbers that are not finite are None, multiprecision ones stay as they are.
 
-    Its keys, in this order: ``model``, ``engine``, ``scheme``, ``method``, ``settings``, ``stop``, ``transitions``,
-    ``final``, ``verdict``, ``seconds``, and ``left_out`` where states were not integrated. Print it with :func:`dumps`.
+    Its keys, in this order: ``model``, ``engine``, ``scheme``, ``method``, ``settings``, ``overrides``, ``stop``,
+    ``transitions``, ``final``, ``verdict``, ``seconds``, and ``left_out`` where states were not integrated. Print it
+    with :func:`dumps`.
     """
     stop, final, verdict = execution.stop, execution.final, execution.verdict
     run = {
@@ -30,6 +31,7 @@ def as_json(execution: Execution) -> dict[str, Any]:
         "scheme": execution.scheme,
         "method": execution.method,
         "settings": {name: value for name, value in execution.settings.items() if name != "left_out"},
+        "overrides": execution.overrides,
         "stop": {"reason": stop.reason, "time": stop.time, "message": stop.message},
         "transitions": [_transition(transition) for transition in execution.transitions],
         "final": {"time": final.time, "mode": final.mode, "state": final.state, "outputs": final.outputs},

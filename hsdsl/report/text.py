@@ -32,6 +32,8 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
     if execution.title:
         lines += _wrapped(execution.model, columns)
     lines += _wrapped(", ".join(words.settings(execution)), columns)
+    if words.overrides(execution):
+        lines += _wrapped(f"with {words.overrides(execution)}", columns)
     if "method_chosen" in execution.settings:
         lines += _wrapped(f"method auto is {execution.settings['method_chosen']}", columns)
     lines += [""]

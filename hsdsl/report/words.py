@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hsdsl import decimals
+from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Point, Transition
 
 
@@ -29,8 +30,22 @@ def settings(execution: Execution) -> list[str]:
         if name not in shown and value is not None and not isinstance(value, (Mapping, list, tuple)):
             chosen.append(f"{name} {number(value)}")
     if execution.digits is not None and "precision" not in execution.settings:
-        chosen.append(f"{execution.digits} digits")
+        chosen.append(f"{execution.digits} digits{_kept(execution)}")
     return [*chosen, f"engine {execution.engine}"]
+
+
+def _kept(execution: Execution) -> str:
+    """Say how many digits the tolerance keeps, where these are far fewer than there are."""
+    tolerance, digits = execution.settings.get("tolerance"), execution.digits
+    if tolerance is None or digits is None:
+        return ""
+    kept = len(str(int(1 / tolerance + 0.5))) - 1
+    return f", of which the tolerance keeps {kept}" if kept < kept_digits(digits) else ""
+
+
+def overrides(execution: Execution) -> str:
+    """Write which parameters and initial values are not those of the file; settings are told with the others."""
+    return values({n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")})
 
 
 def left_out(execution: Execution) -> str:

@@ -106,6 +106,12 @@ class Mode(Document):
         description="Named subexpressions of this mode, each of earlier ones; they shadow the top ones.",
         examples=[{"force": "-k*x"}],
     )
+    outputs: Table[Expression] = Field(
+        default_factory=empty,
+        description="Outputs of this mode. They go before those of the model with the same name, and have no value in "
+        "modes that do not define them.",
+        examples=[{"power": "k*v**2"}],
+    )
     transitions: Items[Transition] = Field(
         default_factory=list[Any],
         description="The edges that leave the mode.",
@@ -239,7 +245,8 @@ class Model(Document):
     modes: ModeTable[Mode] = Field(description="The modes.", examples=[{"fall": {"flow": {"h": "v", "v": "-g"}}}])
     outputs: Table[Expression] = Field(
         default_factory=empty,
-        description="Name: expression, recorded beside the states.",
+        description="Name: expression, recorded beside the states. Each mode reads it with its own `let`; it has no "
+        "value in a mode that lacks one of its names.",
         examples=[{"energy": "m*g*h + m*v**2/2"}],
     )
     units: OpenTable[Text] = Field(

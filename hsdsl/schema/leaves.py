@@ -42,10 +42,12 @@ def _single(value: Any, wanted: str) -> Scalar:
     return value
 
 
-def _expression(value: Any) -> Scalar:
+def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
     if isinstance(value, (dict, list)):
         hint = in_brackets(value) or "write every component as a name of its own"
         raise refuse("HS203", f"an expression is wanted here, not {described(value)}", hint)
+    if isinstance(value, Scalar) and value.kind == "null":
+        raise refuse("HS121", f"{kind} is missing here", kind)
     return _single(value, "an expression")
 
 
@@ -54,14 +56,14 @@ def _condition(value: Any) -> Scalar:
         parts = [part.value for part in value if isinstance(part, Scalar)]  # pyright: ignore[reportUnknownVariableType]
         hint = in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}"
         raise refuse("HS203", "a condition is wanted here, not a list", hint)
-    return _expression(value)
+    return _expression(value, "a condition, such as v > 0")
 
 
 def _inequality(value: Any) -> Scalar:
     if isinstance(value, list):
         hint = in_brackets(value) or "under `when`, put the rest under `if`; under `domain`, make each an item"
         raise refuse("HS203", "one inequality is wanted here, not a list", hint)
-    return _expression(value)
+    return _expression(value, "an inequality, such as x >= 1")
 
 
 def _text(value: Any) -> Scalar | None:

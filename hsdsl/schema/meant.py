@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from hsdsl.names import closest
 from hsdsl.schema.documents import SHAPES
@@ -42,6 +42,7 @@ _NOT_NEEDED = {
     "variables": "the states are the keys of `flow`, and `initial` gives their values",
     "from": "leave it out: a transition stands in the mode that it leaves",
     "<<": "mappings are not merged in YAML 1.2",
+    "terminal": "leave it out, and let `to` name a mode with final: true",
 }
 _ADD = {
     "hsdsl": "begin the file with hsdsl: 1",
@@ -76,6 +77,11 @@ def key_meant(key: str, fields: Iterable[str], parent: Node | None) -> str | Non
         return named[0]
     elsewhere = key in _NOT_NEEDED or home(key, ()) or is_a_mode(present[key][1] if key in present else None)
     return None if elsewhere else closest(key, fields)
+
+
+def named_elsewhere(key: str, fields: Collection[str]) -> bool:
+    """Whether a key is the name that another tool has for one of some fields."""
+    return any(field in fields for field in _BY_NAME.get(key, ()))
 
 
 def advice(key: str, meant: str | None, fields: Iterable[str], value: Node | None) -> str:

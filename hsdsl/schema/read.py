@@ -13,8 +13,10 @@ from hsdsl.names import shown
 from hsdsl.schema.documents import SHAPES, Model
 from hsdsl.schema.forms import assigned, undifferentiated
 from hsdsl.schema.habits import reread
+from hsdsl.schema.indents import reindent
 from hsdsl.schema.leaves import described
 from hsdsl.schema.meant import Location, advice, key_meant, moves_to, to_add, torn
+from hsdsl.schema.misspelt import respell
 from hsdsl.schema.repair import descend, repair
 from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
 
@@ -45,12 +47,14 @@ def read(root: Node, findings: Findings) -> Model:
     ModelError
         When too little is left to be called a model.
     """
+    reindent(root, findings)
     reread(root, findings)
+    respell(root, findings)
     for _ in range(_MOST_REPAIRS):
         try:
             return Model.model_validate(_plain(root))
         except ValidationError as error:
-            details = error.errors(include_url=False)
+            details = _first(error.errors(include_url=False))
         meant = [_meant(root, fault) for fault in details]
         taken = [_taken_for(root, fault, key) for fault, key in zip(details, meant, strict=True)]
         filled = set(taken)
@@ -66,6 +70,12 @@ def read(root: Node, findings: Findings) -> Model:
             break
     findings.raise_if_any()
     raise AssertionError
+
+
+def _first(details: list[ErrorDetails]) -> list[ErrorDetails]:
+    """The faults without those of values whose key is at fault: ``{v = 1}`` lacks no value."""
+    keys = {_names(fault["loc"][:-1]) for fault in details if fault["loc"][-1:] == ("[key]",)}
+    return [fault for fault in details if fault["type"] != "HS121" or _names(fault["loc"]) not in keys]
 
 
 def _plain(node: Node) -> Any:
@@ -89,7 +99,10 @@ def _diagnostic(root: Node, details: ErrorDetails) -> Diagnostic:
             if not location:
                 hint = "a model begins with hsdsl: 1; is this file one?"
                 return place.diagnostic(code, f"a model is wanted here, not {described(_plain(root))}", hint)
-            return place.diagnostic(code, context["message"], context.get("hint"))
+            message, hint, last = context["message"], context.get("hint"), _names(location)[-1]
+            if code == "HS121" and isinstance(last, str):
+                message, hint = f"'{shown(last)}' has no value", f"write {shown(last)}: and {hint}"
+            return place.diagnostic(code, message, hint)
         case _:
             return _find(root, location).diagnostic("HS204", "this value is not possible here")
 

@@ -46,7 +46,7 @@ def repair(root: Node, location: Location, fault: str, meant: str | None, belong
             return _replaced(parent, location[-1], "1")
         case "HS203" if isinstance(location[-1], int) and location[-2:-1] in _LISTS_OF_MAPPINGS:
             return _removed(parent, location[-1])
-        case "HS203" | "HS205" if not _holds_more(location):
+        case "HS121" | "HS203" | "HS205" if not _holds_more(location):
             return _replaced(parent, location[-1], None)
         case "HS204":
             return _drop(root, location)

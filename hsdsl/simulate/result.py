@@ -134,6 +134,7 @@ def about(program: Program, settings: Settings, digits: int | None, engine: str)
         "output_names": program.outputs,
         "title": program.title,
         "digits": digits,
+        "overrides": dict(settings.overrides),
     }
 
 

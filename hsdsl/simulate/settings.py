@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators import Method
@@ -32,6 +34,7 @@ class Settings:
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
+    ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -45,6 +48,7 @@ class Settings:
     samples: int | tuple[Number, ...] | None = None
     one_stop: OneStop | None = None
     method_chosen: str | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False)
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

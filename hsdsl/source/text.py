@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hsdsl import limits
 from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
-from hsdsl.names import INVISIBLE, closest
+from hsdsl.names import INVISIBLE, closest, shown
 
 _MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 _BREAK = re.compile("\r\n|\r|\n")
@@ -55,7 +55,15 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         with Path(path).open("rb") as stream:
             return stream.read(limits.current().bytes + 1)
     except (OSError, ValueError) as error:
+        if _is_text(path):
+            message = f"this is the text of a model, not the path of its file: `{shown(os.fspath(path), 40)}`"
+            raise UsageError(message, "hsdsl.loads(text) reads a model from its text") from None
         raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
+
+
+def _is_text(path: str | os.PathLike[str]) -> bool:
+    """Whether a path looks like the text of a model: it has several lines, or a key with its value."""
+    return isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path)
 
 
 def _models_nearby(path: Path) -> str | None:

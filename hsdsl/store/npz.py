@@ -31,7 +31,7 @@ _DAMAGE = (ValueError, KeyError, TypeError, IndexError, EOFError, AttributeError
 def save_npz(execution: Execution, file: BinaryIO) -> None:
     """Write an execution, everything but its ``output_function``."""
     columns = {name: getattr(execution, name) for name in COLUMNS}
-    recorded = (execution.transitions, execution.final, execution.stop, execution.settings)
+    recorded = (execution.transitions, execution.final, execution.stop, execution.settings, execution.overrides)
     loose = Plain.numbers(recorded)
     packed = (x for column in columns.values() if column.dtype == object for x in column.ravel())
     plain = Plain(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
@@ -46,6 +46,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
         "bits": plain.precision,
         "layouts": layouts,
         **{name: plain.pack(getattr(execution, name)) for name in _TEXTS},
+        "overrides": plain.pack(execution.overrides),
         "stop": plain.pack_fields(execution.stop),
         "final": plain.pack_fields(execution.final),
         "verdict": plain.pack_fields(execution.verdict),
@@ -88,6 +89,7 @@ def _read(archive: dict[str, Array]) -> Execution:
         for layout, kind, jump, first, last in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
     )
     fields: dict[str, Any] = {name: plain.unpack(header[name]) for name in _TEXTS}
+    fields["overrides"] = plain.unpack(header.get("overrides", {}))  # files of earlier versions have none
     fields |= {name: plain.unpack_array(archive[name]) for name in COLUMNS}
     return Execution(
         stop=Stop(**plain.unpack_fields(header["stop"])),

@@ -37,7 +37,7 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
 def write_csv(samples: Samples, file: BinaryIO, header: bool = True) -> None:
     """Write CSV (UTF-8): ``time,mode,j``, states, outputs; numbers such that they read back exactly.
 
-    A cell is empty where the mode lacks the state, or a state that the output needs; a state that is not a number
+    A cell is empty where the mode lacks the state or does not define the output; a state that is not a number
     is ``nan``.
     """
     text = io.TextIOWrapper(file, encoding="utf-8", newline="")

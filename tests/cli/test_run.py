@@ -25,7 +25,19 @@ outputs: {energy: v**2/2 + g*h}
 initial: {mode: fall, h: 1, v: 0}
 experiment: {until: 1.5, tolerance: 1e-9}
 """
-KEYS = ["model", "engine", "scheme", "method", "settings", "stop", "transitions", "final", "verdict", "seconds"]
+KEYS = [
+    "model",
+    "engine",
+    "scheme",
+    "method",
+    "settings",
+    "overrides",
+    "stop",
+    "transitions",
+    "final",
+    "verdict",
+    "seconds",
+]
 TRANSITION = ["index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives"]
 
 

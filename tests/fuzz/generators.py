@@ -34,7 +34,10 @@ TOKENS = (
     "\t", "\n", " ", "\u00a0", "−", "×", "²", "≥", "π", "\u202e", "\x00", "𝑥", "_", "`", "~", "|", "&", "//", "<<",
     "->", "=>",
 )  # fmt: skip
-KEYS = ("x", "v", "flow", "when", "to", "if", "let", "domain", "file", "modes", "<<", "")
+KEYS = (
+    "x", "v", "flow", "when", "to", "if", "let", "domain", "file", "modes", "outputs", "transitions", "reset",
+    "initial", "direction", "<<", "",
+)  # fmt: skip
 YAML_TOKENS = (
     "{", "}", "[", "]", ":", ": ", ", ", "- ", "? ", "#", " #", "&a ", "*a", "!", "!!str ", "|", ">", "'", '"', "%",
     "@", "`", "\n", "\t", "  ", "---\n", "...\n", "\r\n", "<<: *a", "~", "null", "true", "yes", "on", ".nan", "\\x41",

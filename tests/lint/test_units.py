@@ -1,5 +1,7 @@
 """Units read by our own grammar: what pint would make of the same text, and nothing evaluated."""
 
+from fractions import Fraction
+
 import pint
 import pytest
 
@@ -41,9 +43,26 @@ def test_refused(text):
 
 
 def test_said_as_people_write_it():
-    for text in ("m", "m/s", "kg*m/s**2", "1/s", "m**(1/2)", "1/(m*s)"):
+    for text in ("m", "m/s", "kg*m/s**2", "1/s", "m**(1/2)", "1/(m*s)", "mV/ms", "1/ms", "degree", "10*mm"):
         assert str(read(text)) == text
-    assert str(read("mm/s")) == "0.001 m/s" and str(read("1/ms")) == "1000/s" and str(read("degree"))[:6] == "0.0174"
+        assert str(read(f"({text})**2").to(Fraction(1, 2))) == text
+
+
+def test_many_names_are_said_in_base_units():
+    assert str(read("kg*m*A*mm*s*K/ms")) == "kg*A*m**2*K"
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "said"),
+    [
+        ("V", "mV", "V (1000 mV)"),
+        ("nA/uF", "mV/ms", "nA/uF (0.001 mV/ms)"),
+        ("degree", "1", "degree (0.0174533)"),
+        ("V", "A", "V"),
+    ],
+)
+def test_a_size_is_said_where_it_is_all_that_differs(one, other, said):
+    assert read(one).beside(read(other)) == said
 
 
 def test_size_counts():

@@ -82,6 +82,52 @@ def test_outputs_are_none_where_a_state_is_missing():
     assert made.modes[1].outputs == (None, 3, TIME**2, sp.Symbol("y", real=True))
 
 
+def test_outputs_are_read_in_each_mode():
+    made = model(
+        "    let: {p: x, q: p + v}\n    outputs: {own: q, e: 7}\n"
+        "  B:\n    flow: {y: 1}\n    let: {p: 2*y}\n    outputs: {last: p}\n  C: {flow: {z: 1}}\n",
+        "let: {p: 3, top: p}\noutputs: {e: p, f: q*p, g: top}\n",
+    )
+    y = sp.Symbol("y", real=True)
+    assert made.outputs == ("e", "f", "g", "own", "last")
+    assert made.modes[0].outputs == (7, (X + V) * X, 3, X + V, None)
+    assert made.modes[1].outputs == (2 * y, None, 3, None, 2 * y)
+    assert made.modes[2].outputs == (3, None, 3, None, None)
+
+
+@pytest.mark.parametrize(
+    ("mode", "rest", "expected"),
+    [
+        ("    outputs: {o: y}\n", "", ["HS117"]),  # a state of another mode
+        ("    outputs: {o: p}\n", "", ["HS111"]),  # a `let` of another mode
+        ("    outputs: {x: 1}\n", "", ["HS301"]),
+        ("    outputs: {y: 1}\n", "", ["HS301"]),  # a column cannot be both
+        ("    outputs: {o: 1/0}\n", "", ["HS118"]),
+        ("", "outputs: {o: pq}\n", ["HS111"]),
+        ("    let: {p: 0}\n", "outputs: {o: 1/p}\n", ["HS118"]),  # without a value in this mode alone
+        ("    let: {p: nothing}\n", "outputs: {o: p}\n", ["HS111"]),  # the fault is told where it is
+        ("  C: {final: true, outputs: {o: 1}}\n", "", ["HS315"]),
+    ],
+)
+def test_outputs_of_modes_with_faults(mode, rest, expected):
+    body = f"modes:\n  A:\n    flow: {{x: 1, v: 1}}\n{mode}  B: {{flow: {{y: 1}}, let: {{p: y}}}}\n"
+    assert codes(HEAD + body + rest + TAIL) == expected
+
+
+def test_a_let_of_another_mode():
+    with pytest.raises(ModelError) as raised:
+        model("  B:\n    flow: {y: p}\n  C: {flow: {z: 1}, let: {p: z}}\n")
+    (fault,) = raised.value.diagnostics
+    assert fault.message == "'p' is a `let` name of other modes" and "`let` of the whole model" in str(fault.hint)
+    assert str(raised.value) == f"m.yaml:6:15: error HS111: {fault.message} ({fault.hint})"
+
+
+def test_a_misspelt_let_of_a_mode_in_an_output():
+    with pytest.raises(ModelError) as raised:
+        model("    let: {force: -x}\n", "outputs: {o: forse*v}\n")
+    assert [d.hint for d in raised.value.diagnostics] == ["did you mean 'force'?"]
+
+
 def test_a_let_is_checked_in_the_modes_that_use_it():
     assert model("  B:\n    flow: {y: 1}\n", "let: {p: x + v}\n").modes[1].flow == (1,)
     lines = HEAD + "let: {p: x, q: p}\nmodes:\n  A: {flow: {x: q, v: 1}}\n  B: {flow: {y: q}}\n" + TAIL

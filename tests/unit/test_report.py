@@ -27,6 +27,7 @@ def test_json_has_the_keys_of_the_contract_in_order():
         "scheme": "relaxed",
         "method": "midpoint",
         "settings": {"until": 4.125, "step": 1e-3, "relaxation": 1e-6, "tolerance": None},
+        "overrides": {},
         "stop": {"reason": "until", "time": 4.125, "message": "The run reached its end."},
         "transitions": [
             {
@@ -46,7 +47,8 @@ def test_json_has_the_keys_of_the_contract_in_order():
         "seconds": {"load": 0.25, "compile": 0.01, "simulate": 0.5},
     }
     assert list(run) == [
-        "model", "engine", "scheme", "method", "settings", "stop", "transitions", "final", "verdict", "seconds",
+        "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "verdict",
+        "seconds",
     ]  # fmt: skip
     assert list(run["transitions"][0]) == [
         "index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives",

@@ -73,4 +73,4 @@ def _names(subject: Subject) -> Iterator[Key]:
     document = subject.document
     yield from (*document.parameters, *document.inputs, *document.let, *document.outputs)
     for part in subject.modes:
-        yield from (*(part.document.flow or ()), *part.document.let)
+        yield from (*(part.document.flow or ()), *part.document.let, *part.document.outputs)

@@ -3,7 +3,7 @@
 ## What it does
 
 Finds empty maps and lists under keys that may be left out: `parameters`, `inputs`, `let`, `outputs`, `units`,
-`reference`, and the `let`, `domain`, `transitions` and `reset` of modes.
+`reference`, and the `let`, `domain`, `outputs`, `transitions` and `reset` of modes.
 
 ## Why it is bad
 
@@ -46,7 +46,7 @@ from hsdsl.lint.subject import Subject
 from hsdsl.source import Mapping, Node, Scalar
 
 _OF_MODEL = ("parameters", "inputs", "let", "outputs", "units", "reference")
-_OF_MODE = ("let", "domain", "transitions")
+_OF_MODE = ("let", "domain", "outputs", "transitions")
 
 
 def check(subject: Subject) -> Iterator[Finding]:

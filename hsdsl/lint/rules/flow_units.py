@@ -56,5 +56,6 @@ def check(subject: Subject) -> Iterator[Finding]:
             continue
         wanted = state.times(time.to(Fraction(-1)))
         if not wanted.same(checked.measure):
-            message = f"the flow of '{checked.written.name}' is in {checked.measure}, and should be in {wanted}"
+            found = checked.measure.beside(wanted)
+            message = f"the flow of '{checked.written.name}' is in {found}, and should be in {wanted}"
             yield Finding(checked.written.span(), message)

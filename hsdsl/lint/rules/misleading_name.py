@@ -60,7 +60,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     """Find names that look like something else."""
     document = subject.document
     states = (key for part in subject.modes for key in part.document.flow or ())
-    inner = (key for part in subject.modes for key in part.document.let)
+    inner = (key for part in subject.modes for key in (*part.document.let, *part.document.outputs))
     for name in (*document.parameters, *document.inputs, *document.let, *document.outputs, *states, *inner):
         lowered = name.lower()
         if len(name) > 1 and lowered in RESERVED:

@@ -39,20 +39,30 @@ Give one of them another name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from hsdsl.expression.syntax import Name
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
+from hsdsl.source import Key
 
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find outputs with a name that means something else."""
-    document = subject.document
-    trees = {e.name: e.tree for e in subject.expressions if e.role == "output"}
-    for name in document.outputs:
-        tree = trees[name]
-        taken = name in document.parameters or name in document.inputs or name in document.let
-        if taken and not (isinstance(tree, Name) and tree.name == name):
+    trees = {(e.mode, e.name): e.tree for e in subject.expressions if e.role == "output"}
+    for mode, name, taken in _outputs(subject):
+        tree = trees[mode, name]
+        if name in taken and not (isinstance(tree, Name) and tree.name == name):
             message = f"the output '{name}' is something else than '{name}' in the expressions of this file"
             yield Finding(name.place.span, message, "give one of them another name")
+
+
+def _outputs(subject: Subject) -> Iterator[tuple[str | None, Key, Collection[str]]]:
+    """Every output with its mode, and the names that mean something where it is read."""
+    document = subject.document
+    shared = {*document.parameters, *document.inputs, *document.let}
+    everywhere = shared.union(*(part.document.let for part in subject.modes))
+    yield from ((None, name, everywhere) for name in document.outputs)
+    for part in subject.modes:
+        here = shared.union(part.document.let) if part.document.outputs else shared
+        yield from ((str(part.key), name, here) for name in part.document.outputs)

@@ -63,5 +63,7 @@ def check(subject: Subject) -> Iterator[Finding]:
         if what is None or wanted is None or not isinstance(checked.measure, Unit):
             continue
         if not wanted.same(checked.measure):
-            message = f"{what} '{checked.written.name}' is in {checked.measure}, and should be in {wanted}"
+            message = (
+                f"{what} '{checked.written.name}' is in {checked.measure.beside(wanted)}, and should be in {wanted}"
+            )
             yield Finding(checked.written.span(), message)

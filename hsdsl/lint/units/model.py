@@ -46,7 +46,7 @@ class Units:
     def __init__(self, document: Model, expressions: tuple[Written, ...]) -> None:
         self._document = document
         self._expressions = expressions
-        self._lets: dict[tuple[str | None, str], Measure] = {}
+        self._lets: dict[str, dict[str | None, Measure]] = {}  # by name, and by the mode that has it
         self._texts = {str(key): scalar for key, scalar in document.units.items() if scalar is not None}
         for key, entry in document.parameters.items():
             if isinstance(entry, ParameterEntry) and entry.unit is not None:
@@ -89,12 +89,15 @@ class Units:
         walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value)
         measure = walk.measure(written.tree)
         if written.role == "let":
-            self._lets[written.mode, str(written.name)] = measure
+            self._lets.setdefault(str(written.name), {})[written.mode] = measure
         return Checked(written, measure, tuple(walk.misfits))
 
     def _name(self, mode: str | None, name: str) -> Measure:
         unknown: Any_ = "unknown"
-        for scope in (mode, None):
-            if (scope, name) in self._lets:
-                return self._lets[scope, name]
-        return self.of(name) or unknown
+        lets = self._lets.get(name)
+        if lets is None:
+            return self.of(name) or unknown
+        if mode is not None:
+            return lets.get(mode, lets.get(None, unknown))
+        first, *others = lets.values()  # an output of the whole model is read in every mode
+        return first if all(other == first for other in others) else unknown

@@ -6,7 +6,8 @@ A temperature in degC counts as one in kelvin: differences are what equations ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -16,6 +17,8 @@ from hsdsl.expression.syntax import Name, Negative, Number, Power, Product, Tree
 
 _LONGEST = 100  # characters
 _LARGEST_POWER = 100
+_MOST_NAMES = 6  # of units that a message carries; beyond that it has base units
+Powers = tuple[tuple[str, Fraction], ...]
 
 
 @dataclass(frozen=True)
@@ -28,17 +31,18 @@ class Unit:
         Its size in SI base units.
     powers : tuple of (str, Fraction)
         Its dimensions, sorted, without those of power 0.
+    names : tuple of (str, Fraction)
+        The units of the file it is made of, as ``mV/ms``: how messages say it.
     """
 
     factor: float = 1.0
-    powers: tuple[tuple[str, Fraction], ...] = ()
+    powers: Powers = ()
+    names: Powers = field(default=(), compare=False)
 
     def times(self, other: Unit) -> Unit:
         """The product."""
-        powers = dict(self.powers)
-        for name, power in other.powers:
-            powers[name] = powers.get(name, Fraction(0)) + power
-        return Unit(self.factor * other.factor, tuple(sorted((n, p) for n, p in powers.items() if p)))
+        powers, names = _joined(self.powers, other.powers), _joined(self.names, other.names)
+        return Unit(self.factor * other.factor, tuple(sorted(powers)), names)
 
     def to(self, exponent: Fraction) -> Unit:
         """A power."""
@@ -46,7 +50,8 @@ class Unit:
             factor = self.factor ** float(exponent)
         except (OverflowError, ZeroDivisionError):
             factor = float("inf")
-        return Unit(factor, tuple((n, p * exponent) for n, p in self.powers if exponent))
+        powers, names = (tuple((n, p * exponent) for n, p in of if exponent) for of in (self.powers, self.names))
+        return Unit(factor, powers, names)
 
     def same(self, other: Unit) -> bool:
         """Whether both are one unit, by size too."""
@@ -58,16 +63,34 @@ class Unit:
         return not self.powers and abs(self.factor - 1) <= 1e-9
 
     def __str__(self) -> str:
-        """In base units, as ``1000 kg*m/s**2``."""
-        above, below = (
-            [(_BASE.get(n, n.strip("[]")), abs(p)) for n, p in sorted(self.powers, key=_order) if (p > 0) is up]
-            for up in (True, False)
-        )
-        over, under = ("*".join(n if p == 1 else f"{n}**{_plain(p)}" for n, p in part) for part in (above, below))
-        under = f"({under})" if len(below) > 1 else under
-        whole = (over or "1") + (f"/{under}" if under else "")
-        size = f"{self.factor:.6g}"
-        return whole if abs(self.factor - 1) <= 1e-9 else f"{size} {whole}" if over else size + whole[1:]
+        """In the units of the file, as ``mV/ms``, or in base units, as ``1000 kg*m/s**2``."""
+        if 0 < len(self.names) <= _MOST_NAMES:
+            return _quotient(self.names)
+        parts = [(_BASE.get(name, name.strip("[]")), power) for name, power in sorted(self.powers, key=_order)]
+        whole, size = _quotient(parts), f"{self.factor:.6g}"
+        if abs(self.factor - 1) <= 1e-9:
+            return whole
+        return size + whole[1:] if whole.startswith("1") else f"{size} {whole}"
+
+    def beside(self, other: Unit) -> str:
+        """As text, with its size where only that tells it from the other: ``V (1000 mV)``."""
+        if self.powers != other.powers or not other.factor:
+            return str(self)
+        return f"{self} ({self.factor / other.factor:.6g}{'' if other == ONE else f' {other}'})"
+
+
+def _joined(one: Powers, other: Powers) -> Powers:
+    powers = dict(one)
+    for name, power in other:
+        powers[name] = powers.get(name, Fraction(0)) + power
+    return tuple((name, power) for name, power in powers.items() if power)
+
+
+def _quotient(parts: Iterable[tuple[str, Fraction]]) -> str:
+    above, below = ([(name, abs(power)) for name, power in parts if (power > 0) is up] for up in (True, False))
+    over, under = ("*".join(n if p == 1 else f"{n}**{_plain(p)}" for n, p in part) for part in (above, below))
+    under = f"({under})" if len(below) > 1 else under
+    return (over or "1") + (f"/{under}" if under else "")
 
 
 def _order(item: tuple[str, Fraction]) -> tuple[bool, str]:
@@ -118,9 +141,13 @@ def read(text: str) -> Unit:
 def _of(tree: Tree) -> Unit:
     match tree:
         case Name():
-            return _named(tree.name)
+            return replace(_named(tree.name), names=((tree.name, Fraction(1)),))
         case Number():
-            return Unit(float(tree.value)) if tree.value > 0 else _refuse()
+            if tree.value <= 0:
+                return _refuse()
+            return Unit(
+                float(tree.value), names=() if tree.value == 1 else ((f"{float(tree.value):.6g}", Fraction(1)),)
+            )
         case Product():
             result = ONE
             for divided, factor in tree.factors:

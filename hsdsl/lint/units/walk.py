@@ -93,7 +93,7 @@ class Walk:
                 if known is None:
                     known = found
                 elif not known.same(found):
-                    message = f"`{self.said(part)}`, in {found}, is {how} something in {known}"
+                    message = f"`{self.said(part)}`, in {found.beside(known)}, is {how} something in {known}"
                     self.misfits.append(Misfit("sum", part, message))
                     return "unknown"
         return known if known is not None else "unknown" if unsure else "any"
@@ -147,7 +147,7 @@ class Walk:
     def _pure(self, tree: Tree, what: str) -> None:
         found = self.measure(tree)
         if isinstance(found, Unit) and not found.pure:
-            message = f"`{self.said(tree)}`, {what}, is in {found} and not a plain number"
+            message = f"`{self.said(tree)}`, {what}, is in {found.beside(ONE)} and not a plain number"
             self.misfits.append(Misfit("argument", tree, message))
 
     def said(self, tree: Tree) -> str:
