@@ -30,15 +30,17 @@ if TYPE_CHECKING:
 MOST_PREPARED = 16
 
 
-def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
+def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
     """Read a model file.
 
     Parameters
     ----------
     path : path
-        A YAML file in the language.
+        A YAML file in the language; `-` is standard input.
     limits : Limits, optional
         What the file may ask for, and where its data may lie, where the defaults are not to hold.
+    text : bytes, optional
+        The file's content, where it is not to be read from ``path``.
 
     Raises
     ------
@@ -47,16 +49,22 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
     UsageError
         The file cannot be read.
     """
-    return Model(parts_of(path, limits))
+    return Model(parts_of(path, limits, text))
 
 
 class Model:
-    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both."""
+    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both.
+
+    It is what was read when it was loaded, also where its file changes later, and it can be pickled.
+    """
 
     def __init__(self, of: HybridSystem | Parts) -> None:
         self.parts = of if isinstance(of, Parts) else Parts(of)
         self._smaller: dict[tuple[str, ...], Model] = {}
         self._prepared: Remembered[Prepared] = Remembered(MOST_PREPARED)
+
+    def __reduce__(self) -> tuple[type[Model], tuple[Parts]]:
+        return type(self), (self.parts,)
 
     def __repr__(self) -> str:
         modes = ", ".join(mode.name for mode in self.program.modes[:8])
@@ -64,13 +72,7 @@ class Model:
 
     @property
     def system(self) -> HybridSystem:
-        """The mathematics; of a model seen before it is read when it is asked for.
-
-        Raises
-        ------
-        UsageError
-            The file has changed meanwhile.
-        """
+        """The mathematics; of a model seen before it is elaborated when it is asked for."""
         return self.parts.system
 
     @property

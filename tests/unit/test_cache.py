@@ -14,8 +14,9 @@ from engines import alike, needs_compiler
 import hsdsl
 from hsdsl import cache
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.errors import UsageError
+from hsdsl.errors import ModelError
 from hsdsl.model import engines, seen
+from hsdsl.model.written import Written
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
 
@@ -150,21 +151,29 @@ def test_a_change_of_the_data_or_the_model_is_seen(tmp_path: Path) -> None:
     assert finals == pytest.approx([1, 1, 2])
     loaded = hsdsl.load(model)
     model.write_text(WITH_DATA.replace("x: 0", "x: 5"))
-    assert hsdsl.load(model).simulate().final["x"] == pytest.approx(7)
-    with pytest.raises(UsageError, match="has changed"):
-        loaded.simulate(until="1/2 + 1/4")
+    data.unlink()
+    assert loaded.simulate(until="1/2 + 1/4").final["x"] == pytest.approx(
+        1.5
+    )  # it is what was read, mathematics and all
+    with pytest.raises(ModelError, match="no such file"):
+        hsdsl.load(model)
 
 
 def test_what_is_no_program_is_not_taken(folder: Path) -> None:
     path = MODELS[0]
     program = hsdsl.load(path).program
-    key = seen.key_of(path.read_bytes(), None)
-    assert seen.find(path, key) == program
-    for changed in (replace(program, parameters=(1,)), replace(program, modes=None), replace(program, title=3)):
-        for entry in (folder / seen.KIND / key).iterdir():
+    written = Written.at(path, None).with_files({})
+    assert seen.find(written) == (program, written)
+    for changed in (
+        replace(program, parameters=(1,)),
+        replace(program, modes=None),
+        replace(program, title=3),
+        replace(program, digest=program.digest[::-1]),  # the program of other bytes
+    ):
+        for entry in (folder / seen.KIND / seen.key_of(written)).iterdir():
             entry.unlink()
-        seen.keep(path, key, changed, {})  # type: ignore[arg-type]
-        assert seen.find(path, key) is None
+        seen.keep(written, changed)  # type: ignore[arg-type]
+        assert seen.find(written) is None
 
 
 @needs_compiler
@@ -176,21 +185,18 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
 
 
 @needs_compiler
-def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, str]] = []
     monkeypatch.setattr(engines.kernel, "begin", lambda *parts: asked.append(parts))
-    path = tmp_path / "m.yaml"
     for text, scheme, method in (
         ("experiment: {scheme: located, method: radau}", None, None),
         ("experiment: {until: 1, method: rk4}", "located", None),
         ("experiment: {scheme: relaxed, method: rk4}", None, "taylor"),
         ("experiment: {scheme: nothing}", None, None),
     ):
-        path.write_text(text)
-        engines.begin(path, "auto", None, scheme, method)
-    engines.begin(path, "python", None, "located", None)
-    engines.begin(path, "auto", 50, "located", None)
-    engines.begin(tmp_path / "none.yaml", "auto", None, None, None)
+        engines.begin(text.encode(), "auto", None, scheme, method)
+    engines.begin(b"", "python", None, "located", None)
+    engines.begin(b"", "auto", 50, "located", None)
     assert asked == [("located", "radau"), ("located", "rk4"), ("relaxed", "taylor")]
 
 
