@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -104,6 +105,107 @@ def test_compiled_code_is_kept_and_made_again_where_damaged(monkeypatch: pytest.
     kept.write_bytes(b"no library")
     assert CompiledKernel(program, CompiledModel(program)).arithmetic is FLOAT64
     assert len(made) == 2
+
+
+def _belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if os.getuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "getuid", lambda: 12345)
+
+
+def _is_a_link(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.rename(path.with_name("moved"))
+    path.symlink_to(path.with_name("moved"))
+
+
+WAYS = [
+    lambda path, _: path.chmod(0o777),
+    lambda path, _: path.chmod(0o770),
+    lambda path, _: path.chmod(0o1777),
+    _belongs_to_another,
+    _is_a_link,
+]
+
+
+@posix
+@pytest.mark.parametrize("way", WAYS, ids=["all", "group", "sticky", "owner", "link"])
+@pytest.mark.parametrize("depth", range(4), ids=["top", "kind", "key", "file"])
+def test_nothing_is_taken_from_where_another_may_put_it(way, depth, folder: Path, monkeypatch) -> None:
+    path = cache.keep("words", "k", ".txt", write("word"))
+    place = (folder, folder / "words", folder / "words" / "k", path)[depth]
+    if (place, way) == (folder, _is_a_link):
+        pytest.skip("a user may move the whole folder and link to it")
+    assert cache.find("words", "k") == path
+    way(place, monkeypatch)
+    assert cache.find("words", "k") is None
+    if place != path:
+        with pytest.raises(PermissionError):
+            cache.keep("words", "k", ".txt", write("word"))
+    elif way is not _belongs_to_another:  # it is made anew, and then it is ours
+        assert cache.find("words", "k") is None and cache.keep("words", "k", ".txt", write("word")) == path
+        assert cache.find("words", "k") == path
+
+
+@posix
+def test_the_folders_above_let_nobody_exchange_it(folder: Path) -> None:
+    cache.keep("words", "k", ".txt", write("word"))
+    for mode, trusted in ((0o777, False), (0o1777, True), (0o755, True)):
+        folder.parent.chmod(mode)
+        assert (cache.find("words", "k") is not None, cache.private(folder) is None) == (trusted, trusted)
+
+
+@needs_compiler
+@posix
+@pytest.mark.parametrize("depth", range(3), ids=["kind", "key", "file"])
+def test_a_foreign_library_is_not_loaded(depth, monkeypatch: pytest.MonkeyPatch, folder: Path, capsys) -> None:
+    program, loaded = hsdsl.load(MODELS[0]).program, []
+    CompiledModel(program)
+    kept = list((folder / library.KIND).rglob("*.so"))
+    for path in kept:  # with a name that agrees with its content, as a stranger would do it
+        foreign = path.with_name(cache._checksum(b"foreign") + ".so")
+        path.unlink()
+        foreign.write_bytes(b"foreign")
+        (folder / library.KIND, foreign.parent, foreign)[depth].chmod(0o777)
+    monkeypatch.setattr(library.ctypes, "CDLL", lambda p, load=library.ctypes.CDLL: (loaded.append(p), load(p))[1])
+    monkeypatch.setattr(kernel, "_loaded", {})
+    CompiledModel(program)
+    assert loaded and not any(Path(path).stem == cache._checksum(b"foreign") for path in loaded)
+    assert ("can be written by other users" in capsys.readouterr().err) == (depth < 2)
+
+
+RUN = [sys.executable, "-m", "hsdsl", "run", str(MODELS[0]), "--json", "--engine", "c", "--scheme", "relaxed"]
+READ_ONLY = "mount --bind {0} {0} && mount -o remount,bind,ro {0} && ! touch {0}/x 2>/dev/null && "
+
+
+@needs_compiler
+@posix
+def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: Path) -> None:
+    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode:
+        pytest.skip("no name spaces here")
+    subprocess.run(RUN, check=True, capture_output=True)
+    before = sorted(folder.rglob("*"))
+    code = "import hsdsl.runtime.library as l; l._compile = None; from hsdsl.cli import main; main()"
+    served = ["unshare", "-rm", "sh", "-c", READ_ONLY.format(tmp_path / "caches") + 'exec "$@"', "-"]
+    done = subprocess.run([*served, sys.executable, "-c", code, *RUN[3:]], capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    assert sorted(folder.rglob("*")) == before
+    new = subprocess.run([*served, *RUN, "--set", "experiment.method=dopri5"], capture_output=True, text=True)
+    assert new.returncode == 0 and "Traceback" not in new.stderr
+
+
+@posix
+def test_what_cannot_be_touched_is_found_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = cache.keep("words", "k", ".txt", write("word"))
+
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    for step in ("utime", "mkdir", "chmod", "replace", "unlink"):
+        monkeypatch.setattr(os, step, refused)
+    assert cache.find("words", "k") == path
+    path.write_text("wort")
+    assert cache.find("words", "k") is None  # damaged, and cannot be removed
 
 
 @needs_compiler
