@@ -110,12 +110,14 @@ def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | N
     from hsdsl.chart.picture import panels
     from hsdsl.chart.table import as_csv, as_text, record
     from hsdsl.report import dumps
+    from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
 
     rows = [row for _, group in found for row in group]
     if out is not None:
         with replacing(out) as file:
             file.write(as_csv(rows).encode())
+            forget_sidecar(out)
         say(f"wrote {out}")
     if plot is not None:
         from hsdsl.plot.work_precision import plot_work_precision
