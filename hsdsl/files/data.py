@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
-import stat
 from collections.abc import Iterable
 from pathlib import Path
 
 from hsdsl import limits
-from hsdsl.files.model import READ, is_piped, reason
+from hsdsl.files.model import is_piped, open_regular, reason
 from hsdsl.names import shown
 
 LARGEST = 64 << 20  # bytes
@@ -37,14 +36,8 @@ def read_data(folder: Path, name: str) -> bytes:
         When it lies elsewhere, is no regular file, is too large, or cannot be read.
     """
     target = _inside(folder, name)
-    irregular = DataRefused("HS311", f"'{shown(name)}' is not a regular file")
     try:
-        mode = os.stat(target).st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # to open a device may do something
-            raise irregular
-        with open(os.open(target, READ | getattr(os, "O_NOFOLLOW", 0)), "rb") as stream:
-            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged meanwhile
-                raise irregular
+        with open_regular(target, getattr(os, "O_NOFOLLOW", 0)) as stream:
             data = stream.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         message = f"the file '{shown(name)}' cannot be read: {reason(error)}"

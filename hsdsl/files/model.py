@@ -11,6 +11,7 @@ import sys
 import time
 from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 
 from hsdsl import limits
 from hsdsl.errors import UsageError
@@ -39,6 +40,25 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
             return _content(stream.fileno(), most, path)
     except (OSError, ValueError) as error:
         raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
+
+
+def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
+    """Open a regular file to read; anything else is refused before it could keep us waiting.
+
+    Raises
+    ------
+    OSError
+        It cannot be opened, or is none.
+    """
+    refusal = OSError(errno.EINVAL, "this is not a regular file")
+    mode = os.stat(path).st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # to open some devices is to do something
+        raise refusal
+    stream = open(os.open(path, READ | flags), "rb")  # noqa: SIM115 - whoever asked closes it
+    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        return stream
+    stream.close()  # exchanged meanwhile
+    raise refusal
 
 
 def is_piped(path: str | os.PathLike[str]) -> bool:
