@@ -11,8 +11,9 @@ import click
 
 from hsdsl.cli.console import FILE, errors_reported, say
 from hsdsl.cli.limited import limited
+from hsdsl.cli.streams import draw
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, visible
 
 if TYPE_CHECKING:
     from hsdsl.chart import Row
@@ -144,12 +145,11 @@ class _progress:
         return self._say if self._shown else _silence
 
     def _say(self, text: str) -> None:
-        sys.stderr.write(f"\r\x1b[K{text[:100]}")
-        sys.stderr.flush()
+        draw(f"\r\x1b[K{visible(text[:100])}")
 
     def __exit__(self, *_: object) -> None:
         if self._shown:
-            sys.stderr.write("\r\x1b[K")
+            draw("\r\x1b[K")
 
 
 def _split(text: str | None) -> list[str]:

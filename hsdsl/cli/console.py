@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
+from hsdsl.cli.streams import draw
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
+from hsdsl.names import visible
 
 if TYPE_CHECKING:
     from hsdsl.simulate.recorder import Progress
@@ -56,7 +58,7 @@ def report_usage(error: UsageError, json: bool) -> None:
 
         empty = {"code": None, "path": None, "line": None, "column": None}
         print(dumps({"errors": [{**empty, "message": str(error), "hint": error.hint}]}))
-    say(f"hsdsl: {error}" + (f"\n  hint: {error.hint}" if error.hint else ""))
+    say(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
 
 
 @contextmanager
@@ -82,11 +84,9 @@ def progress(quiet: bool) -> Generator[Callable[[Progress], None] | None]:
     finally:
         done.set()
         thread.join()
-        sys.stderr.write("\r\x1b[K")
-        sys.stderr.flush()
+        draw("\r\x1b[K")
 
 
 def _bar(share: float, transitions: int, width: int = 30) -> None:
     full = round(width * min(1.0, share))
-    sys.stderr.write(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")
-    sys.stderr.flush()
+    draw(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")

@@ -10,6 +10,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.cli.console import FIRST_SIGN, INTERVAL, say
+from hsdsl.cli.streams import draw
 from hsdsl.errors import UsageError
 
 if TYPE_CHECKING:
@@ -72,14 +73,12 @@ def _progress() -> Generator[Callable[[float, float], None] | None]:
         nonlocal due
         if monotonic() >= due:
             due = monotonic() + INTERVAL
-            sys.stderr.write(f"\rat least {lower:.4g}, at most {upper:.4g} so far\x1b[K")
-            sys.stderr.flush()
+            draw(f"\rat least {lower:.4g}, at most {upper:.4g} so far\x1b[K")
 
     try:
         yield watch
     finally:
-        sys.stderr.write("\r\x1b[K")
-        sys.stderr.flush()
+        draw("\r\x1b[K")
 
 
 def _run(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | Path | None]:

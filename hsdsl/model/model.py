@@ -16,7 +16,7 @@ from hsdsl.model.parts import Parts, parts_of
 from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import Request
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
@@ -67,8 +67,8 @@ class Model:
         return type(self), (self.parts,)
 
     def __repr__(self) -> str:
-        modes = ", ".join(mode.name for mode in self.program.modes[:8])
-        return f"<hsdsl model {Path(self.program.path).name}: modes {modes}{', ...' * (len(self.program.modes) > 8)}>"
+        modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
+        return f"<hsdsl model {visible(Path(self.program.path).name)}: modes {modes}>"
 
     @property
     def system(self) -> HybridSystem:
