@@ -51,20 +51,21 @@ def distrusted(path: Path) -> str | None:
     """
     if not hasattr(os, "getuid"):
         return None  # on Windows a profile is its user's alone
-    place = folder().resolve()
-    for above in place.parents:  # who may write there may exchange what lies below
-        mode = above.stat().st_mode
+    top = folder()
+    place = above = os.path.realpath(top)
+    while above != (above := os.path.dirname(above)):  # who may write there may exchange what lies below
+        mode = os.stat(above).st_mode
         if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
             return f"{above} can be written by other users"
     refusal = _of_another(place)
-    for name in path.relative_to(folder()).parts:
-        place /= name
+    for name in path.parts[len(top.parts) :]:
+        place = os.path.join(place, name)
         refusal = refusal or _of_another(place)
     return refusal
 
 
-def _of_another(place: Path) -> str | None:
-    status = place.lstat()
+def _of_another(place: str) -> str | None:
+    status = os.lstat(place)
     if status.st_uid not in (os.getuid(), 0):
         return f"{place} belongs to another user"
     if stat.S_ISLNK(status.st_mode):

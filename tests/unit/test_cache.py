@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -192,6 +198,41 @@ def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: 
     assert sorted(folder.rglob("*")) == before
     new = subprocess.run([*served, *RUN, "--set", "experiment.method=dopri5"], capture_output=True, text=True)
     assert new.returncode == 0 and "Traceback" not in new.stderr
+
+
+def test_those_who_keep_find_and_remove_at_once_find_whole_entries_or_none(folder: Path) -> None:
+    texts, wrong = [str(k) * 50_000 for k in range(3)], []
+
+    def keeps(text: str) -> None:
+        with suppress(OSError):  # its entry was removed under it: then nothing is kept
+            cache.keep("words", "k", ".txt", write(text))
+
+    def finds() -> None:
+        path = cache.find("words", "k")
+        with suppress(FileNotFoundError):
+            if path is not None and path.read_text() not in texts:
+                wrong.append(path)
+
+    def removes() -> None:
+        time.sleep(1e-3)
+        shutil.rmtree(folder / "words", ignore_errors=True)
+
+    def repeat(what: Callable[[], None]) -> None:
+        try:
+            for _ in range(200):
+                what()
+        except BaseException as error:
+            wrong.append(error)
+
+    work = [*(partial(keeps, text) for text in texts), finds, finds, removes]
+    threads = [threading.Thread(target=repeat, args=[what]) for what in work]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not wrong and not any(thread.is_alive() for thread in threads)
+    keeps(texts[0])
+    assert cache.find("words", "k") is not None and not list(folder.rglob("*.part"))
 
 
 @posix
