@@ -48,7 +48,7 @@ Part = tuple[tuple[str, ...], ...]  # names of states and outputs asked for, and
 
 def key_of(written: Written, part: Part = ()) -> str:
     """Return the name of an entry; where there are data files, copies in two folders have one each."""
-    folder = str(folder_of(written.path).resolve()) if written.files != {} else ""
+    folder = os.fsencode(folder_of(written.path).resolve()) if written.files != {} else b""
     return store.key_of(written.text, _fingerprint(), repr(written.limits), folder, repr(part))
 
 

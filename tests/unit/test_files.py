@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl import limits
+from hsdsl import limits, store
 from hsdsl.cache import key_of
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.files import data, read_bytes
@@ -280,6 +280,22 @@ def test_copies_in_two_folders_have_their_own_data_and_both_are_kept(tmp_path):
         for number in (1, 2):
             assert end(hsdsl.load(tmp_path / str(number) / "m.yaml")) == number
     assert all("program" in vars(hsdsl.load(tmp_path / number / "m.yaml").parts) for number in "12")
+
+
+@posix
+@pytest.mark.parametrize("name", ["\udcff", "\x1b[31m", "a\nb", "\u202e", "'\"$ "], ids=ascii)
+def test_a_folder_may_have_any_name(name, tmp_path, monkeypatch):
+    folder = tmp_path / name
+    folder.mkdir()
+    (folder / "m.yaml").write_text(WITH_DATA)
+    (folder / "u.csv").write_text("time,u\n0,3\n")
+    for _ in range(2):
+        assert end(hsdsl.load(folder / "m.yaml")) == 3
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    for _ in range(2):
+        assert end(hsdsl.load(folder / "m.yaml")) == 3
+    (run,) = hsdsl.load(folder / "m.yaml").simulate(engine="python").save(folder / "run.npz")
+    assert hsdsl.distance(store.load(run), store.load(run)).upper == 0
 
 
 def test_copies_without_data_share_what_is_kept(tmp_path):

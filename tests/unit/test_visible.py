@@ -121,7 +121,9 @@ def test_a_file_name_steers_nothing(name, tmp_path, monkeypatch, capfd):
     Path(f"{name}2.yaml").write_text(MODEL.replace("x: 1", "x: q"))
     commands = [
         ["validate", f"{name}.yaml", f"{name}2.yaml", f"{name}3.yaml"], ["lint", f"{name}.yaml", f"{name}2.yaml"],
-        ["lint", "--format", "github", f"{name}2.yaml"], ["run", f"{name}.yaml", "--out", "r.npz"],
+        ["lint", "--format", "github", f"{name}2.yaml"], ["lint", "--format", "sarif", f"{name}2.yaml"],
+        ["validate", "--json", f"{name}2.yaml"], ["run", f"{name}.yaml", "--json", "--plot", f"{name}.html"],
+        ["run", f"{name}.yaml", "--out", "r.npz"],
         ["run", f"{name}3.yaml"], ["run", f"{name}.yaml", f"--{name}"], ["lint", "--format", name, "x"], [name],
         ["run", f"{name}.yaml", "--engine", name], ["run", f"{name}.yaml", "--out", f"{name}/x.csv"], ["explain", name],
         ["run", f"{name}.yaml", "--set", f"{name}=1"], ["distance", f"{name}.npz", f"{name}.npz"],
