@@ -7,11 +7,12 @@ same where a function has no finite real value: they raise one of :data:`DOMAIN_
 
 from __future__ import annotations
 
+import copyreg
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 Number = Any  # float or mpmath.mpf: whatever the arithmetic makes
@@ -108,6 +109,14 @@ FLOAT64 = Arithmetic(
 )
 
 
+def _pickled(digits: int, number: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+    return _unpickled, (digits, number._mpf_)
+
+
+def _unpickled(digits: int, parts: Any) -> Any:
+    return multiprecision(digits).zero.context.make_mpf(parts)
+
+
 @cache
 def multiprecision(digits: int) -> Arithmetic:
     """Make mpmath numbers of ``digits`` decimal digits, in a context of their own (no global state is touched)."""
@@ -115,6 +124,7 @@ def multiprecision(digits: int) -> Arithmetic:
 
     context: Any = mpmath.MPContext()
     context.dps = digits
+    copyreg.pickle(context.mpf, partial(_pickled, digits))
 
     def heaviside(x: Any) -> Any:
         return (1 + context.sign(x)) / 2

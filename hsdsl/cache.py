@@ -1,8 +1,11 @@
 """Files that can be made again, in the user's cache folder: private, checked when read, safe among processes.
 
 An entry is ``KIND/KEY/CHECKSUM.SUFFIX``: its name says what its content must hash to, so a damaged file is noticed and
-made again, and no other file has to be written together with it. Files are written beside and renamed. The folder must
-belong to the user and be writable by nobody else, since compiled code is loaded from it; another folder is refused.
+made again, and no other file has to be written together with it. Files are written beside and renamed.
+
+Compiled code is loaded from here. So the folder, all in it and the file itself must belong to the user (or to root), be
+writable by nobody else and be no links, and a folder above may be writable by everybody only if it is sticky, as /tmp
+is. Else nothing is taken from here and nothing kept.
 """
 
 from __future__ import annotations
@@ -30,18 +33,45 @@ def folder() -> Path:
 
 
 def private(path: Path) -> str | None:
-    """Make a folder private to the user, or say why it cannot be used."""
+    """Make a folder of the cache private to the user, or say why it cannot be used."""
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = path.stat()
+        return distrusted(path)
     except OSError as error:
         return f"{path} cannot be made: {error.strerror}"
+
+
+def distrusted(path: Path) -> str | None:
+    """Say why a file or folder of the cache is not trusted: itself, or a folder on the way, could be another's work.
+
+    Raises
+    ------
+    OSError
+        It is not there.
+    """
     if not hasattr(os, "getuid"):
         return None  # on Windows a profile is its user's alone
-    if status.st_uid != os.getuid():
-        return f"{path} belongs to another user"
+    top = folder()
+    place = above = os.path.realpath(top)
+    while above != (above := os.path.dirname(above)):  # who may write there may exchange what lies below
+        mode = os.stat(above).st_mode
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            return f"{above} can be written by other users"
+    refusal = _of_another(place)
+    for name in path.parts[len(top.parts) :]:
+        place = os.path.join(place, name)
+        refusal = refusal or _of_another(place)
+    return refusal
+
+
+def _of_another(place: str) -> str | None:
+    status = os.lstat(place)
+    if status.st_uid not in (os.getuid(), 0):
+        return f"{place} belongs to another user"
+    if stat.S_ISLNK(status.st_mode):
+        return f"{place} is a link"
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"{path} can be written by other users (make it private: chmod 700)"
+        return f"{place} can be written by other users (make it private: chmod 700)"
     return None
 
 
@@ -56,17 +86,19 @@ def key_of(*parts: str | bytes) -> str:
 
 
 def find(kind: str, key: str) -> Path | None:
-    """Return the file of an entry whose content is what was written, if there is one; a damaged one is removed."""
-    if private(folder()) is not None:
-        return None
+    """Return the file of an entry whose content is what was written, if there is one; a damaged one is removed.
+
+    Nothing is written that has to be: a cache that was filled before serves on a read-only file system too.
+    """
     with suppress(OSError):
         for path in sorted((folder() / kind / key).iterdir()):
-            if path.suffix == ".part":
+            if path.suffix == ".part" or distrusted(path) is not None:
                 continue
-            if _checksum(path.read_bytes()) == path.stem:
-                os.utime(path)
+            whole = _checksum(path.read_bytes()) == path.stem
+            with suppress(OSError):
+                os.utime(path) if whole else path.unlink()
+            if whole:
                 return path
-            path.unlink()
     return None
 
 
@@ -80,15 +112,16 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     """
     import secrets
 
-    if refusal := private(folder()):
-        raise PermissionError(refusal)
     entry = folder() / kind / key
-    entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if refusal := private(folder()) or private(entry.parent):
+        raise PermissionError(refusal)
     part = entry.parent / f"{secrets.token_hex(8)}.part"  # beside the entry, which another process may prune
     try:
         write(part)
+        part.chmod(0o600)
         path = entry / f"{_checksum(part.read_bytes())}{suffix}"
-        entry.mkdir(mode=0o700, exist_ok=True)
+        if refusal := private(entry):
+            raise PermissionError(refusal)
         os.replace(part, path)
         for other in entry.iterdir():
             if other != path and other.suffix != ".part":

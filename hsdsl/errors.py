@@ -76,7 +76,10 @@ class ModelError(Exception):
 
     def __init__(self, diagnostics: list[Diagnostic] | tuple[Diagnostic, ...]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("\n".join(f"{d}" + (f" ({d.hint})" if d.hint else "") for d in self.diagnostics))
+        super().__init__(self.diagnostics)  # what it is made from again, in another process
+
+    def __str__(self) -> str:
+        return "\n".join(f"{d}" + (f" ({d.hint})" if d.hint else "") for d in self.diagnostics)
 
 
 class UsageError(Exception):

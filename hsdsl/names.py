@@ -11,6 +11,7 @@ LOOKALIKES = "·²³"  # Unicode lets some of them stand in names; in mathematic
 INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"
 )
+_HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
@@ -68,11 +69,16 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
 
 
 def visible(text: str) -> str:
-    """A text without characters that would steer a terminal or hide from a reader."""
-    return INVISIBLE.sub("\ufffd", text)
+    """A text as one line, character by character, without any that steer a terminal or hide from a reader."""
+    return _HIDDEN.sub("\ufffd", text)
 
 
-def shown(text: str, limit: int = 60) -> str:
-    """A text cut to what a sentence can carry."""
-    text = " ".join(visible(text).split())
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+def visible_lines(text: str) -> str:
+    """A text of several lines, each of them visible."""
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def shown(text: str, limit: int | None = 60) -> str:
+    """A text as a sentence can carry it: in one line, and cut."""
+    text = visible(" ".join(INVISIBLE.sub("\ufffd", text).split()))
+    return text if limit is None or len(text) <= limit else text[: limit - 3] + "..."

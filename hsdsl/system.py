@@ -10,7 +10,7 @@ Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with its p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -146,7 +146,7 @@ class HybridSystem:
     initial: Initial
     experiment: Experiment
     reference: tuple[dict[str, Any], ...]  # checked plain data, numbers as text
-    files: dict[str, str]  # data files that were read, relative to the model, and their sha256
+    files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

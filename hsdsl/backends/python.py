@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
@@ -41,6 +40,7 @@ class PythonKernel:
     def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
         self.arithmetic = arithmetic
         self._program = program
+        self._enclosing: PythonKernel | None = None
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
         self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
@@ -48,12 +48,14 @@ class PythonKernel:
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
 
-    @cached_property
+    @property
     def enclosing(self) -> PythonKernel:
         """The same program over interval arithmetic."""
         from hsdsl.enclosures import ENCLOSED  # only verdicts ask for it
 
-        return PythonKernel(self._program, ENCLOSED)
+        if self._enclosing is None:
+            self._enclosing = PythonKernel(self._program, ENCLOSED)
+        return self._enclosing
 
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""

@@ -10,12 +10,13 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from typing import Any
 
 import click
 from click.exceptions import Exit, NoSuchCommand
 
 from hsdsl import __version__
+from hsdsl.cli import streams
+from hsdsl.names import visible
 
 INTERRUPTED, WRONG_USAGE = 130, 2
 VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "schema", "doctor")
@@ -53,7 +54,7 @@ def app() -> None:
 
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
-    _prepare_streams()
+    streams.prepare()
     code = 0
     try:
         code = _obey(sys.argv[1:])
@@ -75,22 +76,13 @@ def _obey(words: list[str]) -> int:
     except Exit as end:
         return end.exit_code
     except click.ClickException as error:
-        error.show()
+        vars(error)["message"] = visible(error.message)
+        error.show(sys.stderr)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
     return 0
-
-
-def _prepare_streams() -> None:
-    """See to it that there are streams, also where they were closed, and that they can write any name."""
-    for name in ("stdout", "stderr"):
-        stream: Any = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def _drop_output() -> None:

@@ -11,8 +11,9 @@ import click
 
 from hsdsl.cli.console import FILE, errors_reported, say
 from hsdsl.cli.limited import limited
+from hsdsl.cli.streams import draw
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, visible
 
 if TYPE_CHECKING:
     from hsdsl.chart import Row
@@ -110,12 +111,14 @@ def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | N
     from hsdsl.chart.picture import panels
     from hsdsl.chart.table import as_csv, as_text, record
     from hsdsl.report import dumps
+    from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
 
     rows = [row for _, group in found for row in group]
     if out is not None:
         with replacing(out) as file:
             file.write(as_csv(rows).encode())
+            forget_sidecar(out)
         say(f"wrote {out}")
     if plot is not None:
         from hsdsl.plot.work_precision import plot_work_precision
@@ -142,12 +145,11 @@ class _progress:
         return self._say if self._shown else _silence
 
     def _say(self, text: str) -> None:
-        sys.stderr.write(f"\r\x1b[K{text[:100]}")
-        sys.stderr.flush()
+        draw(f"\r\x1b[K{visible(text[:100])}")
 
     def __exit__(self, *_: object) -> None:
         if self._shown:
-            sys.stderr.write("\r\x1b[K")
+            draw("\r\x1b[K")
 
 
 def _split(text: str | None) -> list[str]:

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
+from hsdsl.cli.streams import draw
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
+from hsdsl.names import visible
 
 if TYPE_CHECKING:
     from hsdsl.simulate.recorder import Progress
@@ -23,7 +25,12 @@ FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
 
 
 def say(text: str) -> None:
-    """Write a message to standard error."""
+    """Write a message to standard error: one line, whatever stands in it."""
+    say_lines(visible(text))
+
+
+def say_lines(text: str) -> None:
+    """Write several lines to standard error; what stands in each was made visible before."""
     print(text, file=sys.stderr)
 
 
@@ -39,9 +46,9 @@ def errors_reported(json: bool) -> Generator[None]:
         if json:
             print(dumps(as_json(error.diagnostics)))
         else:
-            say("\n\n".join(render(d) for d in error.diagnostics))
+            say_lines("\n\n".join(render(d) for d in error.diagnostics))
             count = len(error.diagnostics)
-            say(f"\n{count} error{'s' * (count > 1)}")
+            say_lines(f"\n{count} error{'s' * (count > 1)}")
         contradiction = all(d.code == STEP_AND_TOLERANCE for d in error.diagnostics)
         raise Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
     except UsageError as error:
@@ -56,7 +63,7 @@ def report_usage(error: UsageError, json: bool) -> None:
 
         empty = {"code": None, "path": None, "line": None, "column": None}
         print(dumps({"errors": [{**empty, "message": str(error), "hint": error.hint}]}))
-    say(f"hsdsl: {error}" + (f"\n  hint: {error.hint}" if error.hint else ""))
+    say_lines(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
 
 
 @contextmanager
@@ -82,11 +89,9 @@ def progress(quiet: bool) -> Generator[Callable[[Progress], None] | None]:
     finally:
         done.set()
         thread.join()
-        sys.stderr.write("\r\x1b[K")
-        sys.stderr.flush()
+        draw("\r\x1b[K")
 
 
 def _bar(share: float, transitions: int, width: int = 30) -> None:
     full = round(width * min(1.0, share))
-    sys.stderr.write(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")
-    sys.stderr.flush()
+    draw(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")

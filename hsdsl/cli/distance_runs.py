@@ -10,10 +10,12 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.cli.console import FIRST_SIGN, INTERVAL, say
+from hsdsl.cli.streams import draw
 from hsdsl.errors import UsageError
 
 if TYPE_CHECKING:
     from hsdsl.execution import Execution
+    from hsdsl.model import Model
 
 PICTURES = (".png", ".svg")
 
@@ -35,8 +37,8 @@ def of_runs(
     from hsdsl.report import dumps
 
     check_picture(plot)
-    run, other = _run(first, options["parameters"]), _run(second, options["parameters"])
-    options = {**options, "model": _model_beside(first, run)}
+    (run, model), (other, _) = (_run(path, options["parameters"]) for path in (first, second))
+    options = {**options, "model": model}
     with _progress() as watch:
         found = distance(run, other, metric or "rho", coordinates=coordinates, watch=watch, **options)
     if plot is not None:
@@ -71,24 +73,25 @@ def _progress() -> Generator[Callable[[float, float], None] | None]:
         nonlocal due
         if monotonic() >= due:
             due = monotonic() + INTERVAL
-            sys.stderr.write(f"\rat least {lower:.4g}, at most {upper:.4g} so far\x1b[K")
-            sys.stderr.flush()
+            draw(f"\rat least {lower:.4g}, at most {upper:.4g} so far\x1b[K")
 
     try:
         yield watch
     finally:
-        sys.stderr.write("\r\x1b[K")
-        sys.stderr.flush()
+        draw("\r\x1b[K")
 
 
-def _run(path: Path, parameters: dict[str, Any]) -> Execution:
+def _run(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | Path | None]:
+    """A run and the model that it is of, where that is not where the run says."""
     if path.suffix.lower() == ".npz":
         from hsdsl.store import load
 
-        return load(path)
+        run = load(path)
+        return run, _model_beside(path, run)
     from hsdsl.model import load as load_model
 
-    return load_model(path).simulate(parameters=parameters)
+    model = load_model(path)  # read once: it may come through a pipe
+    return model.simulate(parameters=parameters), model
 
 
 def _model_beside(path: Path, run: Execution) -> Path | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hsdsl import __version__
-from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, report_usage, say
+from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, report_usage, say_lines
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
 
@@ -73,8 +73,8 @@ class Gathered:
 
     def _text(self) -> None:
         if self.errors:
-            say("\n\n".join(map(render, self.errors)))
-            say(f"\n{counted(len(self.errors), 'error')}")
+            say_lines("\n\n".join(map(render, self.errors)))
+            say_lines(f"\n{counted(len(self.errors), 'error')}")
         if self.findings:
             print("\n\n".join(map(render, self.findings)))
             print(f"\n{counted(len(self.findings), 'finding')}")

@@ -12,6 +12,7 @@ from hsdsl.cli.console import FILE
 from hsdsl.cli.gathered import FORMAT, FORMATS, Format, Gathered, counted
 from hsdsl.cli.limited import limited
 from hsdsl.errors import ModelError, UsageError
+from hsdsl.names import visible
 
 if TYPE_CHECKING:
     from hsdsl.lint import Report, Selection
@@ -77,4 +78,4 @@ def _sum_up(path: Path, report: Report, remedied: int) -> None:
     parts = [f"{remedied} fixed"] * bool(remedied) + [f"{len(report.ignored)} ignored"] * bool(report.ignored)
     found = counted(len(report.findings), "finding") if report.findings else "clean"
     if parts or not report.findings:
-        print(", ".join([f"{path}: {found}", *parts]))
+        print(", ".join([f"{visible(str(path))}: {found}", *parts]))

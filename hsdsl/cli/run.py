@@ -102,10 +102,12 @@ def _simulate(
     json: bool,
     quiet: bool,
 ) -> Execution:
+    from hsdsl.files import read_bytes
     from hsdsl.model import engines, load, split_overrides
 
-    engines.begin(path, *(asked[key] for key in ("engine", "precision", "scheme", "method")))
-    model = load(path)
+    text = read_bytes(path)
+    engines.begin(text, *(asked[key] for key in ("engine", "precision", "scheme", "method")))
+    model = load(path, text=text)
     names = chosen_names(outputs, model.columns)
     parameters, initial, settings = split_overrides(overrides)
     asked |= {"parameters": parameters, "initial": initial, "settings": settings, "outputs": names}

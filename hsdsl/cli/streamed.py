@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.cli.console import progress, say
+from hsdsl.names import visible
 
 if TYPE_CHECKING:
     from hsdsl.execution import Stop
@@ -38,7 +39,8 @@ def streamed(
         print(dumps({"model": str(path), **as_json(run)}))
     elif not quiet:
         stop = f"{run.stop.reason}: {run.stop.message}"
-        print(f"{run.rows} of {run.steps} rows written to {run.path}\nstop      {stop}\ntransitions {run.transitions}")
+        print(f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}")
+        print(f"stop      {stop}\ntransitions {run.transitions}")
     if not run.stop.complete and not json:
         say(f"hsdsl: stopped ({run.stop.reason}): {run.stop.message}")
     return run.stop

@@ -11,6 +11,7 @@ from hsdsl.cli.console import FILE
 from hsdsl.cli.gathered import FORMAT, FORMATS, Format, Gathered, counted
 from hsdsl.cli.limited import limited
 from hsdsl.errors import ModelError, UsageError
+from hsdsl.names import visible
 
 
 @click.command()
@@ -42,4 +43,4 @@ def _checked(path: Path) -> str:
     model = load(path)
     model.resolve()
     modes, edges = len(model.system.modes), sum(len(mode.edges) for mode in model.system.modes)
-    return f"{path}: valid, {counted(modes, 'mode')}, {counted(edges, 'transition')}"
+    return f"{visible(str(path))}: valid, {counted(modes, 'mode')}, {counted(edges, 'transition')}"

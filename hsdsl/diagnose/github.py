@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from hsdsl.errors import Diagnostic
+from hsdsl.names import visible
 
 _COMMAND = {"error": "error", "warning": "warning", "note": "notice"}
-_IN_MESSAGE = {"%": "%25", "\r": "%0D", "\n": "%0A"}
-_IN_PROPERTY = {**_IN_MESSAGE, ":": "%3A", ",": "%2C"}
+_IN_MESSAGE, _IN_PROPERTY = "%", "%:,"
 
 
 def as_annotation(diagnostic: Diagnostic) -> str:
@@ -22,5 +22,10 @@ def as_annotation(diagnostic: Diagnostic) -> str:
     return f"::{_COMMAND[diagnostic.severity]} {listed}::{_escaped(diagnostic.message + hint, _IN_MESSAGE)}"
 
 
-def _escaped(text: str, table: dict[str, str]) -> str:
-    return "".join(table.get(character, character) for character in text)
+def _escaped(text: str, signs: str) -> str:
+    """Write as %XX what is a sign of a command, ends a line, steers a terminal or hides."""
+    return "".join(_encoded(c) if c in signs or visible(c) != c else c for c in text)
+
+
+def _encoded(character: str) -> str:
+    return "".join(f"%{byte:02X}" for byte in character.encode("utf-8", "surrogatepass"))

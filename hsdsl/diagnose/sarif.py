@@ -83,7 +83,7 @@ def _uri(path: str) -> str:
     """A path as a URI: relative ones stay relative, to be resolved by who reads the log."""
     if os.path.isabs(path):
         return Path(path).as_uri()
-    return quote(Path(path).as_posix())
+    return quote(os.fsencode(Path(path).as_posix()))
 
 
 def _edit(edit: Edit) -> dict[str, Any]:

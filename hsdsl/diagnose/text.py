@@ -26,13 +26,13 @@ def render(diagnostic: Diagnostic) -> str:
         without a line break at the end. A finding that is known by bounds or from samples says so.
     """
     span = diagnostic.span
-    where = f"{span.path}:{span.line}:{span.column}: " if span else ""
+    where = f"{visible(span.path)}:{span.line}:{span.column}: " if span else ""
     decided = _DECIDED[diagnostic.decided]
-    lines = [f"{where}{diagnostic.severity} {diagnostic.code}: {diagnostic.message}{decided}"]
+    lines = [f"{where}{diagnostic.severity} {diagnostic.code}: {visible(diagnostic.message)}{decided}"]
     if span and diagnostic.text is not None:
         lines += _pointed(visible(diagnostic.text), span.column - 1, span.length)
     if diagnostic.hint:
-        lines.append(f"  hint: {diagnostic.hint}")
+        lines.append(f"  hint: {visible(diagnostic.hint)}")
     return "\n".join(lines)
 
 

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NoReturn
 
 from hsdsl import limits
@@ -25,8 +23,9 @@ from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.files import digest_of, read_bytes
 from hsdsl.schema import Model, read
-from hsdsl.source import Node, Text, compose, decode, read_bytes
+from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem
 
 __all__ = ["Reading", "elaborate", "elaborate_with_places", "parameter_expression"]
@@ -63,7 +62,9 @@ class Reading:
     top: Scope
 
 
-def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
+def elaborate(
+    path: str | os.PathLike[str], *, text: bytes | None = None, files: Mapping[str, bytes] | None = None
+) -> HybridSystem:
     """The hybrid system that a model file describes.
 
     Parameters
@@ -72,6 +73,8 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
         The model file.
     text : bytes, optional
         Its content, where it is not to be read from ``path``.
+    files : mapping, optional
+        The content of its data files by name, where they are not to be read.
 
     Returns
     -------
@@ -85,10 +88,12 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
     UsageError
         The file cannot be read.
     """
-    return elaborate_with_places(path, text=text).system
+    return elaborate_with_places(path, text=text, files=files).system
 
 
-def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = None) -> Reading:
+def elaborate_with_places(
+    path: str | os.PathLike[str], *, text: bytes | None = None, files: Mapping[str, bytes] | None = None
+) -> Reading:
     """The hybrid system that a model file describes, beside the places its parts have there.
 
     Parameters and errors are those of :func:`elaborate`.
@@ -100,18 +105,17 @@ def elaborate_with_places(path: str | os.PathLike[str], *, text: bytes | None = 
     root = compose(source, findings)
     document = read(root, findings)
     reader = Reader(findings)
-    world = World.of(document, reader, Path(path).parent, shown_path)
+    world = World.of(document, reader, shown_path, files)
     try:
         with deep_stack(), timebox(limits.current().seconds, PARTS) as reader.box:
             parts = _parts(world)
     except OutOfTime:
         _say_too_long(reader)
     findings.raise_if_any()
-    digest = hashlib.sha256(b"".join((data, *world.files.values()))).hexdigest()
-    files = {name: hashlib.sha256(content).hexdigest() for name, content in world.files.items()}
+    digest = digest_of(data, world.files.values())
     title, about = world.text(document.title), world.text(document.source)
     try:
-        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=files, **parts)
+        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=world.files, **parts)
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
     top = world.scope(("time", "parameters", "inputs", "states", "let"), "")

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from pathlib import Path
 
-from hsdsl import limits
 from hsdsl.elaborate.world import World
 from hsdsl.errors import Diagnostic, Span
+from hsdsl.files import DataRefused
 from hsdsl.names import did_you_mean, shown
-from hsdsl.source import ABSENT, Key, Scalar, reason
+from hsdsl.source import ABSENT, Key, Scalar
 
-LARGEST_FILE = 64 << 20  # bytes
 _MOST_FAULTS = 10  # of one file: a wrong column would bury everything else
 _NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE][+-]?[0-9]{1,3})?")
 
@@ -23,55 +21,21 @@ def read_samples(world: World, name: Key, file: Scalar) -> Samples | None:
     """Times and values of the column ``name``; None where the file has faults, which are reported."""
     if file.value == ABSENT:
         return None
-    path = _inside(world, file)
-    data = None if path is None else _bytes(world, file, path)
-    if path is None or data is None:
+    try:
+        data = world.data(file.value)
+    except DataRefused as refusal:
+        world.reader.add(file.place, refusal.code, refusal.message, refusal.hint)
         return None
-    world.files[file.value] = data
     try:
         lines = data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         world.reader.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
-    table = _Table(str(path), lines)
+    table = _Table(str(world.folder / file.value), lines)
     samples = table.samples(name)
     for diagnostic in table.faults:
         world.reader.findings.add(diagnostic)
     return None if table.faults else samples
-
-
-def _inside(world: World, file: Scalar) -> Path | None:
-    """The file's path, if it stays in the model's folder."""
-    path = world.folder / file.value
-    try:
-        target = path.resolve()
-        folders = (world.folder.resolve(), *(folder.resolve() for folder in limits.current().folders))
-        inside = any(target.is_relative_to(folder) for folder in folders)
-    except (OSError, ValueError, RuntimeError):
-        inside = False
-    if inside:
-        return path
-    message = f"the file '{shown(file.value)}' is not in the folder of the model"
-    hint = "put it there and write its path from that folder, or allow its folder with --allow-path FOLDER"
-    world.reader.add(file.place, "HS317", message, hint)
-    return None
-
-
-def _bytes(world: World, file: Scalar, path: Path) -> bytes | None:
-    try:
-        if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe would keep us waiting
-            world.reader.add(file.place, "HS311", f"'{shown(file.value)}' is not a regular file")
-            return None
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        message = f"the file '{shown(file.value)}' cannot be read: {reason(error)}"
-        world.reader.add(file.place, "HS311", message, "its path is taken from the folder of the model")
-        return None
-    if len(data) > LARGEST_FILE:
-        world.reader.add(file.place, "HS311", f"the file '{shown(file.value)}' is larger than 64 MiB")
-        return None
-    return data
 
 
 def _hint(name: str, columns: list[str]) -> str | None:

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from hsdsl.elaborate.reader import Reader
 from hsdsl.expression.scope import Refusal, Scope, Value, state
+from hsdsl.files import folder_of, read_data
 from hsdsl.names import closest
 from hsdsl.schema import Mode, Model
 from hsdsl.source import ABSENT, Key, Scalar
@@ -35,14 +36,17 @@ class World:
         The names that only `initial` knows: states of its mode that lack a flow. They are reported there alone.
     scopes : dict
         What names mean in each mode, once it is elaborated.
+    given : mapping or None
+        The content of all data files by name, where they are not to be read.
     files : dict
-        The data files that were read: their content by name, relative to the model.
+        The data files that were used: their content by name, relative to the model.
     """
 
     document: Model
     reader: Reader
     folder: Path
     path: str
+    given: Mapping[str, bytes] | None = None
     names: dict[str, str] = field(default_factory=dict)
     values: Values = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -51,9 +55,9 @@ class World:
     files: dict[str, bytes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, document: Model, reader: Reader, folder: Path, path: str) -> World:
+    def of(cls, document: Model, reader: Reader, path: str, given: Mapping[str, bytes] | None = None) -> World:
         """A document with its names gathered and their clashes reported."""
-        world = cls(document, reader, folder, path)
+        world = cls(document, reader, folder_of(path), path, given)
         for key in document.parameters:
             world._claim(key, "parameters")
         for key in document.inputs:
@@ -98,6 +102,18 @@ class World:
             else:
                 found[name] = _refused(name, KINDS[kind], sentence, hint)
         return Scope({**dict.fromkeys(self.undeclared), **found, **(values or {})})
+
+    def data(self, name: str) -> bytes:
+        """The content of a data file, which is read once.
+
+        Raises
+        ------
+        DataRefused
+            It cannot be used.
+        """
+        if name not in self.files:
+            self.files[name] = read_data(self.folder, name) if self.given is None else self.given[name]
+        return self.files[name]
 
     def text(self, scalar: Scalar | None) -> str | None:
         """The text of a scalar that may be missing."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from hsdsl.execution.run import Execution
 from hsdsl.execution.samples import Array
+from hsdsl.names import visible
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ class Ensemble:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
-        return f"<Ensemble of {self.model}: {self.scheme} {self.method}, shape {self.shape}, stops: {counts or 'none'}>"
+        how = f"{self.scheme} {self.method}, shape {self.shape}"
+        return f"<Ensemble of {visible(self.model)}: {how}, stops: {counts or 'none'}>"
 
     @property
     def reasons(self) -> dict[str, int]:

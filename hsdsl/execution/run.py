@@ -17,6 +17,7 @@ from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.same import same
 from hsdsl.execution.samples import Samples
 from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
+from hsdsl.names import visible
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
@@ -118,7 +119,7 @@ class Execution(Deferred):
         start, end = self.time_span
         count = len(self.transitions)
         return (
-            f"<Execution of {self.model}: {self.scheme} {self.method}, "
+            f"<Execution of {visible(self.model)}: {visible(self.scheme)} {visible(self.method)}, "
             f"t = {float(start):.6g} to {float(end):.6g}, {count} transition{'' if count == 1 else 's'}, "
             f"{len(self.arcs)} arcs, {len(self.times)} rows, stop: {self.stop.reason}>"
         )

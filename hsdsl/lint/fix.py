@@ -6,9 +6,10 @@ import os
 from collections.abc import Iterable
 from typing import Any
 
-from hsdsl.errors import Edit, ModelError
+from hsdsl.errors import Edit, ModelError, UsageError
+from hsdsl.files import is_piped, read_bytes
 from hsdsl.lint import Report, Selection, lint
-from hsdsl.source import decode, read_bytes
+from hsdsl.source import decode
 from hsdsl.store.atomic import replacing
 from hsdsl.system import HybridSystem
 
@@ -51,6 +52,8 @@ def fix(path: str | os.PathLike[str], selection: Selection | None = None) -> tup
             break
         (data, report), remedied = after, remedied + len(chosen)
     if data != original:
+        if is_piped(path) or read_bytes(path) != original:
+            raise UsageError(f"{os.fspath(path)} cannot be written back: it is a pipe, or was changed meanwhile")
         with replacing(path) as file:
             file.write(data)
     return report, remedied

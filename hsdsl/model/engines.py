@@ -13,7 +13,6 @@ import re
 import sys
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 from hsdsl.defaults import DEFAULTS
 from hsdsl.errors import UsageError
@@ -39,7 +38,7 @@ def check(engine: str) -> None:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
 
 
-def begin(path: Path, engine: str, precision: int | None, scheme: str | None, method: str | None) -> None:
+def begin(model: bytes, engine: str, precision: int | None, scheme: str | None, method: str | None) -> None:
     """Compile the runtime while a model is read, where a run of it will need that and nobody has done it.
 
     What the file seems to say of its scheme and method is taken for what it says; where that is wrong the right runtime
@@ -47,11 +46,7 @@ def begin(path: Path, engine: str, precision: int | None, scheme: str | None, me
     """
     if engine == "python" or precision is not None:
         return
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except (OSError, ValueError):
-        return  # who reads it next says what is wrong
-    said = {key: value for key, value in re.findall(r"\b(scheme|method): *(\w+)", text)}
+    said = {key: value for key, value in re.findall(r"\b(scheme|method): *(\w+)", model.decode(errors="replace"))}
     scheme = scheme or said.get("scheme", DEFAULTS["scheme"])
     if scheme in SCHEMES:
         kernel.begin(scheme, method or said.get("method", DEFAULTS["method"]))

@@ -96,6 +96,23 @@ def _samples(asked: Any) -> int | Array | None:
 
 
 @dataclass(frozen=True, eq=False)
+class Again:
+    """Single runs of the instances of an ensemble, by their places."""
+
+    model: Model
+    asked: Asked
+
+    def __call__(self, place: tuple[int, ...]) -> Execution:
+        """Run one."""
+        shape = self.asked.varied.shape
+        return self.numbered(int(np.ravel_multi_index(place, shape)) if shape else 0)
+
+    def numbered(self, index: int) -> Execution:
+        """Run the one with this number."""
+        return self.model.simulate(**self.asked.single(index))
+
+
+@dataclass(frozen=True, eq=False)
 class Ready:
     """An ensemble that can start. ``places`` are the numbers of the instances that are not refused."""
 
@@ -121,15 +138,16 @@ class Ready:
         kept = Kept(len(self.places), width, outputs, len(self.names), samples, crossings)
         if plan is None:
             modes = [mode.name for mode in program.modes]
-            again = [partial(self.again, place) for place in self.places]
+            again = [partial(self.again.numbered, place) for place in self.places]
             run_in_turn(again, self.instances, kept, self.names, self.kinds, modes, progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         return self._ensemble(kept, time.perf_counter() - began)
 
-    def again(self, index: int) -> Execution:
-        """Run one instance by itself."""
-        return self.model.simulate(**self.asked.single(index))
+    @property
+    def again(self) -> Again:
+        """Single runs."""
+        return Again(self.model, self.asked)
 
     def _ensemble(self, kept: Kept, seconds: float) -> Ensemble:
         shape, settings = self.asked.varied.shape, self.base.settings
@@ -166,7 +184,7 @@ class Ready:
             samples={name: whole(column, nan) for name, column in samples.items() if self.instances.time.shape[1]},
             seconds={"simulate": seconds},
             refusals=refused,
-            again=lambda place: self.again(int(np.ravel_multi_index(place, shape)) if shape else 0),
+            again=self.again,
         )
 
     def _states(self, kept: Kept) -> dict[str, Array]:
@@ -181,7 +199,7 @@ class Ready:
     def _stops(self, kept: Kept) -> Array:
         """Why each run ended; of one that was stuck only its own message tells."""
         for i in np.flatnonzero(kept.stop == "stuck").tolist():
-            kept.stop[i] = self.again(self.places[i]).stop.reason
+            kept.stop[i] = self.again.numbered(self.places[i]).stop.reason
         return kept.stop
 
 

@@ -11,11 +11,11 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
-from hsdsl.model.parts import Parts, parts_of, parts_of_text
+from hsdsl.model.parts import Parts, parts_of
 from hsdsl.model.remembered import Remembered, key_of
 from hsdsl.model.requests import Request
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
@@ -27,17 +27,20 @@ if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 MOST_PREPARED = 16
+NO_FILE = "<text>"  # the path of a model that is in no file
 
 
-def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
+def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
     """Read a model file.
 
     Parameters
     ----------
     path : path
-        A YAML file in the language.
+        A YAML file in the language; `-` is standard input.
     limits : Limits, optional
         What the file may ask for, and where its data may lie, where the defaults are not to hold.
+    text : bytes, optional
+        The file's content, where it is not to be read from ``path``.
 
     Raises
     ------
@@ -46,7 +49,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None) -> Model:
     UsageError
         The file cannot be read.
     """
-    return Model(parts_of(path, limits))
+    return Model(parts_of(path, limits, text))
 
 
 def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
@@ -66,30 +69,30 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
     ModelError
         The model has errors; all of them are carried.
     """
-    return Model(parts_of_text(text, folder, limits))
+    return Model(parts_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
 
 class Model:
-    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both."""
+    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both.
+
+    It is what was read when it was loaded, also where its file changes later, and it can be pickled.
+    """
 
     def __init__(self, of: HybridSystem | Parts) -> None:
         self.parts = of if isinstance(of, Parts) else Parts(of)
         self._smaller: dict[tuple[str, ...], Model] = {}
         self._prepared: Remembered[Prepared] = Remembered(MOST_PREPARED)
 
+    def __reduce__(self) -> tuple[type[Model], tuple[Parts]]:
+        return type(self), (self.parts,)
+
     def __repr__(self) -> str:
-        modes = ", ".join(mode.name for mode in self.program.modes[:8])
-        return f"<hsdsl model {Path(self.program.path).name}: modes {modes}{', ...' * (len(self.program.modes) > 8)}>"
+        modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
+        return f"<hsdsl model {visible(Path(self.program.path).name)}: modes {modes}>"
 
     @property
     def system(self) -> HybridSystem:
-        """The mathematics; of a model seen before it is read when it is asked for.
-
-        Raises
-        ------
-        UsageError
-            The file has changed meanwhile.
-        """
+        """The mathematics; of a model seen before it is elaborated when it is asked for."""
         return self.parts.system
 
     @property

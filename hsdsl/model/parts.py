@@ -7,12 +7,10 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
-from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, seen
@@ -20,6 +18,7 @@ from hsdsl.model.overrides import recorded
 from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
+from hsdsl.model.written import Written
 from hsdsl.program import Program
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, prepare
@@ -28,77 +27,60 @@ from hsdsl.simulate.timeline import Timeline, make_timeline
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
-NO_FILE = "<text>"  # the path of a model that is in no file
 
-
-def parts_of(path: str | os.PathLike[str], limits: Limits | None) -> Parts:
-    """Read a model file, or find what was kept of it."""
+def parts_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Parts:
+    """Read a model file once, or take the bytes given for it, and find what was kept of them or elaborate them."""
     began = time.perf_counter()
-    data = _read(path)
-    key = None if data is None else seen.key_of(data, limits)
-    program = None if key is None else seen.find(Path(path), key)
-    if program is not None:
-        return Parts(None, time.perf_counter() - began, limits, program, key)
-    system = _elaborated(path, limits)
-    return Parts(system, time.perf_counter() - began, limits, key=key)
-
-
-def parts_of_text(text: str, folder: str | os.PathLike[str] | None, limits: Limits | None) -> Parts:
-    """Read the text of a model; nothing of it is kept."""
-    began = time.perf_counter()
-    path = NO_FILE if folder is None else Path(folder) / NO_FILE
-    system = _elaborated(path, limits, text.encode("utf-8", errors="surrogatepass"))
-    return Parts(system, time.perf_counter() - began, limits)
-
-
-def _elaborated(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> HybridSystem:
-    from hsdsl.elaborate import elaborate
-
-    with applied(limits):
-        return elaborate(path, text=text)
-
-
-def _read(path: str | os.PathLike[str]) -> bytes | None:
-    """The file's bytes; what is wrong with a file that has none is said by who reads it next."""
-    try:
-        return Path(path).read_bytes()
-    except (OSError, ValueError):
-        return None
+    written = Written.at(path, limits, text)
+    found = seen.find(written)
+    if found is not None:
+        program, written = found
+        return Parts(None, time.perf_counter() - began, written, program)
+    system = written.elaborated()
+    return Parts(system, time.perf_counter() - began, written.with_files(system.files))
 
 
 class Parts:
-    """The parts of a checked model, and runs prepared from them; ``seconds`` is what making them took."""
+    """The parts of a checked model, and runs prepared from them; ``seconds`` is what making them took.
+
+    Pickled they are what the model was read from, where it was read, and its program.
+    """
 
     def __init__(
         self,
         system: HybridSystem | None,
         load_seconds: float = 0.0,
-        limits: Limits | None = None,
+        written: Written | None = None,
         program: Program | None = None,
-        key: str | None = None,
+        part: seen.Part = (),
         left_out: tuple[str, ...] = (),
     ) -> None:
         if system is not None:
             self.system = system
         if program is not None:
             self.program = program
-        self._limits, self._key, self._left_out = limits, key, left_out
+        self._written, self._part, self._left_out = written, part, left_out
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        made = self.program  # the first thing that whoever gets it needs, and costly
+        state = {key: value for key, value in vars(self).items() if key not in ("system", "_compiled", "kernels")}
+        return state | {"program": made} | ({"system": self.system} if self._written is None else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _compiled=None, kernels={})
+
     @cached_property
     def system(self) -> HybridSystem:
-        """The mathematics; of a model seen before it is read when it is asked for.
+        """The mathematics; of a model seen before it is elaborated when it is asked for, from the bytes read then."""
+        from hsdsl.elaborate.needed import only
 
-        Raises
-        ------
-        UsageError
-            The file has changed meanwhile.
-        """
-        system = _elaborated(self.program.path, self._limits)
-        if system.digest != self.program.digest:
-            raise UsageError(f"{system.path} has changed since it was loaded", "load it again")
+        assert self._written is not None
+        system = self._written.elaborated()
+        for names in self._part:
+            system = only(system, names)
         return system
 
     @cached_property
@@ -107,12 +89,16 @@ class Parts:
         from hsdsl.lower import lower
 
         began = time.perf_counter()
-        with applied(self._limits):
+        with applied(None if self._written is None else self._written.limits):
             program = replace(lower(self.system), left_out=self._left_out)
         self.seconds["compile"] += time.perf_counter() - began
-        if self._key is not None and program.method in (None, "auto", *METHODS):  # else it is refused, with its place
-            seen.keep(Path(program.path), self._key, program, self.system.files)
+        if program.method in (None, "auto", *METHODS):  # else it is refused, with its place
+            self._keep(program, self._part)
         return program
+
+    def _keep(self, program: Program, part: seen.Part) -> None:
+        if self._written is not None:
+            seen.keep(self._written, program, part)
 
     @property
     def columns(self) -> list[str]:
@@ -174,7 +160,7 @@ class Parts:
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """Return the inputs over time."""
-        with applied(self._limits):
+        with applied(None if self._written is None else self._written.limits):
             return make_timeline(self.program, values.kernel, parameters, until)
 
     def prepare_single(self, asked: dict[str, Any]) -> Prepared:
@@ -186,17 +172,17 @@ class Parts:
     def only(self, names: tuple[str, ...]) -> Parts:
         """Return the parts of the model with what these states and outputs need, this one where that is all."""
         began = time.perf_counter()
-        key = None if self._key is None else seen.key_of_part(self._key, names)
-        program = None if key is None else seen.find(Path(self.program.path), key)
-        if program is not None:
-            whole = program.left_out == ()
-            return self if whole else Parts(None, self.seconds["load"], self._limits, program, key)
+        part = (*self._part, names)
+        found = None if self._written is None else seen.find(self._written, part)
+        if found is not None:
+            program, written = found
+            whole = program.left_out == self.program.left_out
+            return self if whole else Parts(None, self.seconds["load"], written, program, part)
         from hsdsl.elaborate.needed import left_out, only
 
         system = only(self.system, names)
         if system is self.system:
-            if key is not None:
-                seen.keep(Path(self.program.path), key, self.program, system.files)
+            self._keep(self.program, part)
             return self
         spent = self.seconds["load"] + time.perf_counter() - began
-        return Parts(system, spent, self._limits, key=key, left_out=left_out(self.system, system))
+        return Parts(system, spent, self._written, part=part, left_out=left_out(self.system, system))

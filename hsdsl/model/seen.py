@@ -1,8 +1,8 @@
 """Programs of models read before: kept as JSON, so that to run one again needs no SymPy.
 
-An entry is found by the bytes of the model file, this package's own files and the limits in force; it names the data
-files that were read with their checksums, and holds for as long as they are unchanged. JSON is read into the types that
-`hsdsl.program` declares, and into nothing else.
+An entry is found by the bytes of the model file, this package's own files, the limits in force and, where there are
+data files, the model's folder. It names the data files with their checksums, and is used only for the bytes that it was
+made from; their rules hold each time. JSON is read into the types that `hsdsl.program` declares, and into nothing else.
 
 Every piece of a program is a row of a table and is named by its number, and equal pieces are one row: the modes of a
 large model have much in common, which is then read once.
@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -24,24 +24,32 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hsdsl import cache as store
 from hsdsl import program as declared
-from hsdsl.limits import Limits, current
+from hsdsl.files import DataRefused, folder_of
+from hsdsl.model.written import Written
 from hsdsl.program import Program
 
 KIND = "programs"
 _PACKAGE = Path(__file__).parents[1]
-_READERS = ("source", "schema", "expression", "elaborate", "lower", "model")  # what a program depends on, beside files
+_READERS = (
+    "files",
+    "source",
+    "schema",
+    "expression",
+    "elaborate",
+    "lower",
+    "model",
+)  # what a program depends on, beside files
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 Row = list[Any]
 
 
-def key_of(model: bytes, limits: Limits | None) -> str:
-    """Return the name of the entry of a model file with these bytes."""
-    return store.key_of(model, _fingerprint(), repr(limits or current()))
+Part = tuple[tuple[str, ...], ...]  # names of states and outputs asked for, and then of those of what is left
 
 
-def key_of_part(key: str, names: Sequence[str]) -> str:
-    """Return the name of the entry of a part of a model: what is left of it for states and outputs with these names."""
-    return store.key_of(key, *names)
+def key_of(written: Written, part: Part = ()) -> str:
+    """Return the name of an entry; where there are data files, copies in two folders have one each."""
+    folder = os.fsencode(folder_of(written.path).resolve()) if written.files != {} else b""
+    return store.key_of(written.text, _fingerprint(), repr(written.limits), folder, repr(part))
 
 
 @cache
@@ -59,23 +67,36 @@ def _described(*folders: Path) -> Iterator[str]:
                     yield f"{entry.path} {status.st_size} {status.st_mtime_ns}"
 
 
-def find(path: Path, key: str) -> Program | None:
-    """Return the program of a model read before, None where there is none or a data file has changed."""
-    entry = store.find(KIND, key)
-    if entry is None:
-        return None
-    with suppress(OSError, ValueError, KeyError, TypeError, IndexError):
-        found = json.loads(entry.read_bytes())
-        if all(_checksum((path.parent / name).read_bytes()) == checksum for name, checksum in found["files"].items()):
-            return replace(_read(found["rows"]), path=str(path))
+def find(written: Written, part: Part = ()) -> tuple[Program, Written] | None:
+    """Return the program of a model read before, or of a part of it, beside all that it was made from.
+
+    None where there is none, or where a data file is another one by now or breaks a rule.
+    """
+    for supposed in (written.with_files({}), written) if written.files is None else (written,):
+        entry = store.find(KIND, key_of(supposed, part))
+        with suppress(OSError, ValueError, KeyError, TypeError, IndexError, RecursionError, DataRefused):
+            if entry is not None:
+                return _found(json.loads(entry.read_bytes()), written)
     return None
 
 
-def keep(path: Path, key: str, program: Program, files: Mapping[str, str]) -> None:
-    """Keep a program; nothing happens where nothing can be kept. ``files`` are data files with their checksums."""
-    text = json.dumps({"files": dict(files), "rows": _rows(program)}, separators=(",", ":"))
+def _found(entry: dict[str, Any], written: Written) -> tuple[Program, Written]:
+    """Read an entry that was made from just these bytes; ValueError where it was made from others."""
+    complete = written.with_files({name: written.data(name) for name in entry["files"]})
+    if any(_checksum(complete.data(name)) != checksum for name, checksum in entry["files"].items()):
+        raise ValueError("another data file")
+    program = replace(_read(entry["rows"]), path=written.path)
+    if program.digest != complete.digest:
+        raise ValueError("another model")
+    return program, complete
+
+
+def keep(written: Written, program: Program, part: Part = ()) -> None:
+    """Keep a program; nothing happens where nothing can be kept."""
+    files = {name: _checksum(content) for name, content in (written.files or {}).items()}
+    text = json.dumps({"files": files, "rows": _rows(program)}, separators=(",", ":"))
     with suppress(OSError):
-        store.keep(KIND, key, ".json", lambda target: _write(target, text))
+        store.keep(KIND, key_of(written, part), ".json", lambda target: _write(target, text))
 
 
 def _write(target: Path, text: str) -> None:

@@ -20,6 +20,7 @@ from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.prepared import Prepared, Watch
+from hsdsl.store.sidecar import forget_sidecar
 from hsdsl.store.table import write_csv
 
 if TYPE_CHECKING:
@@ -162,6 +163,7 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
     assert plan is not None and settings.method is not None
     began = time.perf_counter()
     try:
+        forget_sidecar(path)  # it describes what is written over
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
         try:
             rows = Rows(prepared.program, prepared.states, every, columns, lambda text: _write_all(file, text))

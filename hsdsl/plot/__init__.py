@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+from hsdsl.names import visible_lines
 from hsdsl.plot.guards import GuardLine
 from hsdsl.store.atomic import replacing
 
@@ -85,10 +86,10 @@ def plot(
             from hsdsl.plot.page import page
 
             picture = BytesIO()
-            _print(figure, picture, "svg")
+            write_figure(figure, picture, "svg")
             file.write(page(execution, picture.getvalue().decode(), title).encode())
         else:
-            _print(figure, file, suffix[1:])
+            write_figure(figure, file, suffix[1:])
 
 
 def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
@@ -112,10 +113,23 @@ def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
         figure = draw()
         for path in map(Path, paths):
             with replacing(path) as file:
-                _print(figure, file, path.suffix[1:].lower())
+                write_figure(figure, file, path.suffix[1:].lower())
 
 
-def _print(figure: Figure, file: BinaryIO, kind: str) -> None:
+def write_figure(figure: Figure, file: BinaryIO, kind: str) -> None:
+    """Write a figure as ``png`` or ``svg``."""
     said = ("Date", "Creator", "Format", "Type") if kind == "svg" else ("Software",)
     stable = dict.fromkeys(said)  # nothing but the run: the same run gives the same file
+    _make_visible(figure)
     figure.savefig(file, format=kind, dpi=150, metadata=stable)
+
+
+def _make_visible(figure: Figure) -> None:
+    """Let no text of a model or a saved run hide characters in a picture, or break its XML."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        written = text.get_text()
+        if (visible := visible_lines(written)) != written:
+            text.set_text(visible)

@@ -47,7 +47,7 @@ def plot_over_time(
     import matplotlib.style
     from matplotlib.figure import Figure
 
-    from hsdsl.plot import STYLE
+    from hsdsl.plot import STYLE, write_figure
 
     with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")
@@ -72,9 +72,4 @@ def plot_over_time(
         axis.set_ylabel("distance")
         axis.set_title(title, loc="left", parse_math=False)
         axis.legend(frameon=False)
-        figure.savefig(
-            file,
-            format=target.suffix[1:].lower(),
-            dpi=150,
-            metadata={"Date": None} if target.suffix == ".svg" else None,
-        )
+        write_figure(figure, file, target.suffix[1:].lower())

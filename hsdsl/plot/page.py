@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
-
 from hsdsl.execution import Execution
 from hsdsl.report import words
-from hsdsl.report.page import html
+from hsdsl.report.page import escaped, html
 
 CSS = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 75rem; margin: 2rem auto; padding: 0 1rem }
@@ -19,7 +17,7 @@ td { font-variant-numeric: tabular-nums }
 
 def page(execution: Execution, svg: str, title: str | None) -> str:
     """Put an SVG picture and the run's summary on a page."""
-    name = escape(title or words.heading(execution))
+    name = escaped(title or words.heading(execution))
     picture = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{name}"', 1)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{name}</title>\n'

@@ -50,7 +50,7 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
     import matplotlib.style
     from matplotlib.figure import Figure
 
-    from hsdsl.plot import STYLE
+    from hsdsl.plot import STYLE, write_figure
 
     with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
         columns = min(3, len(modes))
@@ -62,8 +62,7 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
         for axis in axes[len(modes) :]:
             axis.set_visible(False)
         figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-        day = {"Date": None} if target.suffix.lower() == ".svg" else None
-        figure.savefig(file, format=target.suffix[1:].lower(), dpi=150, metadata=day)
+        write_figure(figure, file, target.suffix[1:].lower())
 
 
 def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:

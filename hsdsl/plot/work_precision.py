@@ -74,7 +74,7 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
     import matplotlib.style
     from matplotlib.figure import Figure
 
-    from hsdsl.plot import STYLE
+    from hsdsl.plot import STYLE, write_figure
 
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
@@ -89,12 +89,7 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
                 else:
                     axes[k][i].axis("off")
         _legend(figure, labels, groups)
-        figure.savefig(
-            file,
-            format=target.suffix[1:].lower(),
-            dpi=150,
-            metadata={"Date": None} if target.suffix == ".svg" else None,
-        )
+        write_figure(figure, file, target.suffix[1:].lower())
 
 
 def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:

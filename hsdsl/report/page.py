@@ -5,7 +5,13 @@ from __future__ import annotations
 from html import escape
 
 from hsdsl.execution import Execution, Transition
+from hsdsl.names import visible_lines
 from hsdsl.report import words
+
+
+def escaped(text: str) -> str:
+    """Write any text in HTML, between tags or in an attribute: it is read as the text that it is."""
+    return escape(visible_lines(text))
 
 
 def html(execution: Execution, *, limit: int = 60) -> str:
@@ -19,10 +25,10 @@ def html(execution: Execution, *, limit: int = 60) -> str:
         ("verdict", words.verdict(execution)),
         ("time", words.seconds(execution)),
     ]
-    rows = "".join(f"<tr><th>{label}</th><td>{escape(text)}</td></tr>" for label, text in facts if text)
-    settings = escape(", ".join(words.settings(execution)))
+    rows = "".join(f"<tr><th>{label}</th><td>{escaped(text)}</td></tr>" for label, text in facts if text)
+    settings = escaped(", ".join(words.settings(execution)))
     return (
-        f'<div class="hsdsl"><p><strong>{escape(words.heading(execution))}</strong><br>{settings}</p>'
+        f'<div class="hsdsl"><p><strong>{escaped(words.heading(execution))}</strong><br>{settings}</p>'
         f"<table>{rows}</table>{_transitions(execution, limit)}</div>"
     )
 
@@ -43,8 +49,8 @@ def _transitions(execution: Execution, limit: int) -> str:
 
 
 def _row(transition: Transition, time: str) -> str:
-    between = f"{escape(transition.source)} &rarr; {escape(transition.target)}"
+    between = f"{escaped(transition.source)} &rarr; {escaped(transition.target)}"
     note = "; ".join(filter(None, (words.changes(transition), words.remarks(transition))))
-    cells = (str(transition.index), time, words.delay(transition), escape(transition.edge))
-    plain = "".join(f"<td>{cell}</td>" for cell in cells)
-    return f"<tr>{plain}<td>{between}</td><td>{escape(note)}</td></tr>"
+    cells = (str(transition.index), time, words.delay(transition), transition.edge)
+    plain = "".join(f"<td>{escaped(cell)}</td>" for cell in cells)
+    return f"<tr>{plain}<td>{between}</td><td>{escaped(note)}</td></tr>"

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 
 from hsdsl.execution import Execution
+from hsdsl.names import shown
 from hsdsl.report import words
 
 WIDTH = 100
@@ -49,7 +50,8 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
 
 
 def _wrapped(text: str, columns: int, first: str = "", rest: str = "") -> list[str]:
-    """Break into lines, but never around an equals sign or an arrow."""
+    """Break into lines, but never around an equals sign or an arrow; what is hidden or ends a line shows."""
+    text = shown(text, None)
     for sign in ("=", "->"):
         text = text.replace(f" {sign} ", f"\xa0{sign}\xa0")
     lines = textwrap.wrap(text, columns, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
@@ -86,7 +88,7 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
 def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
     """Set columns side by side, those of numbers flush right."""
     cells: list[list[str]] = []
-    for column in table:
+    for column in ([shown(cell, None) for cell in column] for column in table):
         wide = max(len(cell) for cell in column)
         right = column[0] in ("#", "time", "delay")
         cells.append([cell.rjust(wide) if right else cell.ljust(wide) for cell in column])

@@ -31,8 +31,8 @@ def load(content: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL
     if path is not None:
         try:
             return ctypes.CDLL(str(path))
-        except OSError:  # made for something else than what runs now
-            path.unlink(missing_ok=True)
+        except OSError:
+            pass  # made for something else than what runs now: it is made again
     try:
         return ctypes.CDLL(str(keep(KIND, key, ".so", lambda target: _compile(compiler, source(), target, effort))))
     except OSError as refusal:

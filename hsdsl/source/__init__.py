@@ -2,7 +2,7 @@
 
 from hsdsl.source.compose import compose
 from hsdsl.source.nodes import ABSENT, Key, Mapping, Node, Place, Scalar, Sequence, absent
-from hsdsl.source.text import Text, decode, read_bytes, reason
+from hsdsl.source.text import Text, decode
 
 __all__ = [
     "ABSENT",
@@ -16,6 +16,4 @@ __all__ = [
     "absent",
     "compose",
     "decode",
-    "read_bytes",
-    "reason",
 ]

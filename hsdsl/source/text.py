@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import dataclass, field
-from itertools import islice
-from pathlib import Path
 
 from hsdsl import limits
-from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
-from hsdsl.names import INVISIBLE, closest, shown
+from hsdsl.errors import Diagnostic, ModelError, Span
+from hsdsl.names import INVISIBLE
 
-_MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 _BREAK = re.compile("\r\n|\r|\n")
 _ARCHIVE = b"PK\x03\x04"
 _OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
@@ -43,56 +39,6 @@ class Text:
         return Diagnostic(code, message, span, hint, self.lines[span.line - 1])
 
 
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a file, as many as a model may have and one more.
-
-    Raises
-    ------
-    UsageError
-        When the file cannot be read.
-    """
-    try:
-        with Path(path).open("rb") as stream:
-            return stream.read(limits.current().bytes + 1)
-    except (OSError, ValueError) as error:
-        if _is_text(path):
-            message = f"this is the text of a model, not the path of its file: `{shown(os.fspath(path), 40)}`"
-            raise UsageError(message, "hsdsl.loads(text) reads a model from its text") from None
-        raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
-
-
-def _is_text(path: str | os.PathLike[str]) -> bool:
-    """Whether a path looks like the text of a model: it has several lines, or a key with its value."""
-    return isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path)
-
-
-def _models_nearby(path: Path) -> str | None:
-    """The hint for a file that is not there, or for a folder: a model that is."""
-    try:
-        folder = path if path.is_dir() else path.parent
-        models = [entry for entry in islice(folder.iterdir(), _MOST_ENTRIES) if entry.suffix in (".yaml", ".yml")]
-    except (OSError, ValueError):
-        return None
-    names = {entry.name: str(entry) for entry in sorted(models)}
-    if path.is_dir():
-        return f"name a model, such as {next(iter(names.values()))}" if names else "name a model file"
-    near = closest(path.name, names)
-    return f"did you mean '{names[near]}'?" if near else None
-
-
-def reason(error: OSError | ValueError) -> str:
-    """Why a file could not be read, for a person."""
-    if isinstance(error, FileNotFoundError):
-        return "there is no such file"
-    if isinstance(error, IsADirectoryError):
-        return "this is a folder, not a file"
-    if isinstance(error, PermissionError):
-        return "the file may not be read"
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()
-    return "this cannot be the name of a file"
-
-
 def decode(path: str, data: bytes) -> Text:
     """The text of a model.
 
@@ -101,11 +47,11 @@ def decode(path: str, data: bytes) -> Text:
     ModelError
         When it is too large, not UTF-8, or has characters that no model may have.
     """
-    data = data.removeprefix(b"\xef\xbb\xbf")
     most = limits.current().bytes
     if len(data) > most:
         hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
         raise _refused(path, "HS003", f"the file is larger than {_size(most)}", hint)
+    data = data.removeprefix(b"\xef\xbb\xbf")
     if data.startswith(_ARCHIVE):
         hint = "a saved run (.npz) is read with hsdsl.store.load"
         raise _refused(path, "HS001", "the file is an archive, not the text of a model", hint)

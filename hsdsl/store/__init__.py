@@ -1,7 +1,9 @@
 """Executions in files: ``.npz`` without loss, ``.csv`` and ``.parquet`` as tables with a JSON sidecar.
 
 The sidecar of ``run.csv`` is ``run.csv.json``: the name keeps its suffix so that the sidecar never takes the place of a
-``run.json`` that somebody else writes.
+``run.json`` that somebody else writes. It holds the checksum of its table, and never outlives or precedes it: both are
+written aside and brought to the disk, the old sidecar is removed, and then the table and its sidecar take their places.
+At worst a table is without one.
 """
 
 from __future__ import annotations
@@ -13,12 +15,12 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.store.atomic import replacing
+from hsdsl.store.atomic import alone, beside, replacing
 from hsdsl.store.npz import load, save_npz
-from hsdsl.store.sidecar import write_sidecar
+from hsdsl.store.sidecar import forget_sidecar, read_sidecar, sidecar_of, write_sidecar
 from hsdsl.store.table import at_samples, write_csv, write_parquet
 
-__all__ = ["load", "save"]
+__all__ = ["forget_sidecar", "load", "read_sidecar", "save"]
 
 _TABLES = {".csv": write_csv, ".parquet": write_parquet}
 
@@ -41,11 +43,16 @@ def save(
     if suffix not in _TABLES:
         raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix says what to write")
     rows = execution.rows() if samples is None else at_samples(execution, samples)
-    table = rows.only(columns)
-    beside = target.with_name(target.name + ".json")
-    with replacing(target) as file:
-        _TABLES[suffix](table, file)
-        file.flush()  # a full disk shows now, before the sidecar takes its place
-        with replacing(beside) as description:
-            write_sidecar(execution, table, target.name, description)
-    return target, beside
+    rows = rows.only(columns)
+    description = sidecar_of(target)
+    with beside(target) as table:
+        _TABLES[suffix](rows, table.file)
+        table.finish()
+        with beside(description) as sidecar:
+            write_sidecar(execution, rows, target.name, table.part, sidecar.file)
+            sidecar.finish()
+            with alone(table.target.parent):
+                sidecar.target.unlink(missing_ok=True)
+                table.place()
+                sidecar.place()
+    return target, description

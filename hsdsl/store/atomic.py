@@ -7,18 +7,37 @@ import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.errors import UsageError
 
 
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO, None, None]:
-    """Open a new file that takes the place of ``path`` when the block ends well, and vanishes otherwise.
+@dataclass(frozen=True)
+class New:
+    """A file that is written at ``part`` and is to take the place of ``target``."""
 
-    It is written in the same folder, flushed to the disk and renamed; a link is followed, and the permissions of a
-    file that is replaced are kept.
+    file: BinaryIO
+    part: Path
+    target: Path
+
+    def finish(self) -> None:
+        """Bring it to the disk, where it shows whether there is room, with the permissions of what it replaces."""
+        self.file.flush()
+        os.fsync(self.file.fileno())
+        self.file.close()
+        with suppress(FileNotFoundError):
+            os.chmod(self.part, stat.S_IMODE(self.target.stat().st_mode))
+
+    def place(self) -> None:
+        """Put it where it belongs."""
+        os.replace(self.part, self.target)
+
+
+@contextmanager
+def beside(path: str | os.PathLike[str]) -> Generator[New]:
+    """Open a new file in the folder of ``path``; it vanishes unless it is finished and placed. A link is followed.
 
     Raises
     ------
@@ -28,29 +47,59 @@ def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO, None, None]:
     target = Path(os.path.realpath(path))
     try:
         _refuse_special(target, path)
-        beside = target.with_name(f".hsdsl-{secrets.token_hex(6)}.part")
-        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        part = target.with_name(f".hsdsl-{secrets.token_hex(6)}.part")
+        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     except OSError as error:
         raise UsageError(_sentence(path, target, error)) from None
     try:
         with os.fdopen(descriptor, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        with suppress(FileNotFoundError):
-            os.chmod(beside, stat.S_IMODE(target.stat().st_mode))
-        os.replace(beside, target)
+            yield New(file, part, target)
     except OSError as error:
         raise UsageError(_sentence(path, target, error)) from error
     finally:
-        with suppress(FileNotFoundError):
-            beside.unlink()
+        with suppress(OSError):
+            part.unlink()
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO]:
+    """Open a new file that takes the place of ``path`` when the block ends well, and vanishes otherwise.
+
+    Raises
+    ------
+    UsageError
+        As for :func:`beside`.
+    """
+    with beside(path) as new:
+        yield new.file
+        new.finish()
+        new.place()
+
+
+@contextmanager
+def alone(folder: Path) -> Generator[None]:
+    """Let no other writer rename several files in a folder at once, on systems and disks that have such locks."""
+    descriptor = None
+    with suppress(ImportError, OSError):
+        import fcntl
+
+        descriptor = os.open(folder, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
 
 
 def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
-    if target.is_dir():
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISDIR(mode):
         raise UsageError(f"cannot write {os.fspath(path)}: it is a folder")
-    if target.exists() and not target.is_file():
+    if not stat.S_ISREG(mode):
         raise UsageError(f"cannot write {os.fspath(path)}: it is not a regular file")
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -18,14 +18,17 @@ import numpy as np
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Arc, Array, Execution, Kind, Point, Stop, Transition, Verdict
+from hsdsl.files import open_regular
 from hsdsl.store.plain import Plain
+from hsdsl.store.sound import check
 
 FORMAT = "hsdsl execution"
 VERSION = 1
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 KINDS: tuple[Kind, ...] = ("flow", "strip")
 _TEXTS = ("model", "digest", "engine", "scheme", "method", "settings", "seconds", "digits", "title", "output_names")
-_DAMAGE = (ValueError, KeyError, TypeError, IndexError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error)
+_BEGINNING = b"PK\x03\x04"
+_DAMAGED = "it is damaged, or not an execution that hsdsl saved"
 
 
 def save_npz(execution: Execution, file: BinaryIO) -> None:
@@ -63,25 +66,49 @@ def load(path: str | os.PathLike[str]) -> Execution:
     Raises
     ------
     UsageError
-        When the file cannot be read, is damaged, or holds something else.
+        When the file cannot be read, is damaged, is of a later version, or holds something else.
     """
+    name = os.fspath(path)
     if Path(path).suffix.lower() != ".npz":
-        raise UsageError(f"{os.fspath(path)} is not an .npz file: only those hold a whole execution")
+        raise UsageError(f"{name} is not an .npz file: only those hold a whole execution")
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            return _read({name: archive[name] for name in archive.files})
+        with open_regular(path) as file:
+            _check_whole(file)
+            with np.load(file, allow_pickle=False) as archive:
+                return _read(archive)
+    except UsageError as error:
+        raise UsageError(f"cannot read {name}: {error}", error.hint) from None
     except OSError as error:
-        raise UsageError(f"cannot read {os.fspath(path)}: {error.strerror or error}") from None
-    except _DAMAGE:
-        raise UsageError(
-            f"cannot read {os.fspath(path)}: it is damaged, or not an execution that hsdsl saved"
-        ) from None
+        raise UsageError(f"cannot read {name}: {error.strerror or error}") from None
+    except MemoryError:
+        raise UsageError(f"cannot read {name}: it does not fit into memory") from None
+    except Exception:  # what NumPy and the readers of ZIP and JSON raise for bytes that are none of theirs has no end
+        raise UsageError(f"cannot read {name}: {_DAMAGED}") from None
 
 
-def _read(archive: dict[str, Array]) -> Execution:
+def _check_whole(file: BinaryIO) -> None:
+    """Refuse what is no archive, has lost its end, unfolds to more than it is (ours are not compressed), or whose
+    checksums are wrong.
+    """
+    size = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    beginning = file.read(len(_BEGINNING))
+    if not zipfile.is_zipfile(file):
+        cut = size < len(_BEGINNING) or beginning == _BEGINNING
+        raise UsageError(_DAMAGED, "its end is missing: copy it again" if cut else None)
+    with zipfile.ZipFile(file) as archive:
+        if sum(member.file_size for member in archive.infolist()) > size or archive.testzip() is not None:
+            raise UsageError(_DAMAGED)
+    file.seek(0)
+
+
+def _read(archive: Mapping[str, Array]) -> Execution:
     header = cast("dict[str, Any]", json.loads(archive["header"].tobytes()))
-    if header["format"] != FORMAT or header["version"] != VERSION:
+    if header["format"] != FORMAT or type(header["version"]) is not int or header["version"] < 1:
         raise ValueError("another format")
+    if header["version"] > VERSION:
+        message = f"a later version of hsdsl saved it, in format {header['version']:.20g}; this one reads {VERSION}"
+        raise UsageError(message, "update hsdsl")
     plain = Plain(header["bits"], header["digits"])
     layouts = [(str(mode), tuple(states)) for mode, states in header["layouts"]]
     arcs = tuple(
@@ -91,7 +118,7 @@ def _read(archive: dict[str, Array]) -> Execution:
     fields: dict[str, Any] = {name: plain.unpack(header[name]) for name in _TEXTS}
     fields["overrides"] = plain.unpack(header.get("overrides", {}))  # files of earlier versions have none
     fields |= {name: plain.unpack_array(archive[name]) for name in COLUMNS}
-    return Execution(
+    execution = Execution(
         stop=Stop(**plain.unpack_fields(header["stop"])),
         final=Point(**plain.unpack_fields(header["final"])),
         verdict=Verdict(**plain.unpack_fields(header["verdict"])),
@@ -99,3 +126,5 @@ def _read(archive: dict[str, Array]) -> Execution:
         arcs=arcs,
         **fields,
     )
+    check(execution)
+    return execution

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 import platform
+from contextlib import suppress
 from importlib import metadata
-from typing import Any, BinaryIO
+from pathlib import Path
+from typing import Any, BinaryIO, cast
 
+from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Samples
 from hsdsl.report import as_json, dumps
 
@@ -23,8 +29,57 @@ def versions() -> dict[str, str]:
     return found
 
 
-def describe(execution: Execution, table: Samples, name: str) -> dict[str, Any]:
-    """Return the sidecar's object: that of `run --json`, with the model's hash, versions and the table's shape."""
+def sidecar_of(table: Path) -> Path:
+    """Name the sidecar of a table."""
+    return table.with_name(table.name + ".json")
+
+
+def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read what the sidecar of a table says, if it is that table's.
+
+    Raises
+    ------
+    UsageError
+        There is none, it is damaged, or the table was changed or replaced since.
+    """
+    path = sidecar_of(Path(table))
+    try:
+        found, content = _parsed(path), _checksum(Path(table))
+    except OSError as error:
+        raise UsageError(f"cannot read {os.fspath(table)} and its sidecar: {error.strerror or error}") from None
+    if found is None:
+        raise UsageError(f"{path} is damaged, or not the sidecar of a table")
+    if found.get("table_sha256") != content:
+        raise UsageError(f"{path} does not belong to {os.fspath(table)}, which was changed or replaced since")
+    return found
+
+
+def forget_sidecar(table: Path) -> None:
+    """Remove the sidecar of a table that is about to be written over; a file of its name that is none stays."""
+    path = sidecar_of(table)
+    with suppress(FileNotFoundError):
+        if path.is_file() and _parsed(path) is not None:
+            path.unlink()
+
+
+def _parsed(path: Path) -> dict[str, Any] | None:
+    try:
+        found: Any = json.loads(path.read_bytes())
+        known = isinstance(found["table"]["file"], str) and isinstance(found["versions"], dict)
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return cast("dict[str, Any]", found) if known else None
+
+
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def describe(execution: Execution, table: Samples, name: str, content: str) -> dict[str, Any]:
+    """Return the sidecar's object: that of `run --json`, with the model's hash, versions and the table's shape and
+    hash.
+    """
     run = as_json(execution)
     return {
         "model": run.pop("model"),
@@ -32,11 +87,12 @@ def describe(execution: Execution, table: Samples, name: str) -> dict[str, Any]:
         "title": execution.title,
         "versions": versions(),
         "table": {"file": name, "rows": len(table), "columns": list(table.labels)},
+        "table_sha256": content,
         "digits": execution.digits,
         **run,
     }
 
 
-def write_sidecar(execution: Execution, table: Samples, name: str, file: BinaryIO) -> None:
-    """Write the sidecar of the table called ``name``."""
-    file.write((dumps(describe(execution, table, name)) + "\n").encode())
+def write_sidecar(execution: Execution, table: Samples, name: str, written: Path, file: BinaryIO) -> None:
+    """Write the sidecar of the table that will be called ``name`` and is ``written`` already."""
+    file.write((dumps(describe(execution, table, name, _checksum(written))) + "\n").encode())

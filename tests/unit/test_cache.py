@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,8 +21,9 @@ from engines import alike, needs_compiler
 import hsdsl
 from hsdsl import cache
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.errors import UsageError
+from hsdsl.errors import ModelError
 from hsdsl.model import engines, seen
+from hsdsl.model.written import Written
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
 
@@ -105,6 +113,142 @@ def test_compiled_code_is_kept_and_made_again_where_damaged(monkeypatch: pytest.
     assert len(made) == 2
 
 
+def _belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if os.getuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "getuid", lambda: 12345)
+
+
+def _is_a_link(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.rename(path.with_name("moved"))
+    path.symlink_to(path.with_name("moved"))
+
+
+WAYS = [
+    lambda path, _: path.chmod(0o777),
+    lambda path, _: path.chmod(0o770),
+    lambda path, _: path.chmod(0o1777),
+    _belongs_to_another,
+    _is_a_link,
+]
+
+
+@posix
+@pytest.mark.parametrize("way", WAYS, ids=["all", "group", "sticky", "owner", "link"])
+@pytest.mark.parametrize("depth", range(4), ids=["top", "kind", "key", "file"])
+def test_nothing_is_taken_from_where_another_may_put_it(way, depth, folder: Path, monkeypatch) -> None:
+    path = cache.keep("words", "k", ".txt", write("word"))
+    place = (folder, folder / "words", folder / "words" / "k", path)[depth]
+    if (place, way) == (folder, _is_a_link):
+        pytest.skip("a user may move the whole folder and link to it")
+    assert cache.find("words", "k") == path
+    way(place, monkeypatch)
+    assert cache.find("words", "k") is None
+    if place != path:
+        with pytest.raises(PermissionError):
+            cache.keep("words", "k", ".txt", write("word"))
+    elif way is not _belongs_to_another:  # it is made anew, and then it is ours
+        assert cache.find("words", "k") is None and cache.keep("words", "k", ".txt", write("word")) == path
+        assert cache.find("words", "k") == path
+
+
+@posix
+def test_the_folders_above_let_nobody_exchange_it(folder: Path) -> None:
+    cache.keep("words", "k", ".txt", write("word"))
+    for mode, trusted in ((0o777, False), (0o1777, True), (0o755, True)):
+        folder.parent.chmod(mode)
+        assert (cache.find("words", "k") is not None, cache.private(folder) is None) == (trusted, trusted)
+
+
+@needs_compiler
+@posix
+@pytest.mark.parametrize("depth", range(3), ids=["kind", "key", "file"])
+def test_a_foreign_library_is_not_loaded(depth, monkeypatch: pytest.MonkeyPatch, folder: Path, capsys) -> None:
+    program, loaded = hsdsl.load(MODELS[0]).program, []
+    CompiledModel(program)
+    kept = list((folder / library.KIND).rglob("*.so"))
+    for path in kept:  # with a name that agrees with its content, as a stranger would do it
+        foreign = path.with_name(cache._checksum(b"foreign") + ".so")
+        path.unlink()
+        foreign.write_bytes(b"foreign")
+        (folder / library.KIND, foreign.parent, foreign)[depth].chmod(0o777)
+    monkeypatch.setattr(library.ctypes, "CDLL", lambda p, load=library.ctypes.CDLL: (loaded.append(p), load(p))[1])
+    monkeypatch.setattr(kernel, "_loaded", {})
+    CompiledModel(program)
+    assert loaded and not any(Path(path).stem == cache._checksum(b"foreign") for path in loaded)
+    assert ("can be written by other users" in capsys.readouterr().err) == (depth < 2)
+
+
+RUN = [sys.executable, "-m", "hsdsl", "run", str(MODELS[0]), "--json", "--engine", "c", "--scheme", "relaxed"]
+READ_ONLY = "mount --bind {0} {0} && mount -o remount,bind,ro {0} && ! touch {0}/x 2>/dev/null && "
+
+
+@needs_compiler
+@posix
+def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: Path) -> None:
+    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode:
+        pytest.skip("no name spaces here")
+    subprocess.run(RUN, check=True, capture_output=True)
+    before = sorted(folder.rglob("*"))
+    code = "import hsdsl.runtime.library as l; l._compile = None; from hsdsl.cli import main; main()"
+    served = ["unshare", "-rm", "sh", "-c", READ_ONLY.format(tmp_path / "caches") + 'exec "$@"', "-"]
+    done = subprocess.run([*served, sys.executable, "-c", code, *RUN[3:]], capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    assert sorted(folder.rglob("*")) == before
+    new = subprocess.run([*served, *RUN, "--set", "experiment.method=dopri5"], capture_output=True, text=True)
+    assert new.returncode == 0 and "Traceback" not in new.stderr
+
+
+def test_those_who_keep_find_and_remove_at_once_find_whole_entries_or_none(folder: Path) -> None:
+    texts, wrong = [str(k) * 50_000 for k in range(3)], []
+
+    def keeps(text: str) -> None:
+        with suppress(OSError):  # its entry was removed under it: then nothing is kept
+            cache.keep("words", "k", ".txt", write(text))
+
+    def finds() -> None:
+        path = cache.find("words", "k")
+        with suppress(FileNotFoundError):
+            if path is not None and path.read_text() not in texts:
+                wrong.append(path)
+
+    def removes() -> None:
+        time.sleep(1e-3)
+        shutil.rmtree(folder / "words", ignore_errors=True)
+
+    def repeat(what: Callable[[], None]) -> None:
+        try:
+            for _ in range(200):
+                what()
+        except BaseException as error:
+            wrong.append(error)
+
+    work = [*(partial(keeps, text) for text in texts), finds, finds, removes]
+    threads = [threading.Thread(target=repeat, args=[what]) for what in work]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not wrong and not any(thread.is_alive() for thread in threads)
+    keeps(texts[0])
+    assert cache.find("words", "k") is not None and not list(folder.rglob("*.part"))
+
+
+@posix
+def test_what_cannot_be_touched_is_found_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = cache.keep("words", "k", ".txt", write("word"))
+
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    for step in ("utime", "mkdir", "chmod", "replace", "unlink"):
+        monkeypatch.setattr(os, step, refused)
+    assert cache.find("words", "k") == path
+    path.write_text("wort")
+    assert cache.find("words", "k") is None  # damaged, and cannot be removed
+
+
 @needs_compiler
 @posix
 def test_without_a_folder_it_compiles_for_this_process(monkeypatch, tmp_path: Path, capsys) -> None:
@@ -150,21 +294,29 @@ def test_a_change_of_the_data_or_the_model_is_seen(tmp_path: Path) -> None:
     assert finals == pytest.approx([1, 1, 2])
     loaded = hsdsl.load(model)
     model.write_text(WITH_DATA.replace("x: 0", "x: 5"))
-    assert hsdsl.load(model).simulate().final["x"] == pytest.approx(7)
-    with pytest.raises(UsageError, match="has changed"):
-        loaded.simulate(until="1/2 + 1/4")
+    data.unlink()
+    assert loaded.simulate(until="1/2 + 1/4").final["x"] == pytest.approx(
+        1.5
+    )  # it is what was read, mathematics and all
+    with pytest.raises(ModelError, match="no such file"):
+        hsdsl.load(model)
 
 
 def test_what_is_no_program_is_not_taken(folder: Path) -> None:
     path = MODELS[0]
     program = hsdsl.load(path).program
-    key = seen.key_of(path.read_bytes(), None)
-    assert seen.find(path, key) == program
-    for changed in (replace(program, parameters=(1,)), replace(program, modes=None), replace(program, title=3)):
-        for entry in (folder / seen.KIND / key).iterdir():
+    written = Written.at(path, None).with_files({})
+    assert seen.find(written) == (program, written)
+    for changed in (
+        replace(program, parameters=(1,)),
+        replace(program, modes=None),
+        replace(program, title=3),
+        replace(program, digest=program.digest[::-1]),  # the program of other bytes
+    ):
+        for entry in (folder / seen.KIND / seen.key_of(written)).iterdir():
             entry.unlink()
-        seen.keep(path, key, changed, {})  # type: ignore[arg-type]
-        assert seen.find(path, key) is None
+        seen.keep(written, changed)  # type: ignore[arg-type]
+        assert seen.find(written) is None
 
 
 @needs_compiler
@@ -176,21 +328,18 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
 
 
 @needs_compiler
-def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, str]] = []
     monkeypatch.setattr(engines.kernel, "begin", lambda *parts: asked.append(parts))
-    path = tmp_path / "m.yaml"
     for text, scheme, method in (
         ("experiment: {scheme: located, method: radau}", None, None),
         ("experiment: {until: 1, method: rk4}", "located", None),
         ("experiment: {scheme: relaxed, method: rk4}", None, "taylor"),
         ("experiment: {scheme: nothing}", None, None),
     ):
-        path.write_text(text)
-        engines.begin(path, "auto", None, scheme, method)
-    engines.begin(path, "python", None, "located", None)
-    engines.begin(path, "auto", 50, "located", None)
-    engines.begin(tmp_path / "none.yaml", "auto", None, None, None)
+        engines.begin(text.encode(), "auto", None, scheme, method)
+    engines.begin(b"", "python", None, "located", None)
+    engines.begin(b"", "auto", 50, "located", None)
     assert asked == [("located", "radau"), ("located", "rk4"), ("relaxed", "taylor")]
 
 

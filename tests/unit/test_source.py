@@ -5,8 +5,9 @@ import time
 import pytest
 
 from hsdsl.errors import Findings, ModelError, UsageError
+from hsdsl.files import read_bytes
 from hsdsl.limits import DEFAULT
-from hsdsl.source import Mapping, Scalar, Sequence, compose, decode, read_bytes
+from hsdsl.source import Mapping, Scalar, Sequence, compose, decode
 
 
 def root(text):

@@ -7,6 +7,7 @@ import errno
 import io
 import json
 import os
+import re
 import stat
 import sys
 import zipfile
@@ -100,11 +101,34 @@ def _foreign(path):
     np.savez(path, x=np.zeros(3))
 
 
-def _newer(path):
+def _with_header(path, text):
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files}
-    header = json.loads(arrays["header"].tobytes()) | {"version": 2}
-    np.savez(path, **arrays | {"header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)})
+    np.savez(path, **arrays | {"header": np.frombuffer(text(json.loads(arrays["header"].tobytes())), dtype=np.uint8)})
+
+
+def _saying(**changed):
+    return lambda path: _with_header(path, lambda header: json.dumps(header | changed).encode())
+
+
+def _compressed(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("header.npy", b"0" * 10_000_000)
+
+
+def _array_header(text):
+    """A column whose NumPy header says something that its parser stumbles over."""
+
+    def change(path):
+        with zipfile.ZipFile(path) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        head = text.encode()
+        members["times.npy"] = b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in members.items():
+                archive.writestr(name, content)
+
+    return change
 
 
 def _pickled(path):
@@ -124,7 +148,14 @@ def _no_number(path):
 
 
 DAMAGES = [
-    _truncated, _flipped, _foreign, _newer, _pickled, _mismatched, _no_number,
+    _truncated, _flipped, _foreign, _pickled, _mismatched, _no_number, _compressed,
+    _array_header("{'descr': '<f8', 'shape': (3,"), _array_header("(" * 9_000), _array_header("1L"), _array_header('"'),
+    lambda path: _with_header(path, lambda _: b"[" * 200_000), lambda path: _with_header(path, lambda _: b"9" * 5_000),
+    lambda path: _with_header(path, lambda header: json.dumps([header]).encode()),
+    _saying(version=0), _saying(version="2"), _saying(version=None), _saying(format="other"), _saying(bits="x"),
+    _saying(model=3), _saying(title=["<b>"]), _saying(digits=-5), _saying(settings=[]), _saying(seconds={"load": "x"}),
+    _saying(stop={"reason": "until", "time": "x", "message": ""}), _saying(transitions=[{"index": "<b>"}]),
+    _saying(final={}), _saying(layouts=[]), _saying(output_names={"$tuple": [1]}), _saying(settings={"left_out": {}}),
     lambda path: path.write_bytes(b""), lambda path: path.write_text("time,mode,j\n"),
     lambda path: zipfile.ZipFile(path, "w").close(),
 ]  # fmt: skip
@@ -137,6 +168,49 @@ def test_a_file_that_holds_no_execution_is_refused(damage, tmp_path):
     damage(path)
     with pytest.raises(UsageError, match="damaged, or not an execution"):
         store.load(path)
+
+
+def test_a_file_of_a_later_version_says_so(tmp_path):
+    path = tmp_path / "run.npz"
+    fifty_digits().save(path)
+    for change in ({"version": 2}, {"version": 7, "model": {"new": "form"}, "stop": None}):
+        _saying(**change)(path)
+        with pytest.raises(UsageError, match=f"in format {change['version']}; this one reads 1") as caught:
+            store.load(path)
+        assert caught.value.hint == "update hsdsl" and "damaged" not in str(caught.value)
+
+
+def test_a_file_that_needs_more_memory_than_there_is_says_so(tmp_path):
+    path = tmp_path / "run.npz"
+    hand_made.jumping_input().save(path)
+    _array_header("{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999,), }\n")(path)
+    with pytest.raises(UsageError, match=r"does not fit into memory|damaged"):
+        store.load(path)
+
+
+@pytest.mark.parametrize("make", [fifty_digits, hand_made.modes_of_different_size])
+def test_a_file_cut_short_or_changed_anywhere_gives_the_run_or_one_error(make, tmp_path):
+    path, run = tmp_path / "run.npz", make()
+    run.save(path)
+    whole, random = path.read_bytes(), np.random.default_rng(7)
+    broken = [whole[:length] for length in {*range(0, len(whole), 97), *range(len(whole) - 300, len(whole))}]
+    for place in random.integers(0, len(whole), 400).tolist():
+        broken.append(whole[:place] + bytes([whole[place] ^ int(random.integers(1, 256))]) + whole[place + 1 :])
+    same = 0
+    for content in broken:
+        path.write_bytes(content)
+        try:
+            same += store.load(path) == run or pytest.fail("another run")
+        except UsageError as error:
+            assert re.fullmatch(r"cannot read \S+run\.npz: [^\n]+", str(error))
+    assert same < len(broken) / 3  # only what says nothing, such as a date, can be changed
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_what_is_no_regular_file_is_no_run(make, tmp_path):
+    make(tmp_path / "run.npz")
+    with pytest.raises(UsageError, match=r"not a regular file|[Ii]s a directory"):
+        store.load(tmp_path / "run.npz")
 
 
 def test_a_file_that_cannot_be_opened_is_refused(tmp_path):
