@@ -95,6 +95,8 @@ FLOAT64 = Arithmetic(
     isfinite=math.isfinite,
     functions={name: getattr(math, name) for name in _MATH}
     | {
+        "frexp": math.frexp,
+        "ldexp": math.ldexp,
         "abs": abs,
         "sign": _float_sign,
         "heaviside": _float_heaviside,
@@ -145,6 +147,8 @@ def multiprecision(digits: int) -> Arithmetic:
             for name in _MATH
         }
         | {
+            "frexp": context.frexp,
+            "ldexp": context.ldexp,
             "abs": abs,
             "sign": context.sign,
             "heaviside": heaviside,

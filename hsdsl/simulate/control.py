@@ -1,18 +1,21 @@
 """The step size: fixed, or from the embedded error estimate by one documented formula.
 
-With e the estimate and x, z the step's ends, the error ratio is max_i |e_i| / (tolerance (1 + max(|x_i|, |z_i|))). A
-step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
+With e the estimate, z the step's end and s the scales of the states (the largest size that each has had), the error
+ratio is max_i |e_i| / (tolerance max(s_i, |z_i|)). A step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
 above 1 after a rejection), order being the power of h that the estimate falls with. A step whose equations could not
 be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
 
 An implicit method pays for each change of the step. For one the factor is also held down by what the ratio did over
 the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and one from 0.9 to 1.2 counts as 1. A
-stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) (1 + |x|).
+stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) of its scale.
+
+A state that has been zero so far has no scale. It is held against its own value at the step's end; over a step below
+the tolerance times the largest one it does not count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -45,12 +48,15 @@ class Control:
     accepted: int = 0
     rejected: int = 0
 
-    def ratio(self, error: State, x: State, z: State) -> Number:
-        """Error ratio of a step; at most 1 is acceptable."""
+    def ratio(self, h: Number, error: State, z: State, scales: Sequence[Number]) -> Number:
+        """Error ratio of a step of length h to z; at most 1 is acceptable."""
         assert self.tolerance is not None
         worst = self.h * 0
-        for e, a, b in zip(error, x, z, strict=True):
-            worst = max(worst, abs(e) / (self.tolerance * (1 + max(abs(a), abs(b)))))
+        for e, b, s in zip(error, z, scales, strict=True):
+            size = max(s, abs(b))
+            if s == 0 and (e == 0 or h <= self.tolerance * self.largest):
+                continue
+            worst = max(worst, abs(e) / (self.tolerance * size) if size > 0 else 1 / self.tolerance)
         return worst
 
     def factor(self, ratio: Number) -> Number:
@@ -65,15 +71,15 @@ class Control:
         proposed = taken * (self.predicted(taken, ratio) if self.implicit else self.factor(ratio))
         self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
 
-    def begin(self, x: State, slope: State) -> None:
+    def begin(self, scales: Sequence[Number], slope: State) -> None:
         """Begin a stretch of flow; an implicit method's first step must show a decay from there, however fast."""
         self.before = None
         if not self.implicit or self.power is None:
             return
         share = self.power(self.tolerance, 1 / (self.h * 0 + self.order))
-        for a, f in zip(x, slope, strict=True):
-            if self.h * abs(f) > share * (1 + abs(a)):
-                self.h = share * (1 + abs(a)) / abs(f)
+        for s, f in zip(scales, slope, strict=True):
+            if s > 0 and self.h * abs(f) > share * s:
+                self.h = share * s / abs(f)
 
     def predicted(self, taken: Number, ratio: Number) -> Number:
         """Factor from one step to the next for an implicit method."""

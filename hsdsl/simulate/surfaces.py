@@ -17,7 +17,7 @@ from hsdsl.kernel import ModeKernel, Vector
 from hsdsl.program import EdgeProgram
 
 ROUNDOFF_UNITS = 32
-TIE = 1e-12  # times closer than TIE max(1, |t|) are the same instant
+TIE = 1e-12  # times closer than TIE max(|t|, length of the run) are the same instant
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
@@ -99,13 +99,13 @@ def shortened(piece: Polynomial, theta: Number) -> Polynomial:
     return tuple(parts)
 
 
-def roundoff(unit: Number, magnitude: Number, gradient: Vector, x: State, scale: State) -> Number:
-    """Below this a surface value counts as zero: 32 u (|L| + |R| + sum |dr/dx_i| |x_i|).
+def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: State, scale: State) -> Number:
+    """Below this a surface value counts as zero: 32 u (|L| + |R| + |dr/dt| |t| + sum |dr/dx_i| |x_i|).
 
     ``scale`` holds the sizes of the numbers a state was computed from (see `Here.scale`): a state that a reset or a
     cancellation made small carries the round-off of what made it.
     """
-    total = magnitude
+    total = magnitude + abs(gradient[0]) * abs(t)
     for g, a, s in zip(gradient[1:], x, scale, strict=True):
         total = total + abs(g) * max(abs(a), s)
     return ROUNDOFF_UNITS * unit * total
@@ -135,7 +135,7 @@ class Surfaces:
         except DOMAIN_ERRORS:
             return ROUNDOFF_UNITS * unit * magnitude
         scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
-        return roundoff(unit, magnitude, gradient, x, scale)
+        return roundoff(unit, magnitude, gradient, t, x, scale)
 
     def enter(self, t: Number, x: State, values: Vector, since: Number = 0) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.

@@ -11,11 +11,19 @@
 #define NEWTON_NOISE 1024
 #define NEWTON_SHARE 1e-2
 
-/* The largest change relative to 1 + |x|. */
+/* The largest change relative to the scales; of a state that has been zero so far, to where it is now. */
 HS_INLINE double scaled(const hs_run *run, int n) {
-  const double *const largest = run->radau.largest;
-  double size = largest[0] / (1 + fabs(run->x[0]));
-  for (int s = 1; s < n; s++) size = hs_max(size, largest[s] / (1 + fabs(run->x[s])));
+  const hs_radau *const radau = &run->radau;
+  double size = 0.0;
+  for (int s = 0; s < n; s++) {
+    const double change = radau->largest[s];
+    double scale = radau->scales[s];
+    if (!(scale > 0)) {
+      scale = fabs(run->x[s]);
+      for (int i = 0; i < 3; i++) scale = hs_max(scale, fabs(run->x[s] + radau->z[i][s]));
+    }
+    if (change > 0) size = hs_max(size, scale > 0 ? change / scale : scale + 1);
+  }
   return size;
 }
 

@@ -88,6 +88,8 @@ typedef struct {
   double *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
   double *wanted[3], *right[3];
   double *largest, *error;
+  const double *scales; /* of the states, as the last step was solved with them */
+  int lifted;           /* whether round-off of the flow makes some of them larger */
 } hs_radau;
 
 typedef struct {
@@ -132,6 +134,10 @@ typedef struct {
   hs_patience patience;
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  double *scales, *known; /* of the states here, and of those of all modes before this one was entered */
+  double *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
+  int *lifted;
+  double *flow_sizes, *jacobian; /* see rest.c; jacobian: width * width */
   double **k;          /* stages, then the flow at the end */
   double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */
@@ -165,7 +171,7 @@ typedef struct {
   hs_made made[FREE];
 } hs_run;
 
-static inline double tie(double t) { return HS_TIE * hs_max(1.0, fabs(t)); }
+static inline double tie(const hs_run *run, double t) { return HS_TIE * hs_max(run->until, fabs(t)); }
 
 static inline int all_finite(const double *v, int n) {
   for (int i = 0; i < n; i++)

@@ -71,6 +71,7 @@ static int noise_of(hs_run *run, int k, double t, const double *x, int entry, do
   double total = run->magnitudes[k];
   double *const g = run->gradient;
   if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
+    total = total + fabs(g[0]) * fabs(t);
     const int scaled = entry || run->stood_on[k];
     for (int s = 0; s < n; s++) total = total + fabs(g[s + 1]) * hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0);
   }
