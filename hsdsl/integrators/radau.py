@@ -67,8 +67,8 @@ class Steps:
         smooth: bool = True,
     ) -> None:
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
-        self._largest, self._smooth, self._lifted = scales, smooth, False
-        self._scales = scales
+        self._largest, self._smooth = scales, smooth
+        self._scales, self._floors = scales, list[Number]()
         self._tried: tuple[Flow, Number, Number, State] | None = None
         self._convergence = Convergence(tolerance, arithmetic)
         self._known = coefficients(arithmetic)
@@ -110,14 +110,15 @@ class Steps:
         guess, self._tried = self._guess(t, h, x), (flow, t, h, x)
 
         def attempt(closer: bool = False) -> Increments:
-            self._scales = self._largest
-            return settle(x, self.scales(closer or self._lifted), self._iterations(flow, t, h, x, guess))
+            floors = self._floors
+            self._scales = list(map(max, self._largest, floors)) if floors else self._largest
+            return settle(x, self.scales(closer), self._iterations(flow, t, h, x, guess))
 
         if self._derived_at != t:
             with suppress(NoConvergence):
                 return attempt()
             self._derive(t, x)
-        if self._lifted or not self._smooth:
+        if not self._smooth:
             return attempt()
         try:
             return attempt()
@@ -130,7 +131,8 @@ class Steps:
         if closer and self._smooth:
             with suppress(*DOMAIN_ERRORS):
                 self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic)
-                self._lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
+                lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
+                self._floors = list(self._scales) if lifted else []
         return self._scales
 
     def _derive(self, t: Number, x: State) -> None:

@@ -35,7 +35,8 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
-    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method.
+    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``failed_at`` is
+    where the last step began that was too wrong; ``closer`` says that a look at the flow's round-off let one pass.
     """
 
     h: Number
@@ -47,6 +48,8 @@ class Control:
     before: tuple[Number, Number] | None = None
     accepted: int = 0
     rejected: int = 0
+    failed_at: Number | None = None
+    closer: bool = False
 
     def ratio(self, h: Number, error: State, z: State, scales: Sequence[Number]) -> Number:
         """Error ratio of a step of length h to z; at most 1 is acceptable."""
@@ -58,6 +61,11 @@ class Control:
                 continue
             worst = max(worst, abs(e) / (self.tolerance * size) if size > 0 else 1 / self.tolerance)
         return worst
+
+    def looks_closer(self, t: Number) -> bool:
+        """Whether to look closer at a step from t that is too wrong: at the second, or where that helped before."""
+        again, self.failed_at = t == self.failed_at, t
+        return self.closer or again
 
     def factor(self, ratio: Number) -> Number:
         """Factor from one step to the next."""

@@ -1,6 +1,7 @@
 """The scales of states along a run: what errors are held against, and what counts as moving.
 
-See `hsdsl.integrators.scales`. What a flow is computed from is looked at only where a step would be rejected.
+See `hsdsl.integrators.scales`. What a flow is computed from is looked at only where a step would be rejected for
+the second time.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ def error_ratio(
 ) -> Number:
     """Error ratio of a step from (t, x) to z; at most 1 is acceptable."""
     scales: Sequence[Number] = here.arc.scales if method.scales is None else method.scales(False)
-    ratio = run.control.ratio(h, error, z, scales)
-    if not ratio > 1 or here.mode.jumps:
+    control, ratio = run.control, run.control.ratio(h, error, z, scales)
+    if not ratio > 1 or here.mode.jumps or not control.looks_closer(t):
         return ratio
     try:
         if method.scales is not None:
@@ -29,7 +30,9 @@ def error_ratio(
             scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic)
     except DOMAIN_ERRORS:
         return ratio
-    return run.control.ratio(h, error, z, scales)
+    ratio = control.ratio(h, error, z, scales)
+    control.closer = ratio <= 1
+    return ratio
 
 
 def flow_sizes(run: Run, here: Here, slope: State) -> Vector:

@@ -23,11 +23,19 @@ HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
 
 /* The same with a look at what the flow is computed from; see hsdsl/simulate/scales.py. */
 static double ratio_closer(hs_run *run, double h, double ratio) {
+  hs_control *const control = &run->control;
+  const int again = run->here.t == control->failed_at;
+  control->failed_at = run->here.t;
+  if (!control->closer && !again) return ratio;
   if (HS_HAS_RADAU && run->method->kind == HS_RADAU) {
     radau_scales(run, run->here.t, h, 1);
-    return ratio_to(run, h, run->radau.scales);
+    ratio = ratio_to(run, h, run->radau.scales);
+  } else {
+    if (resolved(run, run->here.t, h, run->x, 0)) return ratio;
+    ratio = ratio_to(run, h, run->resolved);
   }
-  return resolved(run, run->here.t, h, run->x, 0) ? ratio : ratio_to(run, h, run->resolved);
+  control->closer = ratio <= 1;
+  return ratio;
 }
 
 /* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */

@@ -75,6 +75,7 @@ static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
   for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
   radau->largest = numbers(store, w);
   radau->error = numbers(store, w);
+  radau->least = numbers(store, w);
   radau->order = take(store, w, sizeof(int));
   radau->turned = take(store, w, sizeof(int));
 }
@@ -203,6 +204,7 @@ void hs_simulate(hs_task *task) {
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
   run.control.order = task->method->order;
+  run.control.failed_at = NAN;
   run.control.implicit = task->method->kind == HS_RADAU;
   run.steps_to_poll = run.poll_steps = 64;
   run.polled = clock();

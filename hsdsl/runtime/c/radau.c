@@ -52,7 +52,10 @@ static void radau_scales(hs_run *run, double t, double h, int closer) {
   if (!closer || run->here.table->jumps || resolved(run, t, h, run->x, radau->rows)) return;
   radau->scales = run->resolved;
   radau->lifted = 0;
-  for (int s = 0; s < run->here.dimension; s++) radau->lifted |= run->resolved[s] > run->scales[s];
+  for (int s = 0; s < run->here.dimension; s++) {
+    radau->lifted |= run->resolved[s] > run->scales[s];
+    radau->least[s] = run->resolved[s];
+  }
 }
 
 HS_INLINE int derive(hs_run *run, double t) {
@@ -107,8 +110,9 @@ HS_INLINE void guess(hs_run *run, int n, double t, double h) {
 /* Solve for the step with the derivatives that there are. */
 HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int closer) {
   hs_radau *const radau = &run->radau;
-  radau->scales = run->scales;
-  radau_scales(run, t, h, closer || radau->lifted);
+  radau->scales = radau->lifted ? run->resolved : run->scales;
+  for (int s = 0; radau->lifted && s < n; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
+  radau_scales(run, t, h, closer);
   guess(run, n, t, h);
   const int status = factor_for(run, n, h);
   if (status) return status;
@@ -126,9 +130,8 @@ HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
     if (status != NO_CONVERGENCE) return status;
     if (derive(run, t)) return NO_VALUE;
   }
-  const int known = radau->lifted || run->here.table->jumps;
   const int status = settle(run, n, t, h, exactly, 0);
-  return status == NO_CONVERGENCE && !known ? settle(run, n, t, h, exactly, 1) : status;
+  return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, n, t, h, exactly, 1) : status;
 }
 
 /* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */

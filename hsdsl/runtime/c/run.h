@@ -67,6 +67,8 @@ typedef struct {
   int implicit;
   double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
   int64_t accepted, rejected;
+  double failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
+  int closer;       /* whether a look at the flow's round-off let one pass */
 } hs_control;
 
 /* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
@@ -89,7 +91,8 @@ typedef struct {
   double *wanted[3], *right[3];
   double *largest, *error;
   const double *scales; /* of the states, as the last step was solved with them */
-  int lifted;           /* whether round-off of the flow makes some of them larger */
+  double *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
+  int lifted;
 } hs_radau;
 
 typedef struct {
