@@ -12,3 +12,8 @@ DEFAULTS: dict[str, Any] = {
     "max_transitions": 10**6,
 }
 DEFAULT_TOLERANCE = Fraction("1e-9")
+
+
+def least_relaxation(relaxation: Any, until: Any) -> Any:
+    """The default relaxation of a run that ends at ``until``: the general one, or if smaller as large a part of it."""
+    return min(relaxation, relaxation * until) if until > 0 else relaxation

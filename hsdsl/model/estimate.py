@@ -70,12 +70,14 @@ class Estimate:
 
 
 def finer_settings(execution: Execution) -> dict[str, Number]:
-    """Return settings with half the step (or the tolerance of half steps) and half the relaxation."""
+    """Return settings with half the step (or the tolerance of half steps, if there is one) and half the relaxation."""
     settings = execution.settings
     finer = {"relaxation": settings["relaxation"] / 2} if "relaxation" in settings else {}
     if "step" in settings:
         return {"step": settings["step"] / 2, **finer}
-    return {"tolerance": settings["tolerance"] / FINER_TOLERANCE, **finer}
+    last = execution.times[0]
+    digit = last.context.eps if execution.times.dtype == object else 2.0**-52
+    return {"tolerance": max(digit, settings["tolerance"] / FINER_TOLERANCE), **finer}
 
 
 def compare(coarse: Execution, fine: Execution, settings: dict[str, Number]) -> Estimate:
