@@ -69,11 +69,14 @@ def factored(matrix: Matrix, scales: Sequence[Number] | None = None) -> Factors:
 
 
 def _pivot(column: Vector, scales: Vector) -> int:
-    """The first of the largest numbers relative to their scales; beside any other a scale of zero is the smallest."""
+    """The first of the largest numbers relative to their scales; those without a scale only where others are zero."""
     pivot = 0
     for i, a in enumerate(column):
-        if a * scales[pivot] > column[pivot] * scales[i]:
-            pivot = i
+        if scales[i] > 0 and scales[pivot] > 0:
+            larger = a * scales[pivot] > column[pivot] * scales[i]
+        else:
+            larger = column[pivot] == 0 and a > 0
+        pivot = i if larger else pivot
     return pivot
 
 
@@ -105,9 +108,7 @@ class ComplexFactors:
             b[i] = b[i] - (c * b[j] + d * a[j])
 
 
-def factored_complex(
-    real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None
-) -> ComplexFactors:
+def factored_complex(real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None) -> ComplexFactors:
     """Factor a square matrix of complex numbers; the size of a pivot is the sum of its parts' sizes.
 
     Raises

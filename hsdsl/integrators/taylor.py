@@ -112,9 +112,7 @@ def terms(series: Taylor, order: int, t: Number, x: State) -> Stages:
     return tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
 
 
-def proposed_step(
-    stages: Stages, scales: Sequence[Number], tolerance: Number, arithmetic: Arithmetic
-) -> Number | None:
+def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, arithmetic: Arithmetic) -> Number | None:
     """The step at which the first terms that are left out stay below the tolerance; None where all of them vanish.
 
     Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap. With l

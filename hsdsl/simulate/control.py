@@ -7,10 +7,12 @@ be solved is halved. Trials halved to stay in the relaxed domain do not feed the
 
 An implicit method pays for each change of the step. For one the factor is also held down by what the ratio did over
 the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and one from 0.9 to 1.2 counts as 1. A
-stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) of its scale.
+stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) of its scale, but no shorter
+than the least step: the largest one times the tolerance, or times 1e-8 (half the digits of a number) if that is more.
 
-A state that has been zero so far has no scale. It is held against its own value at the step's end; over a step below
-the tolerance times the largest one it does not count.
+A state that has been zero so far has no scale. It is held against its own value at the step's end. Where it begins as
+a power of time that is above the method's order, no step is short enough for that: over the least step a
+state that has been no more than the tolerance times what it is then does not count.
 """
 
 from __future__ import annotations
@@ -35,6 +37,8 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
+    ``largest`` and ``least`` bound steps that nothing else bounds.
+
     ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``failed_at`` is
     where the last step began that was too wrong; ``closer`` says that a look at the flow's round-off let one pass.
     """
@@ -48,18 +52,25 @@ class Control:
     before: tuple[Number, Number] | None = None
     accepted: int = 0
     rejected: int = 0
+    least: Number = 0
     failed_at: Number | None = None
     closer: bool = False
 
-    def ratio(self, h: Number, error: State, z: State, scales: Sequence[Number]) -> Number:
-        """Error ratio of a step of length h to z; at most 1 is acceptable."""
-        assert self.tolerance is not None
-        worst = self.h * 0
-        for e, b, s in zip(error, z, scales, strict=True):
+    def ratio(
+        self, h: Number, error: State, z: State, scales: Sequence[Number], had: Sequence[Number] | None = None
+    ) -> Number:
+        """Error ratio of a step of length h to z; at most 1 is acceptable.
+
+        ``had`` is given where ``scales`` are more than the sizes that the states have had.
+        """
+        tolerance = self.tolerance
+        assert tolerance is not None
+        worst, tiny = self.h * 0, h <= self.least
+        for e, b, s, before in zip(error, z, scales, scales if had is None else had, strict=True):
             size = max(s, abs(b))
-            if s == 0 and (e == 0 or h <= self.tolerance * self.largest):
+            if e == 0 or (tiny and before <= tolerance * abs(b)):
                 continue
-            worst = max(worst, abs(e) / (self.tolerance * size) if size > 0 else 1 / self.tolerance)
+            worst = max(worst, abs(e) / (tolerance * size) if size > 0 else 1 / tolerance)
         return worst
 
     def looks_closer(self, t: Number) -> bool:
@@ -87,7 +98,7 @@ class Control:
         share = self.power(self.tolerance, 1 / (self.h * 0 + self.order))
         for s, f in zip(scales, slope, strict=True):
             if s > 0 and self.h * abs(f) > share * s:
-                self.h = share * s / abs(f)
+                self.h = max(min(self.h, self.least), share * s / abs(f))
 
     def predicted(self, taken: Number, ratio: Number) -> Number:
         """Factor from one step to the next for an implicit method."""
@@ -118,4 +129,6 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
         return Control(settings.step, None, order, settings.step, None)
     largest = settings.until * LARGEST_SHARE
     implicit = isinstance(settings.method, RadauMethod)
-    return Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
+    return control

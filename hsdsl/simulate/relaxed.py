@@ -210,7 +210,9 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, LEFT)
     instant = run.arithmetic.sqrt(run.arithmetic.unit) * t
-    grown = any(s < instant * abs(f) for s, f in zip(here.arc.scales, slope, strict=True))  # faster than time can follow
+    grown = any(
+        0 < s < instant * abs(f) for s, f in zip(here.arc.scales, slope, strict=True)
+    )  # faster than time can follow
     if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
         ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))

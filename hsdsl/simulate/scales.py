@@ -19,8 +19,9 @@ def error_ratio(
     run: Run, here: Here, method: Stepper, error: State, t: Number, h: Number, x: State, z: State
 ) -> Number:
     """Error ratio of a step from (t, x) to z; at most 1 is acceptable."""
-    scales: Sequence[Number] = here.arc.scales if method.scales is None else method.scales(False)
-    control, ratio = run.control, run.control.ratio(h, error, z, scales)
+    control, had = run.control, here.arc.scales
+    scales: Sequence[Number] = had if method.scales is None else method.scales(False)
+    ratio = control.ratio(h, error, z, scales, had)
     if not ratio > 1 or here.mode.jumps or not control.looks_closer(t):
         return ratio
     try:
@@ -30,7 +31,7 @@ def error_ratio(
             scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic)
     except DOMAIN_ERRORS:
         return ratio
-    ratio = control.ratio(h, error, z, scales)
+    ratio = control.ratio(h, error, z, scales, had)
     control.closer = ratio <= 1
     return ratio
 

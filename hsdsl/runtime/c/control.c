@@ -12,10 +12,11 @@
 /* Error ratio of a step of length h to run->z, errors held against these scales. */
 HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
   const double tolerance = run->control.tolerance;
+  const int tiny = h <= run->control.least;
   double worst = run->control.h * 0;
   for (int s = 0; s < run->here.dimension; s++) {
-    const double size = hs_max(scales[s], fabs(run->z[s])), error = run->error[s];
-    if (scales[s] == 0 && (error == 0 || h <= tolerance * run->control.largest)) continue;
+    const double end = fabs(run->z[s]), size = hs_max(scales[s], end), error = run->error[s];
+    if (error == 0 || (tiny && run->scales[s] <= tolerance * end)) continue;
     worst = hs_max(worst, size > 0 ? fabs(error) / (tolerance * size) : 1 / tolerance);
   }
   return worst;
@@ -57,7 +58,8 @@ static void begin_steps(hs_run *run) {
   const double share = pow(control->tolerance, 1 / (control->h * 0 + control->order));
   for (int s = 0; s < run->here.dimension; s++) {
     const double size = run->scales[s], slope = fabs(run->slope[s]);
-    if (size > 0 && control->h * slope > share * size) control->h = share * size / slope;
+    if (size > 0 && control->h * slope > share * size)
+      control->h = hs_max(hs_min(control->h, control->least), share * size / slope);
   }
 }
 

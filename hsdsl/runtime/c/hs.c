@@ -203,6 +203,7 @@ void hs_simulate(hs_task *task) {
   run.control.h = task->settings.step;
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
+  run.control.least = hs_max(task->settings.tolerance, sqrt(HS_UNIT)) * task->settings.largest;
   run.control.order = task->method->order;
   run.control.failed_at = NAN;
   run.control.implicit = task->method->kind == HS_RADAU;

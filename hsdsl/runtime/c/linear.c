@@ -15,8 +15,10 @@ static void exchange_places(int *order, int i, int k) {
   order[k] = kept;
 }
 
-/* Whether a is larger than b, each relative to the scale of the unknown of its row. */
-HS_INLINE int is_larger(double a, double of_a, double b, double of_b) { return a * of_b > b * of_a; }
+/* Whether a is larger than b, each relative to the scale of the unknown of its row; without one only than zero. */
+HS_INLINE int is_larger(double a, double of_a, double b, double of_b) {
+  return of_a > 0 && of_b > 0 ? a * of_b > b * of_a : b == 0 && a > 0;
+}
 
 /* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. Its rows, as its
    columns, belong to unknowns of these scales. */

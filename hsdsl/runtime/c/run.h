@@ -62,7 +62,7 @@ typedef struct {
 } hs_found;
 
 typedef struct {
-  double h, tolerance, largest;
+  double h, tolerance, largest, least;
   int order;
   int implicit;
   double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
