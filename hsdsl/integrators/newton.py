@@ -113,11 +113,13 @@ class Convergence:
 
 
 def _scaled(largest: Vector, x: State, scales: Vector, z: Increments) -> Number:
-    """The largest change relative to the scales; of a state that has been zero so far, to where it is now."""
-    size = largest[0] * 0
-    for i, (d, s) in enumerate(zip(largest, scales, strict=True)):
-        if not s > 0:
-            s = max(abs(x[i]), *(abs(x[i] + k[i]) for k in z))
-        if d > 0:
-            size = max(size, d / s if s > 0 else s + 1)
+    """The largest change relative to the scales, or to where a state is now.
+
+    A state that has been zero so far counts only where all are: it follows the others, an iteration later.
+    """
+    size, known = largest[0] * 0, any(s > 0 for s in scales)
+    for d, a, s, end in zip(largest, x, scales, z[2], strict=True):
+        if d > 0 and (s > 0 or not known):
+            reach = max(s, abs(a + end))
+            size = max(size, d / reach if reach > 0 else reach + 1)
     return size

@@ -29,6 +29,7 @@ SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 10_000
 BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
+NOTHING = 2.0**-960  # below this numbers have no digits left
 LEAST_BEFORE = 0.3  # a root of the one before likewise
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
@@ -68,7 +69,7 @@ class Control:
         worst, tiny = self.h * 0, h <= self.least
         for e, b, s, before in zip(error, z, scales, scales if had is None else had, strict=True):
             size = max(s, abs(b))
-            if e == 0 or (tiny and before <= tolerance * abs(b)):
+            if abs(e) <= NOTHING or (tiny and before <= tolerance * abs(b)):
                 continue
             worst = max(worst, abs(e) / (tolerance * size) if size > 0 else 1 / tolerance)
         return worst

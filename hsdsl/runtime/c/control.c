@@ -8,6 +8,7 @@
 #define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
 #define LEAST_BEFORE 0.3
+#define NOTHING 0x1p-960
 
 /* Error ratio of a step of length h to run->z, errors held against these scales. */
 HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
@@ -16,7 +17,7 @@ HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
   double worst = run->control.h * 0;
   for (int s = 0; s < run->here.dimension; s++) {
     const double end = fabs(run->z[s]), size = hs_max(scales[s], end), error = run->error[s];
-    if (error == 0 || (tiny && run->scales[s] <= tolerance * end)) continue;
+    if (fabs(error) <= NOTHING || (tiny && run->scales[s] <= tolerance * end)) continue;
     worst = hs_max(worst, size > 0 ? fabs(error) / (tolerance * size) : 1 / tolerance);
   }
   return worst;
