@@ -96,6 +96,8 @@ FLOAT64 = Arithmetic(
     isfinite=math.isfinite,
     functions={name: getattr(math, name) for name in _MATH}
     | {
+        "frexp": math.frexp,
+        "ldexp": math.ldexp,
         "abs": abs,
         "sign": _float_sign,
         "heaviside": _float_heaviside,
@@ -155,6 +157,8 @@ def multiprecision(digits: int) -> Arithmetic:
             for name in _MATH
         }
         | {
+            "frexp": context.frexp,
+            "ldexp": context.ldexp,
             "abs": abs,
             "sign": context.sign,
             "heaviside": heaviside,

@@ -10,10 +10,12 @@ A routine's text is a Python function body in which every constant that is not a
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
+JUMPS = re.compile(r"\b(?:sign|floor)\(")
 Hold = Literal["zero", "linear"]
 
 
@@ -162,6 +164,11 @@ class ModeProgram:
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the flow has `sign` or `floor`, which jump."""
+        return any(JUMPS.search(text) for text in self.flow_texts)
 
 
 @dataclass(frozen=True)

@@ -67,11 +67,11 @@ class ArcTable:
 def within(execution: Execution, times: Any) -> tuple[Array, Array]:
     """Take times into the execution's number type, and say which of them are within the run.
 
-    A time outside the run by no more than the tie tolerance, 1e-12 max(1, |t|), counts as its end.
+    A time outside the run by no more than the tie tolerance, 1e-12 of the run's length, counts as its end.
     """
     asked = _as_times(execution, times)
     start, end = execution.time_span
-    slack = 1e-12 * max(1.0, abs(float(start)), abs(float(end)))
+    slack = 1e-12 * max(abs(float(start)), abs(float(end)))
     inside = np.asarray((asked >= start - slack) & (asked <= end + slack), dtype=bool)
     return asked, inside
 

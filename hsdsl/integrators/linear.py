@@ -1,10 +1,12 @@
 """Systems of linear equations for any number type: dense LU with partial pivoting, for the few states of a mode.
 
-Complex numbers are pairs of real ones, so that every number type has them, and every engine the same.
+A pivot is the largest number of its column relative to the scale of its row's unknown, so that it does not depend on
+the units of the unknowns. Complex numbers are pairs of real ones, so that every number type has them, and every engine the same.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
@@ -41,8 +43,8 @@ class Factors:
         return found
 
 
-def factored(matrix: Matrix) -> Factors:
-    """Factor a square matrix.
+def factored(matrix: Matrix, scales: Sequence[Number] | None = None) -> Factors:
+    """Factor a square matrix; its rows, as its columns, belong to unknowns of these scales, all alike where left out.
 
     Raises
     ------
@@ -50,8 +52,9 @@ def factored(matrix: Matrix) -> Factors:
         A pivot is zero or not a number.
     """
     rows, order = [list(row) for row in matrix], list(range(len(matrix)))
+    scales = scales or [1] * len(rows)
     for k in range(len(rows)):
-        pivot = max(range(k, len(rows)), key=lambda i: abs(rows[i][k]))
+        pivot = _pivot([abs(rows[i][k]) for i in range(k, len(rows))], [scales[i] for i in order[k:]]) + k
         rows[k], rows[pivot], order[k], order[pivot] = rows[pivot], rows[k], order[pivot], order[k]
         upper = rows[k]
         if not abs(upper[k]) > 0:
@@ -63,6 +66,18 @@ def factored(matrix: Matrix) -> Factors:
                 for j in range(k + 1, len(row)):
                     row[j] = row[j] - row[k] * upper[j]
     return Factors(rows, order)
+
+
+def _pivot(column: Vector, scales: Vector) -> int:
+    """The first of the largest numbers relative to their scales; those without a scale only where others are zero."""
+    pivot = 0
+    for i, a in enumerate(column):
+        if scales[i] > 0 and scales[pivot] > 0:
+            larger = a * scales[pivot] > column[pivot] * scales[i]
+        else:
+            larger = column[pivot] == 0 and a > 0
+        pivot = i if larger else pivot
+    return pivot
 
 
 @dataclass(frozen=True)
@@ -93,7 +108,7 @@ class ComplexFactors:
             b[i] = b[i] - (c * b[j] + d * a[j])
 
 
-def factored_complex(real: Matrix, imaginary: Matrix) -> ComplexFactors:
+def factored_complex(real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None) -> ComplexFactors:
     """Factor a square matrix of complex numbers; the size of a pivot is the sum of its parts' sizes.
 
     Raises
@@ -103,8 +118,9 @@ def factored_complex(real: Matrix, imaginary: Matrix) -> ComplexFactors:
     """
     re, im, order = [list(row) for row in real], [list(row) for row in imaginary], list(range(len(real)))
     n = len(order)
+    scales = scales or [1] * n
     for k in range(n):
-        pivot = max(range(k, n), key=lambda i: abs(re[i][k]) + abs(im[i][k]))
+        pivot = _pivot([abs(re[i][k]) + abs(im[i][k]) for i in range(k, n)], [scales[i] for i in order[k:]]) + k
         for rows in (re, im):
             rows[k], rows[pivot] = rows[pivot], rows[k]
         order[k], order[pivot] = order[pivot], order[k]

@@ -24,7 +24,7 @@ FEW = 2  # which matters where a step takes more than these
 LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
 DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
 SLOW = 0.5  # likewise for iterations that go on to round-off
-NOISE = 2**10  # units of round-off, relative to 1 + |x|: a correction this small may be all noise
+NOISE = 2**10  # units of round-off, relative to the scales: a correction this small may be all noise
 SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
 
 
@@ -50,7 +50,7 @@ class Convergence:
         self.rate = self.left = arithmetic.zero + 1
         self.aged = False
 
-    def to_tolerance(self, x: State, iterations: Iterator[Iteration]) -> Increments:
+    def to_tolerance(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
         """Iterate until what is left is a small share of the tolerance.
 
         Raises
@@ -64,7 +64,7 @@ class Convergence:
         enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
         left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
         for count, (largest, z) in enumerate(iterations, 1):
-            size = _scaled(largest, x) / tolerance
+            size = _scaled(largest, x, scales, z) / tolerance
             if before is not None:
                 rate = size / before
                 if rate >= DIVERGING:
@@ -85,7 +85,7 @@ class Convergence:
         self.rate, self.left, self.aged = one, one, True
         raise NoConvergence("an iteration that does not settle")
 
-    def to_roundoff(self, x: State, iterations: Iterator[Iteration]) -> Increments:
+    def to_roundoff(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
         """Iterate until the next correction would be below the last digit, or they are all noise.
 
         Raises
@@ -96,7 +96,7 @@ class Convergence:
         unit, before, z = self._arithmetic.unit, None, None
         allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
         for largest, z in islice(iterations, 16 + 2 * self._arithmetic.bits):
-            size = _scaled(largest, x)
+            size = _scaled(largest, x, scales, z)
             rate = SLOW if not before else size / before
             reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
             if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
@@ -112,6 +112,14 @@ class Convergence:
         return z
 
 
-def _scaled(largest: Vector, x: State) -> Number:
-    """The largest change relative to 1 + |x|."""
-    return max(d / (1 + abs(a)) for d, a in zip(largest, x, strict=True))
+def _scaled(largest: Vector, x: State, scales: Vector, z: Increments) -> Number:
+    """The largest change relative to the scales, or to where a state is now.
+
+    A state that has been zero so far counts only where all are: it follows the others, an iteration later.
+    """
+    size, known = largest[0] * 0, any(s > 0 for s in scales)
+    for d, a, s, end in zip(largest, x, scales, z[2], strict=True):
+        if d > 0 and (s > 0 or not known):
+            reach = max(s, abs(a + end))
+            size = max(size, d / reach if reach > 0 else reach + 1)
+    return size

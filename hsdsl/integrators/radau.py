@@ -14,25 +14,39 @@ E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 19
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.integrators.collocation import coefficients
 from hsdsl.integrators.implicit import RADAU as RADAU
 from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
 from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConvergence
+from hsdsl.integrators.scales import resolved, rows_of
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
 
 
-def radau_stepper(jacobian: Routine, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
+def radau_stepper(
+    jacobian: Routine,
+    tolerance: Number | None,
+    arithmetic: Arithmetic,
+    scales: Sequence[Number],
+    smooth: bool = True,
+) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
+
+    ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic)
-    return Stepper(RADAU.name, steps.step, steps.piece, lambda h, stages, end: stages[3], landing=steps.landing)
+    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth)
+
+    def error(h: Number, stages: Stages, end: State) -> State:
+        return stages[3]
+
+    return Stepper(RADAU.name, steps.step, steps.piece, error, landing=steps.landing, scales=steps.scales)
 
 
 class Steps:
@@ -44,8 +58,18 @@ class Steps:
         How often derivatives were asked for and matrices were factored, and how many iterations there were.
     """
 
-    def __init__(self, jacobian: Routine, tolerance: Number | None, arithmetic: Arithmetic) -> None:
+    def __init__(
+        self,
+        jacobian: Routine,
+        tolerance: Number | None,
+        arithmetic: Arithmetic,
+        scales: Sequence[Number],
+        smooth: bool = True,
+    ) -> None:
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
+        self._largest, self._smooth = scales, smooth
+        self._scales, self._floors = scales, list[Number]()
+        self._tried: tuple[Flow, Number, Number, State] | None = None
         self._convergence = Convergence(tolerance, arithmetic)
         self._known = coefficients(arithmetic)
         self._one = arithmetic.zero + 1
@@ -83,18 +107,36 @@ class Steps:
         if self._rows is None or (self._convergence.aged and self._derived_at != t):
             self._derive(t, x)
         settle = self._convergence.to_roundoff if exactly else self._convergence.to_tolerance
-        guess = self._guess(t, h, x)
-        if self._derived_at == t:
-            return settle(x, self._iterations(flow, t, h, x, guess))
-        try:
-            return settle(x, self._iterations(flow, t, h, x, guess))
-        except NoConvergence:
+        guess, self._tried = self._guess(t, h, x), (flow, t, h, x)
+
+        def attempt(closer: bool = False) -> Increments:
+            floors = self._floors
+            self._scales = list(map(max, self._largest, floors)) if floors else self._largest
+            return settle(x, self.scales(closer), self._iterations(flow, t, h, x, guess))
+
+        if self._derived_at != t:
+            with suppress(NoConvergence):
+                return attempt()
             self._derive(t, x)
-            return settle(x, self._iterations(flow, t, h, x, guess))
+        if not self._smooth:
+            return attempt()
+        try:
+            return attempt()
+        except NoConvergence:
+            return attempt(closer=True)
+
+    def scales(self, closer: bool) -> Sequence[Number]:
+        """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
+        assert self._tried is not None
+        if closer and self._smooth:
+            with suppress(*DOMAIN_ERRORS):
+                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic)
+                lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
+                self._floors = list(self._scales) if lifted else []
+        return self._scales
 
     def _derive(self, t: Number, x: State) -> None:
-        flat, n = self._jacobian(t, *x), len(x)
-        self._rows, self._derived_at, self._factors = [list(flat[i : i + n]) for i in range(0, n * n, n)], t, None
+        self._rows, self._derived_at, self._factors = rows_of(self._jacobian(t, *x), len(x)), t, None
         self.derived += 1
 
     def _factor(self, h: Number) -> tuple[Factors, ComplexFactors]:
@@ -112,7 +154,8 @@ class Steps:
             self._factored_for = h
             self.factorings += 1
             try:
-                self._factors = factored(real), factored_complex(shifted, turned)
+                scales = self._largest
+                self._factors = factored(real, scales), factored_complex(shifted, turned, scales)
             except Singular as problem:
                 self._factors = None
                 raise NoConvergence(str(problem)) from None

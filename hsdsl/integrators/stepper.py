@@ -6,7 +6,7 @@ The loops over stages and states run here, once, while the text is written; what
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -40,6 +40,9 @@ class Stepper:
     landing : callable or None
         For implicit methods, whose stages are increments of the state: ``step`` for a part of the step just made,
         solved to round-off.
+    scales : callable or None
+        For implicit methods: the scales of the states that the step just made was solved with; given True, with a
+        look at what the flow is computed from, for this step and those that follow.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Stepper:
     error: Callable[[Number, Stages, State], State] | None
     gain: float = 1.0
     landing: Callable[[Flow, Number, Number, State, State], tuple[State, Stages]] | None = None
+    scales: Callable[[bool], Sequence[Number]] | None = None
 
 
 @cache

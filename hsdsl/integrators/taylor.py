@@ -8,10 +8,12 @@ high-order Taylor methods, Experimental Mathematics 14, 2005 (doi:10.1080/105864
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.integrators.scales import root
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Taylor
 
@@ -110,20 +112,34 @@ def terms(series: Taylor, order: int, t: Number, x: State) -> Stages:
     return tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
 
 
-def proposed_step(stages: Stages, x: State, tolerance: Number, arithmetic: Arithmetic) -> Number | None:
+def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, arithmetic: Arithmetic) -> Number | None:
     """The step at which the first terms that are left out stay below the tolerance; None where all of them vanish.
 
     Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap. With l
     the largest coefficient of order m relative to the tolerance, h = l**(-1/m); one more of order m + 1 asks for less
-    only where it exceeds l/h.
+    only where it exceeds l/h. A state that has been zero so far is held against the first of its own terms.
     """
-    power, least, before = arithmetic.functions["pow"], None, arithmetic.zero
+    least, before = None, arithmetic.zero
     for m in (len(stages) - 1, len(stages)):
         largest = arithmetic.zero
-        for c, a in zip(stages[m - 1], x, strict=True):
-            largest = max(largest, abs(c) / (tolerance * (1 + abs(a))))
+        for c, s in zip(stages[m - 1], scales, strict=True):
+            if s > 0:
+                largest = max(largest, abs(c) / (tolerance * s))
         if largest > 0 and (least is None or largest * least > before):
-            h = power(1 / largest, (arithmetic.zero + 1) / m)
+            h = root(largest, m, arithmetic)
             least = h if least is None else min(h, least)
         before = largest
+    for i, s in enumerate(scales):
+        if not s > 0:
+            for h in _from_zero([c[i] for c in stages], tolerance, arithmetic):
+                least = h if least is None else min(h, least)
     return least
+
+
+def _from_zero(c: State, tolerance: Number, arithmetic: Arithmetic) -> Iterator[Number]:
+    """The steps at which the first terms that are left out stay below the tolerance beside the first that is not 0."""
+    last = len(c) - 1
+    first = next((k for k in range(last - 1) if c[k] != 0), last)
+    for k in (last - 1, last):
+        if first < k and c[k] != 0:
+            yield root(abs(c[k]) / (tolerance * abs(c[first])), k - first, arithmetic)

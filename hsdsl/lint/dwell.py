@@ -64,7 +64,7 @@ def pace(subject: Subject) -> Pace | None:
 def _of_reference(subject: Subject, reference: Reference, until: Number) -> Pace | None:
     events = [event if isinstance(event, Scalar) else event.time for event in reference.transitions]
     times = [time for time in map(subject.read, events) if numeric.finite(time)]
-    gaps = [after - before for before, after in pairwise(times) if after - before > _TIE * max(1, abs(after))]
+    gaps = [after - before for before, after in pairwise(times) if after - before > _TIE * max(until, abs(after))]
     return Pace(min(gaps), max(1, until / times[-1]) * len(times), True) if gaps else None
 
 

@@ -353,7 +353,7 @@ class Model:
         metric : {"quotient", "relaxed"}
             The paper's d_M (Def. 12), or that of the relaxed space (Def. 19).
         relaxation : number or str, optional
-            The paper's epsilon; left out, the file's or 1e-6.
+            The paper's epsilon; left out, that of a run of the file.
         parameters : mapping, optional
             Overrides by name.
         hops : int, optional

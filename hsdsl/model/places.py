@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import TOLERANCE, Space
@@ -108,11 +109,15 @@ def _example(space: Space, mode: str) -> str:
 
 def _relaxation(values: Values, given: Any) -> float:
     if given is None:
-        given = values.constant("relaxation")[0] if values.has("relaxation") else 1e-6
+        given = values.constant("relaxation")[0] if values.has("relaxation") else _default(values)
     number = float(values.number(given, "relaxation"))
     if number <= 0:
         raise UsageError(f"relaxation must be positive, not {show(number)}")
     return number
+
+
+def _default(values: Values) -> float:
+    return least_relaxation(float(DEFAULTS["relaxation"]), float(values.constant("until")[0]))
 
 
 def _check_inside(space: Space, place: Place) -> None:

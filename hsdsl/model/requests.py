@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.arithmetic import Arithmetic
+from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
@@ -149,6 +149,16 @@ def check_smooth(method: Method | None, program: Program) -> None:
                 "of a state",
                 f"use method '{AUTO}'",
             )
+
+
+def check_tolerance(tolerance: Number | None, arithmetic: Arithmetic) -> None:
+    """Refuse a tolerance that is smaller than the last digit of the numbers of a run."""
+    if tolerance is not None and tolerance < 2 * arithmetic.unit:
+        kind = f"{arithmetic.digits} digits" if arithmetic.digits else "float64"
+        raise UsageError(
+            f"a tolerance of {float(tolerance):.3g} is below the precision of {kind}, {float(2 * arithmetic.unit):.2g}",
+            "take a larger tolerance, or more digits by --precision",
+        )
 
 
 def check_digits(method: Method | None, arithmetic: Arithmetic) -> None:

@@ -6,10 +6,10 @@ from dataclasses import replace
 from fractions import Fraction
 
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
-from hsdsl.defaults import kept_digits
+from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
-from hsdsl.model.requests import DEFAULT, FILE, Request, check_digits, check_smooth
+from hsdsl.model.requests import DEFAULT, FILE, Request, check_digits, check_smooth, check_tolerance
 from hsdsl.model.values import Values, samples
 from hsdsl.simulate import Settings
 
@@ -49,6 +49,10 @@ def settings_of(request: Request, values: Values) -> Settings:
     check_digits(request.method, values.kernel.arithmetic)
     check_smooth(request.method, values.program)
     tolerance = positive("tolerance") if request.size == "tolerance" else None
+    check_tolerance(tolerance, values.kernel.arithmetic)
+    relaxation = positive("relaxation")
+    if request.values["relaxation"].place == "default":
+        relaxation = least_relaxation(relaxation, until)
     method = request.method
     if isinstance(method, TaylorMethod):
         method = method.for_tolerance(tolerance, values.kernel.arithmetic)
@@ -57,7 +61,7 @@ def settings_of(request: Request, values: Values) -> Settings:
         method=method,
         step=step,
         tolerance=tolerance,
-        relaxation=positive("relaxation"),
+        relaxation=relaxation,
         until=until,
         max_transitions=int(most),
         samples=_samples(request, values),

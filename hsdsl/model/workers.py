@@ -97,7 +97,7 @@ def _keep(
     kept.outputs[i] = execution.outputs[-1]
     times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
     kept.crossed[i, : len(times)] = times
-    inside = instances.time[i] <= execution.times[-1] + 1e-12 * max(1.0, abs(float(execution.times[-1])))
+    inside = instances.time[i] <= execution.times[-1] + 1e-12 * abs(float(execution.times[-1]))
     samples = execution.sample(instances.time[i][inside])
     for k, name in enumerate(names):
         if name in samples.states:

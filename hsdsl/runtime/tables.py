@@ -73,6 +73,8 @@ class Mode(ctypes.Structure):
         ("surface_line", POINTER(c_int)),
         ("jacobian", c_void_p),
         ("affine", c_int),
+        ("jumps", c_int),
+        ("state", POINTER(c_int)),
     )
 
 
@@ -87,7 +89,7 @@ class Model(ctypes.Structure):
     mode: Any
 
     _fields_ = (
-        *((name, c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data", "lines")),
+        *((name, c_int) for name in ("modes", "width", "surfaces", "edges", "outputs", "data", "lines", "states")),
         ("mode", POINTER(Mode)),
     )
 
@@ -209,6 +211,7 @@ class Stop(ctypes.Structure):
     h: float
     x: Any
     slope: Any
+    scales: Any
 
     _fields_ = (
         *((name, c_int32) for name in ("reason", "mode", "dimension", "edge", "obstacle", "surface")),
@@ -217,6 +220,7 @@ class Stop(ctypes.Structure):
         ("h", c_double),
         ("x", c_void_p),
         ("slope", c_void_p),
+        ("scales", c_void_p),
     )
 
 

@@ -1,7 +1,7 @@
 """The step size: fixed, or from the embedded error estimate by one documented formula.
 
-With e the estimate and x, z the step's ends, the error ratio is max_i |e_i| / (tolerance (1 + max(|x_i|, |z_i|))). A
-step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
+With e the estimate, z the step's end and s the scales of the states (the largest size that each has had), the error
+ratio is max_i |e_i| / (tolerance max(s_i, |z_i|)). A step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
 above 1 after a rejection), order being the power of h that the estimate falls with. A step whose equations could not
 be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
 
@@ -10,12 +10,17 @@ mode, also of another stretch of flow, begins with it, or with twice the last on
 
 An implicit method pays for each change of the step. For one the factor is also held down by what the ratio did over
 the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8), and one from 0.9 to 1.2 counts as 1. A
-stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) (1 + |x|).
+stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) of its scale, but no shorter
+than the least step: the largest one times the tolerance, or times 1e-8 (half the digits of a number) if that is more.
+
+A state that has been zero so far has no scale. It is held against its own value at the step's end. Where it begins as
+a power of time that is above the method's order, no step is short enough for that: over the least step a
+state that has been no more than the tolerance times what it is then does not count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -27,6 +32,7 @@ SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 10_000
 BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
+NOTHING = 2.0**-960  # below this numbers have no digits left
 LEAST_BEFORE = 0.3  # a root of the one before likewise
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
@@ -35,8 +41,12 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
-    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``reach`` has the
-    step that the surfaces of a mode allow, where they do not allow any; those of a mode in ``lost`` cannot be followed.
+    ``largest`` and ``least`` bound steps that nothing else bounds.
+
+    ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``failed_at`` is
+    where the last step began that was too wrong; ``closer`` says that a look at the flow's round-off let one pass.
+    ``reach`` has the step that the surfaces of a mode allow, where they do not allow any; those of a mode in ``lost``
+    cannot be followed.
     """
 
     h: Number
@@ -48,6 +58,9 @@ class Control:
     before: tuple[Number, Number] | None = None
     accepted: int = 0
     rejected: int = 0
+    least: Number = 0
+    failed_at: Number | None = None
+    closer: bool = False
     reach: dict[str, Number] = field(default_factory=dict[str, Number])
     lost: set[str] = field(default_factory=set[str])
 
@@ -64,13 +77,27 @@ class Control:
         if taken >= self.reach.get(mode, 2 * taken):
             self.reach[mode] = 2 * taken
 
-    def ratio(self, error: State, x: State, z: State) -> Number:
-        """Error ratio of a step; at most 1 is acceptable."""
-        assert self.tolerance is not None
-        worst = self.h * 0
-        for e, a, b in zip(error, x, z, strict=True):
-            worst = max(worst, abs(e) / (self.tolerance * (1 + max(abs(a), abs(b)))))
+    def ratio(
+        self, h: Number, error: State, z: State, scales: Sequence[Number], had: Sequence[Number] | None = None
+    ) -> Number:
+        """Error ratio of a step of length h to z; at most 1 is acceptable.
+
+        ``had`` is given where ``scales`` are more than the sizes that the states have had.
+        """
+        tolerance = self.tolerance
+        assert tolerance is not None
+        worst, tiny = self.h * 0, h <= self.least
+        for e, b, s, before in zip(error, z, scales, scales if had is None else had, strict=True):
+            size = max(s, abs(b))
+            if abs(e) <= NOTHING or (tiny and before <= tolerance * abs(b)):
+                continue
+            worst = max(worst, abs(e) / (tolerance * size) if size > 0 else 1 / tolerance)
         return worst
+
+    def looks_closer(self, t: Number) -> bool:
+        """Whether to look closer at a step from t that is too wrong: at the second, or where that helped before."""
+        again, self.failed_at = t == self.failed_at, t
+        return self.closer or again
 
     def factor(self, ratio: Number) -> Number:
         """Factor from one step to the next."""
@@ -84,15 +111,15 @@ class Control:
         proposed = taken * (self.predicted(taken, ratio) if self.implicit else self.factor(ratio))
         self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
 
-    def begin(self, x: State, slope: State) -> None:
+    def begin(self, scales: Sequence[Number], slope: State) -> None:
         """Begin a stretch of flow; an implicit method's first step must show a decay from there, however fast."""
         self.before = None
         if not self.implicit or self.power is None:
             return
         share = self.power(self.tolerance, 1 / (self.h * 0 + self.order))
-        for a, f in zip(x, slope, strict=True):
-            if self.h * abs(f) > share * (1 + abs(a)):
-                self.h = share * (1 + abs(a)) / abs(f)
+        for s, f in zip(scales, slope, strict=True):
+            if s > 0 and self.h * abs(f) > share * s:
+                self.h = max(min(self.h, self.least), share * s / abs(f))
 
     def predicted(self, taken: Number, ratio: Number) -> Number:
         """Factor from one step to the next for an implicit method."""
@@ -123,4 +150,6 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
         return Control(settings.step, None, order, settings.step, None)
     largest = settings.until * LARGEST_SHARE
     implicit = isinstance(settings.method, RadauMethod)
-    return Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
+    return control

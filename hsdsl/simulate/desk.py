@@ -12,6 +12,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
@@ -35,11 +36,12 @@ class Desk:
         self.chunks = Chunks(self.task.chunk, shape)
         self._width = model.width
         self._workspace = np.empty(compiled.workspace(method, scheme))
-        self._x, self._slope = np.empty(self._width), np.empty(self._width)
+        self._x, self._slope, self._scales = (np.empty(self._width) for _ in range(3))
         self._visited = [grown(self.task.visited, VISITED, self._width)]  # the last is in use
         self.task.model, self.task.method = ctypes.pointer(model), ctypes.pointer(method)
         self.task.workspace = self._workspace.ctypes.data
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
+        self.task.stop.scales = self._scales.ctypes.data
         self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
         self._runtime, self._where = runtime_of(method, scheme), ctypes.addressof(self.task)
         _desks[self._where] = self
@@ -76,6 +78,10 @@ class Desk:
     def slope(self, dimension: int) -> State:
         """The flow there, where it was stuck."""
         return tuple(self._slope[:dimension].tolist())
+
+    def scales(self, dimension: int) -> list[Number]:
+        """The scales of the states there."""
+        return self._scales[:dimension].tolist()
 
     def more_rows(self) -> int:
         """Make room in the chunk; what `flush` answers."""

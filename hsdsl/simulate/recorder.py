@@ -31,7 +31,10 @@ class Progress(Protocol):
 
 @dataclass
 class OpenArc:
-    """An arc being written: its rows are lists that the loop appends to."""
+    """An arc being written: its rows are lists that the loop appends to.
+
+    ``scales`` has the scale of each state: the largest size it has had in the run so far.
+    """
 
     mode: str
     states: tuple[str, ...]
@@ -42,12 +45,19 @@ class OpenArc:
     values: list[State]
     pieces: list[Polynomial]  # one fewer than rows; none at all where every piece is a straight line
     depths: list[Number] = field(default_factory=list[Number])
+    scales: list[Number] = field(default_factory=list[Number])
 
     def append(self, t: Number, x: State, piece: Polynomial) -> None:
         """Add the piece that leads to a row, and the row."""
         self.times.append(t)
         self.values.append(x)
         self.pieces.append(piece)
+        self.notice(x)
+
+    def notice(self, x: State) -> None:
+        """Let the scales grow to a state's size."""
+        for i, a in enumerate(x):
+            self.scales[i] = max(self.scales[i], abs(a))
 
 
 @dataclass
@@ -63,6 +73,7 @@ class Recorder:
     departures: list[str] = field(default_factory=list[str])  # where the run left what the theorem is about, and why
     doubts: list[str] = field(default_factory=list[str])  # what could not be checked, and where
     noted: set[object] = field(default_factory=set[object])
+    scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
 
     def depart(self, kind: object, sentence: str) -> None:
         """Note that the run left what the theorem is about; of one ``kind``, unless None, only the first time."""
@@ -96,7 +107,11 @@ class Recorder:
         x: State,
     ) -> OpenArc:
         """Open an arc at its first row."""
-        arc = OpenArc(mode, states, kind, len(self.transitions), outputs, [t], [x], [])
+        if self.arcs:
+            self.scales |= zip(self.arcs[-1].states, self.arcs[-1].scales, strict=True)
+        scales = [self.scales.get(name, self.arithmetic.zero) for name in states]
+        arc = OpenArc(mode, states, kind, len(self.transitions), outputs, [t], [x], [], scales=scales)
+        arc.notice(x)
         self.arcs.append(arc)
         return arc
 

@@ -18,6 +18,7 @@ from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset
+from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stops import reached, reached_in_strip, show
 from hsdsl.simulate.surfaces import TIE, Crossing, Obstacle, Trial
 
@@ -65,14 +66,14 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, (x,))
-    control.begin(x, slope)
+    control.begin(arc.scales, slope)
     while t < limit:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             found, z, stages, end = attempt(t, h, t1, x, slope)
             if estimate and end is not None and not isinstance(found, Obstacle):
-                ratio = control.ratio(estimate(h, stages, end), x, z)
+                ratio = error_ratio(run, here, method, estimate(h, stages, end), t, h, x, z)
                 found = assess(here, found, ratio, Trial(t, h, t1, x, slope, z, stages, here.kernel.flow, method))
             if not isinstance(found, Obstacle):
                 break
@@ -95,6 +96,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             here.surfaces.leave(t1, z)
         arc.times.append(t1)
         arc.values.append(z)
+        arc.notice(z)
         if curved:
             arc.pieces.append(method.piece(here.kernel.flow, t, h, x, z, stages, slope, end))
         t, x, slope = t1, z, end
@@ -211,7 +213,10 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     t, x = here.t, here.x
     if obstacle.kind == "wall" and obstacle.surface is not None:
         return left_domain(here, obstacle.surface, t, LEFT)
-    grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
+    instant = run.arithmetic.sqrt(run.arithmetic.unit) * t
+    grown = any(
+        0 < s < instant * abs(f) for s, f in zip(here.arc.scales, slope, strict=True)
+    )  # faster than time can follow
     if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
         ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))

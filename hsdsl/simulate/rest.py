@@ -13,8 +13,9 @@ from hsdsl.simulate.along import interpolated, rises_along
 from hsdsl.simulate.interpolation import OVER_TIME
 from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.scales import flow_sizes, instant
 
-SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
+SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 PARALLEL = 1e-6
 CORRECTIONS = 8  # of the root of a push
@@ -39,8 +40,12 @@ def stays(run: Run, here: Here, k: int) -> bool:
     """Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move."""
     t, x, kernel = here.t, here.x, here.kernel
     after = kernel.resets[k](t, *x)
-    still = all(abs(a - b) <= SAME_UNITS * run.arithmetic.unit * (1 + abs(b)) for a, b in zip(after, x, strict=True))
+    still = all(abs(a - b) <= noise for a, b, noise in zip(after, x, _noise(run, here), strict=True))
     return still and kernel.gradients[k](t, *x)[0] == 0 and bool(kernel.conditions[k](t, *x)[0])
+
+
+def _noise(run: Run, here: Here) -> list[Number]:
+    return [SAME_UNITS * run.arithmetic.unit * s for s in here.arc.scales]
 
 
 def is_pushed(run: Run, here: Here, k: int) -> bool:
@@ -53,8 +58,8 @@ def push_order(run: Run, here: Here, k: int) -> int | None:
     """Which derivative of the surface along the flow decides; None where the first one points inwards."""
     slope, gradient = here.kernel.flow(here.t, *here.x), here.kernel.gradients[k](here.t, *here.x)
     rate = here.kernel.rates[k](here.t, *here.x)[0]
-    terms = (abs(g) * (1 + abs(f)) for g, f in zip(gradient[1:], slope, strict=True))
-    size = total(terms, run.arithmetic.zero)
+    sizes = flow_sizes(run, here, slope)
+    size = total((abs(g) * f for g, f in zip(gradient[1:], sizes, strict=True)), run.arithmetic.zero)
     if abs(rate) <= ZERO_UNITS * run.arithmetic.unit * size:
         return 2
     return 1 if rate > 0 else None
@@ -70,7 +75,7 @@ def push(run: Run, here: Here, k: int, order: int, t: Number) -> Number:
     if row is not None:
         return 2 * row[2]
     slope = kernel.flow(t, *x)  # a kinked flow has no second derivative at hand: the rate's difference along it
-    small: Number = run.arithmetic.sqrt(run.arithmetic.unit) / (1 + greatest(slope))
+    small = instant(run, here, slope)
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     return (kernel.rates[k](t + small, *ahead)[0] - kernel.rates[k](t, *x)[0]) / small
 
@@ -79,22 +84,17 @@ def moves_alone(run: Run, here: Here, k: int) -> bool:
     """Whether the flow moves the state only in the direction that the reset takes back."""
     t, x = here.t, here.x
     slope = here.kernel.flow(t, *x)
-    largest = greatest(slope)
-    if not largest > 0:
+    if not any(slope):
         return False
-    small: Number = run.arithmetic.sqrt(run.arithmetic.unit) * (1 + greatest(x)) / largest
+    sizes, small = flow_sizes(run, here, slope), instant(run, here, slope)
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     back = tuple(a - b for a, b in zip(here.kernel.resets[k](t, *ahead), ahead, strict=True))
-    along = max(range(len(slope)), key=lambda i: abs(slope[i]))
+    along = max((i for i, f in enumerate(slope) if f != 0), key=lambda i: abs(slope[i]) / sizes[i])
     share: Number = back[along] / slope[along]
     return share < 0 and all(
-        abs(b - share * f) <= PARALLEL * abs(share) * largest for b, f in zip(back, slope, strict=True)
+        abs(b - share * f) <= PARALLEL * abs(share) * size + noise
+        for b, f, size, noise in zip(back, slope, sizes, _noise(run, here), strict=True)
     )
-
-
-def greatest(x: State) -> Number:
-    """The largest absolute value."""
-    return max(abs(a) for a in x)
 
 
 def hold(run: Run, here: Here, k: int) -> Here:

@@ -67,14 +67,15 @@ class Run:
             from hsdsl.integrators.radau import radau_stepper
 
             jacobian = self.kernel.jacobian(mode, here.segment.data)
-            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic)
+            smooth, scales = not here.mode.jumps, here.arc.scales
+            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth)
         series = self.kernel.taylor(mode, here.segment.data)
         assert series is not None
         return taylor_stepper(method, series, self.arithmetic)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are the same instant."""
-        return TIE * max(1, abs(t))
+        return TIE * max(self.settings.until, abs(t))
 
     def place(
         self,

@@ -23,6 +23,7 @@ from hsdsl.simulate.isolate import value
 from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.surfaces import Obstacle, at, shortened
 
 TOO_FAST = Obstacle("not finite")  # a surface, for one step
@@ -65,9 +66,7 @@ def stepping(run: Run, here: Here) -> Stepping:
     if isinstance(run.settings.method, TaylorMethod):
         series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
         assert series is not None
-        error = run.stepper(here).error
-        assert error is not None
-        return SeriesSteps(run, here, run.settings.method, series, error)
+        return SeriesSteps(run, here, run.settings.method, series, run.stepper(here))
     return TableSteps(run, here, run.stepper(here))
 
 
@@ -92,7 +91,7 @@ class TableSteps:
         except DOMAIN_ERRORS:
             return NOT_FINITE
         if self.slope is None:
-            control.begin(x, slope)
+            control.begin(self.here.arc.scales, slope)
         mode = self.here.mode.name
         h = control.within_reach(mode, control.h)
         while True:
@@ -126,7 +125,7 @@ class TableSteps:
             if not self.run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
             if control.tolerance is not None and method.error is not None:
-                self._ratio = control.ratio(method.error(h, stages, end), x, z)
+                self._ratio = error_ratio(self.run, self.here, method, method.error(h, stages, end), t, h, x, z)
                 if not self._ratio <= 1:
                     return TOO_WRONG
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
@@ -181,7 +180,7 @@ class SeriesSteps:
     here: Here
     method: TaylorMethod
     series: Taylor
-    error: Callable[[Number, Stages, State], State]
+    steps: Stepper
 
     def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
         """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
@@ -209,7 +208,8 @@ class SeriesSteps:
         control = self.run.control
         if control.tolerance is None:
             return control.h
-        proposed = proposed_step(stages, x, max(control.tolerance, self.run.arithmetic.unit), self.run.arithmetic)
+        tolerance = max(control.tolerance, self.run.arithmetic.unit)
+        proposed = proposed_step(stages, self.here.arc.scales, tolerance, self.run.arithmetic)
         return control.largest if proposed is None else min(control.largest, proposed)
 
     def _try(
@@ -225,11 +225,11 @@ class SeriesSteps:
             end = here.kernel.flow(t1, *z)
             if not run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
-            tolerance = run.control.tolerance
-            if tolerance is not None and run.control.ratio(self.error(h, stages, end), x, z) > max(
-                1, 64 * run.arithmetic.unit / tolerance
-            ):
-                return TOO_WRONG
+            tolerance, error = run.control.tolerance, self.steps.error
+            if tolerance is not None and error is not None:
+                ratio = error_ratio(run, here, self.steps, error(h, stages, end), t, h, x, z)
+                if ratio > max(1, 64 * run.arithmetic.unit / tolerance):
+                    return TOO_WRONG
             ends = here.kernel.surfaces(t1, *z)
             curves = self._curves(t, h, t1, x, z, piece, lines, ends)
         except TooFast:

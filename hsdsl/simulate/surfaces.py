@@ -17,7 +17,7 @@ from hsdsl.kernel import ModeKernel, Vector
 from hsdsl.program import EdgeProgram
 
 ROUNDOFF_UNITS = 32
-TIE = 1e-12  # times closer than TIE max(1, |t|) are the same instant
+TIE = 1e-12  # times closer than TIE max(|t|, length of the run) are the same instant
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved

@@ -69,5 +69,5 @@ def _here(run: Run, desk: Desk, made: int) -> Here:
     x, t = desk.x(found.dimension), found.time
     kernel = run.kernel.bind(found.mode, segment.data)
     surfaces = Surfaces(kernel, mode.edges, tuple(0.0 for _ in x), run.arithmetic)
-    arc = OpenArc(mode.name, mode.states, "flow", made, None, [t], [x], [])
+    arc = OpenArc(mode.name, mode.states, "flow", made, None, [t], [x], [], scales=desk.scales(len(x)))
     return Here(mode, kernel, surfaces, segment, arc, t, x)

@@ -97,7 +97,7 @@ def test_increments_and_polynomial() -> None:
 
 def one_step(rate: float, h: float) -> tuple[float, float]:
     """End and error estimate of one step from 1 along x' = rate x."""
-    stepper = radau_stepper(lambda t, x: (rate,), 1e-14, FLOAT64)
+    stepper = radau_stepper(lambda t, x: (rate,), 1e-14, FLOAT64, [1.0])
     z, stages = stepper.step(lambda t, x: (rate * x,), 0.0, h, (1.0,), (rate,))
     assert stepper.error is not None
     return z[0], stepper.error(h, stages, (rate * z[0],))[0]
@@ -233,7 +233,7 @@ def test_a_flow_without_derivatives(scheme: str, tmp_path: Path) -> None:
 
 
 def test_a_step_that_newton_does_not_solve() -> None:
-    stepper = radau_stepper(lambda t, x: (2 * x,), None, FLOAT64)
+    stepper = radau_stepper(lambda t, x: (2 * x,), None, FLOAT64, [1.0])
     with pytest.raises(NoConvergence):
         stepper.step(lambda t, x: (x * x,), 0.0, 10.0, (1.0,), (1.0,))
 

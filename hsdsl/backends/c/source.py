@@ -56,7 +56,7 @@ def model_source(program: Program) -> str:
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.modes)}, {max(len(m.edges) for m in program.modes)}, "
-        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {table}}};\n"
+        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -78,6 +78,7 @@ class _Writer:
         names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
         names += [f"k{i}" for i in range(len(program.switches))]
         self.data = {name: f"p[{i}]" for i, name in enumerate(names)}
+        self.states = list(dict.fromkeys(name for mode in program.modes for name in mode.states))
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []
         self._names: dict[str, str] = {}
@@ -97,6 +98,8 @@ class _Writer:
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
             self.routines(mode.jacobian)["jacobian"],
             str(int(mode.affine)),
+            str(int(mode.jumps)),
+            self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
         ]
         return f"{{{', '.join(fields)}}}"
 

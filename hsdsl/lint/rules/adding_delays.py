@@ -55,7 +55,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.defaults import DEFAULTS
+from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.lint.dwell import pace
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import rational
@@ -70,7 +70,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     if subject.system.experiment.scheme not in (None, "relaxed"):
         return
     relaxation = subject.setting("relaxation")
-    relaxation = rational(DEFAULTS["relaxation"]) if relaxation is None else relaxation
+    if relaxation is None:
+        relaxation = least_relaxation(rational(DEFAULTS["relaxation"]), subject.setting("until"))
     found = pace(subject)
     if found is None or (relaxation >= found.shortest and found.known):  # that is large-relaxation's
         return

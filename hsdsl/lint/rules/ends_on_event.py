@@ -106,6 +106,6 @@ def _known(subject: Subject, until: Number) -> Iterator[str]:
         for event in reference.transitions:
             scalar = event if isinstance(event, Scalar) else event.time
             time = subject.read(scalar)
-            if numeric.finite(time) and abs(time - until) <= _TIE * max(1, abs(until)):
+            if numeric.finite(time) and abs(time - until) <= _TIE * abs(until):
                 edge = None if isinstance(event, Scalar) else event.edge
                 yield "a transition of the reference" if edge is None else edge.value

@@ -45,7 +45,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from hsdsl.defaults import DEFAULTS
+from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.expression import numeric
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import Number, rational
@@ -62,7 +62,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     given, relaxation = experiment.relaxation, subject.setting("relaxation")
     place = (given or experiment.until).place
     if relaxation is None:
-        relaxation = rational(DEFAULTS["relaxation"])
+        relaxation = least_relaxation(rational(DEFAULTS["relaxation"]), subject.setting("until"))
     if not any(mode.edges for mode in subject.system.modes):
         return
     step, until, dwell = subject.setting("step"), subject.setting("until"), _shortest_dwell(subject)
@@ -80,8 +80,9 @@ def check(subject: Subject) -> Iterator[Finding]:
 def _shortest_dwell(subject: Subject) -> Number | None:
     """The shortest time between two transitions of a reference that are not simultaneous."""
     gaps: list[Number] = []
+    until = subject.setting("until") or 0
     for reference in subject.document.reference:
         events = [event if isinstance(event, Scalar) else event.time for event in reference.transitions]
         times = [time for time in map(subject.read, events) if numeric.finite(time)]
-        gaps += [after - before for before, after in pairwise(times) if after - before > _TIE * max(1, abs(after))]
+        gaps += [after - before for before, after in pairwise(times) if after - before > _TIE * max(until, abs(after))]
     return min(gaps, default=None)

@@ -62,5 +62,5 @@ def check(subject: Subject) -> Iterator[Finding]:
         events = [event if isinstance(event, Scalar) else event.time for event in reference.transitions]
         for scalar in (*events, *(state.time for state in reference.states)):
             time = subject.read(scalar)
-            if time < 0 or time > until + _TIE * max(1, abs(until)):
+            if time < 0 or time > until + _TIE * abs(until):
                 yield Finding(scalar.place.span, "the run this is about does not reach this time", "let it run longer")

@@ -65,6 +65,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     experiment = subject.system.experiment
     for key, default in _NUMBERS.items():
         value = getattr(experiment, key)
+        if key == "relaxation" and not subject.setting("until") >= 1:  # then the default is smaller
+            continue
         if value is not None and value.is_Rational and value.p * default.denominator == value.q * default.numerator:
             yield from _repeated(subject.node("experiment"), key)
     if experiment.method == DEFAULTS["method"]:

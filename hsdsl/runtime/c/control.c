@@ -8,14 +8,42 @@
 #define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
 #define LEAST_BEFORE 0.3
+#define NOTHING 0x1p-960
 
-static double error_ratio(const hs_run *run) {
+/* Error ratio of a step of length h to run->z, errors held against these scales. */
+HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
+  const double tolerance = run->control.tolerance;
+  const int tiny = h <= run->control.least;
   double worst = run->control.h * 0;
   for (int s = 0; s < run->here.dimension; s++) {
-    const double size = hs_max(fabs(run->x[s]), fabs(run->z[s]));
-    worst = hs_max(worst, fabs(run->error[s]) / (run->control.tolerance * (1 + size)));
+    const double end = fabs(run->z[s]), size = hs_max(scales[s], end), error = run->error[s];
+    if (fabs(error) <= NOTHING || (tiny && run->scales[s] <= tolerance * end)) continue;
+    worst = hs_max(worst, size > 0 ? fabs(error) / (tolerance * size) : 1 / tolerance);
   }
   return worst;
+}
+
+/* The same with a look at what the flow is computed from; see hsdsl/simulate/scales.py. */
+static double ratio_closer(hs_run *run, double h, double ratio) {
+  hs_control *const control = &run->control;
+  const int again = run->here.t == control->failed_at;
+  control->failed_at = run->here.t;
+  if (!control->closer && !again) return ratio;
+  if (HS_HAS_RADAU && run->method->kind == HS_RADAU) {
+    radau_scales(run, run->here.t, h, 1);
+    ratio = ratio_to(run, h, run->radau.scales);
+  } else {
+    if (resolved(run, run->here.t, h, run->x, 0)) return ratio;
+    ratio = ratio_to(run, h, run->resolved);
+  }
+  control->closer = ratio <= 1;
+  return ratio;
+}
+
+/* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */
+HS_INLINE double error_ratio(hs_run *run, double h) {
+  const double ratio = ratio_to(run, h, run->method->kind == HS_RADAU ? run->radau.scales : run->scales);
+  return !(ratio > 1) || run->here.table->jumps ? ratio : ratio_closer(run, h, ratio);
 }
 
 static double factor(const hs_control *control, double ratio) {
@@ -30,8 +58,9 @@ static void begin_steps(hs_run *run) {
   if (!control->implicit || !(control->tolerance > 0)) return;
   const double share = pow(control->tolerance, 1 / (control->h * 0 + control->order));
   for (int s = 0; s < run->here.dimension; s++) {
-    const double size = 1 + fabs(run->x[s]), slope = fabs(run->slope[s]);
-    if (control->h * slope > share * size) control->h = share * size / slope;
+    const double size = run->scales[s], slope = fabs(run->slope[s]);
+    if (size > 0 && control->h * slope > share * size)
+      control->h = hs_max(hs_min(control->h, control->least), share * size / slope);
   }
 }
 

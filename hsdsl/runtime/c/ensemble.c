@@ -10,7 +10,7 @@ static void sample_chunk(hs_ensemble *e, int at_end) {
   }
   const int64_t instance = e->done, rows = chunk->rows;
   const double *time = e->time + instance * e->samples, last = chunk->times[rows - 1];
-  const double reach = at_end ? last + HS_TIE * hs_max(1.0, fabs(last)) : last;
+  const double reach = at_end ? last + HS_TIE * fabs(last) : last;
   int64_t count = 0;
   while (e->next + count < e->samples && (at_end ? time[e->next + count] <= reach : time[e->next + count] < reach)) count++;
   if (!count) return;

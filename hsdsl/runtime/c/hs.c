@@ -23,6 +23,7 @@
 #include "table.c"
 #include "taylor.c"
 #include "linear.c"
+#include "scales.c"
 #include "radau.c"
 #include "stepper.c"
 
@@ -74,6 +75,7 @@ static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
   for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
   radau->largest = numbers(store, w);
   radau->error = numbers(store, w);
+  radau->least = numbers(store, w);
   radau->order = take(store, w, sizeof(int));
   radau->turned = take(store, w, sizeof(int));
 }
@@ -85,6 +87,10 @@ static void lay_out(hs_run *run, hs_store *store) {
   double **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
                        &run->entered, &run->after, &run->landed, &run->error, 0};
   for (double ***state = states; *state; state++) **state = numbers(store, w);
+  double **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby, &run->flow_sizes, 0};
+  for (double ***each = own; *each; each++) **each = numbers(store, w);
+  run->known = numbers(store, run->model->states);
+  run->lifted = take(store, w, sizeof(int));
   run->k = take(store, all, sizeof(double *));
   for (int i = 1; i < all; i++) {
     double *stage = numbers(store, w);
@@ -131,6 +137,7 @@ static hs_span lay_out_span(const hs_run *run, hs_store *store) {
 static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
   const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
+  run->jacobian = numbers(store, (int64_t)w * w);
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
   double **states[] = {&run->q, &run->other_end, 0};
@@ -199,12 +206,15 @@ void hs_simulate(hs_task *task) {
   run.control.h = task->settings.step;
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
+  run.control.least = hs_max(task->settings.tolerance, sqrt(HS_UNIT)) * task->settings.largest;
   run.control.order = task->method->order;
+  run.control.failed_at = NAN;
   run.control.implicit = task->method->kind == HS_RADAU;
   run.steps_to_poll = run.poll_steps = 64;
   run.polled = clock();
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
+  for (int i = 0; i < run.model->states; i++) run.known[i] = 0.0;
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0);
   if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
     located(&run, entered);

@@ -53,6 +53,8 @@ typedef struct {
   const int *surface_line; /* for each surface; -1 where it is kinked */
   hs_routine *jacobian;    /* of the flow by the states, row by row */
   int affine;              /* whether every surface's gradient is the same everywhere */
+  int jumps;               /* whether the flow has `sign` or `floor` */
+  const int *state;        /* for each state its number among those of all modes */
 } hs_mode;
 
 typedef struct {
@@ -63,6 +65,7 @@ typedef struct {
   int outputs;
   int data; /* numbers in `p` */
   int lines; /* of series, of the mode with most */
+  int states; /* of all modes, by name */
   const hs_mode *mode;
 } hs_model;
 

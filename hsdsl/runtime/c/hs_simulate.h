@@ -167,7 +167,7 @@ typedef enum {
 } hs_obstacle;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
-   `slope` is the end of a step along which something has no value. */
+   `slope` is the end of a step along which something has no value, `scales` are those of the states. */
 typedef struct {
   int32_t reason;
   int32_t mode;
@@ -178,7 +178,7 @@ typedef struct {
   int64_t segment;
   double time;
   double h;
-  double *x, *slope;
+  double *x, *slope, *scales;
 } hs_stop;
 
 typedef struct hs_task hs_task;

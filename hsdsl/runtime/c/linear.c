@@ -15,13 +15,19 @@ static void exchange_places(int *order, int i, int k) {
   order[k] = kept;
 }
 
-/* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. */
-HS_INLINE int factored(int n, double *restrict a, int *restrict order) {
+/* Whether a is larger than b, each relative to the scale of the unknown of its row; without one only than zero. */
+HS_INLINE int is_larger(double a, double of_a, double b, double of_b) {
+  return of_a > 0 && of_b > 0 ? a * of_b > b * of_a : b == 0 && a > 0;
+}
+
+/* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. Its rows, as its
+   columns, belong to unknowns of these scales. */
+HS_INLINE int factored(int n, double *restrict a, int *restrict order, const double *scales) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
     for (int i = k + 1; i < n; i++)
-      if (fabs(a[i * n + k]) > fabs(a[pivot * n + k])) pivot = i;
+      if (is_larger(fabs(a[i * n + k]), scales[order[i]], fabs(a[pivot * n + k]), scales[order[pivot]])) pivot = i;
     exchange_rows(a, n, k, pivot);
     exchange_places(order, k, pivot);
     if (!(fabs(a[k * n + k]) > 0)) return 1;
@@ -48,12 +54,15 @@ HS_INLINE void solve(int n, const double *restrict a, const int *restrict order,
 }
 
 /* The same of a complex matrix, real and imaginary parts apart; the size of a pivot is the sum of its parts' sizes. */
-HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, int *restrict order) {
+HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, int *restrict order,
+                               const double *scales) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
     for (int i = k + 1; i < n; i++)
-      if (fabs(re[i * n + k]) + fabs(im[i * n + k]) > fabs(re[pivot * n + k]) + fabs(im[pivot * n + k])) pivot = i;
+      if (is_larger(fabs(re[i * n + k]) + fabs(im[i * n + k]), scales[order[i]],
+                    fabs(re[pivot * n + k]) + fabs(im[pivot * n + k]), scales[order[pivot]]))
+        pivot = i;
     exchange_rows(re, n, k, pivot);
     exchange_rows(im, n, k, pivot);
     exchange_places(order, k, pivot);

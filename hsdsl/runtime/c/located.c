@@ -107,7 +107,7 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   const double time = wall->time, theta = wall->theta, depth = wall->depth;
   int count = 0;
   copy(run->q, wall->state, run->here.dimension);
-  standing(run, time, run->q, tie(time), run->tied);
+  standing(run, time, run->q, tie(run, time), run->tied);
   for (int k = 0; k < run->here.table->edges; k++) {
     if (!run->tied[k]) continue;
     hs_crossing *const crossing = &run->crossings[count++];
@@ -133,7 +133,7 @@ static int first_event(hs_run *run) {
     else if (!wall || crossing->time < wall->time)
       wall = crossing;
   }
-  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);
+  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(run, wall->time);
   if (wall && !tied && !(guards = guards_at(run, wall))) return walked_out(run, wall);
   if (!guards) return GOES_ON;
   choose(run, guards);
@@ -208,7 +208,7 @@ static int located_flow(hs_run *run) {
 static int same_instant(const hs_run *run, double t) {
   if (!run->jump) return 0;
   const double resumed = made_before(run, 0)->resumed;
-  return resumed == resumed && t - resumed <= tie(t);
+  return resumed == resumed && t - resumed <= tie(run, t);
 }
 
 /* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit. */
@@ -236,7 +236,7 @@ static int jump(hs_run *run) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
     run->noted_crowded = 1;
     resumed = t + run->epsilon;
-    if (resumed > until + tie(until)) {
+    if (resumed > until + tie(run, until)) {
       double rows[2][2] = {{t, 0.0}, {until, until - t}};
       strip(run, 2, rows, crossing->state);
       record(run, crossing, NAN, 0, 0);
@@ -249,7 +249,7 @@ static int jump(hs_run *run) {
     double rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
     strip(run, 2, rows, crossing->state);
   }
-  const double since = run->alternatives_count || same_instant(run, t) ? tie(t) : 0.0;
+  const double since = run->alternatives_count || same_instant(run, t) ? tie(run, t) : 0.0;
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);

@@ -11,11 +11,19 @@
 #define NEWTON_NOISE 1024
 #define NEWTON_SHARE 1e-2
 
-/* The largest change relative to 1 + |x|. */
+/* The largest change relative to the scales, or to where a state is now. A state that has been zero so far counts only
+   where all are: it follows the others, an iteration later. */
 HS_INLINE double scaled(const hs_run *run, int n) {
-  const double *const largest = run->radau.largest;
-  double size = largest[0] / (1 + fabs(run->x[0]));
-  for (int s = 1; s < n; s++) size = hs_max(size, largest[s] / (1 + fabs(run->x[s])));
+  const hs_radau *const radau = &run->radau;
+  double size = 0.0;
+  int known = 0;
+  for (int s = 0; s < n; s++) known |= radau->scales[s] > 0;
+  for (int s = 0; s < n; s++) {
+    const double change = radau->largest[s], scale = radau->scales[s];
+    if (!(change > 0 && (scale > 0 || !known))) continue;
+    const double reach = hs_max(scale, fabs(run->x[s] + radau->z[2][s]));
+    size = hs_max(size, reach > 0 ? change / reach : reach + 1);
+  }
   return size;
 }
 

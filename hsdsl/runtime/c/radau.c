@@ -43,6 +43,19 @@ static void radau_forget(hs_radau *radau) {
   radau->derived = radau->factored = radau->stepped = 0;
   radau->convergence.rate = radau->convergence.left = 1.0;
   radau->convergence.aged = 0;
+  radau->lifted = 0;
+}
+
+/* Have the scales of the states over a step of length h; `closer`, with a look at the terms of the flow. */
+static void radau_scales(hs_run *run, double t, double h, int closer) {
+  hs_radau *const radau = &run->radau;
+  if (!closer || run->here.table->jumps || resolved(run, t, h, run->x, radau->rows)) return;
+  radau->scales = run->resolved;
+  radau->lifted = 0;
+  for (int s = 0; s < run->here.dimension; s++) {
+    radau->lifted |= run->resolved[s] > run->scales[s];
+    radau->least[s] = run->resolved[s];
+  }
 }
 
 HS_INLINE int derive(hs_run *run, double t) {
@@ -70,7 +83,8 @@ HS_INLINE int factor_for(hs_run *run, int n, double h) {
     radau->im[i * n + i] = -known->beta;
   }
   radau->factored_for = h;
-  radau->factored = !factored(n, radau->real, radau->order) && !factored_complex(n, radau->re, radau->im, radau->turned);
+  radau->factored = !factored(n, radau->real, radau->order, run->scales) &&
+                    !factored_complex(n, radau->re, radau->im, radau->turned, run->scales);
   return radau->factored ? 0 : NO_CONVERGENCE;
 }
 
@@ -94,8 +108,11 @@ HS_INLINE void guess(hs_run *run, int n, double t, double h) {
 }
 
 /* Solve for the step with the derivatives that there are. */
-HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly) {
+HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int closer) {
   hs_radau *const radau = &run->radau;
+  radau->scales = radau->lifted ? run->resolved : run->scales;
+  for (int s = 0; radau->lifted && s < n; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
+  radau_scales(run, t, h, closer);
   guess(run, n, t, h);
   const int status = factor_for(run, n, h);
   if (status) return status;
@@ -108,10 +125,13 @@ HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
   hs_radau *const radau = &run->radau;
   const int renew = radau->convergence.aged && radau->derived_at != t;
   if ((!radau->derived || renew) && derive(run, t)) return NO_VALUE;
-  int status = settle(run, n, t, h, exactly);
-  if (status != NO_CONVERGENCE || radau->derived_at == t) return status;
-  if (derive(run, t)) return NO_VALUE;
-  return settle(run, n, t, h, exactly);
+  if (radau->derived_at != t) {
+    const int status = settle(run, n, t, h, exactly, 0);
+    if (status != NO_CONVERGENCE) return status;
+    if (derive(run, t)) return NO_VALUE;
+  }
+  const int status = settle(run, n, t, h, exactly, 0);
+  return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, n, t, h, exactly, 1) : status;
 }
 
 /* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */

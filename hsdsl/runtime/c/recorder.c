@@ -46,8 +46,9 @@ HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polyno
   run->task->now = t;
 }
 
-/* Add the piece that leads to a row, and the row. */
+/* Add the piece that leads to a row, and the row; the scales grow to the state's size. */
 HS_INLINE void append(hs_run *run, double t, const double *x, const hs_polynomial *piece) {
+  for (int s = 0; s < run->here.dimension; s++) run->scales[s] = hs_max(run->scales[s], fabs(x[s]));
   write_row(run, t, x, piece, 0.0, run->here.outputs, run->here.outputs_p);
 }
 

@@ -117,7 +117,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       found = attempt(run, n, h, t1);
       if (adaptive && run->trial.ends && found.obstacle == HS_CLEAR) {
         local_error(run, h);
-        ratio = error_ratio(run);
+        ratio = error_ratio(run, h);
         if (ratio > 1)
           found = TOO_WRONG;
         else if (!found.crossings)
@@ -182,7 +182,7 @@ static int through_strip(hs_run *run) {
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   double resumed = t1 + (run->epsilon - depth);
   const int without_value = reset(run, run->landed);
-  if (resumed > until + tie(until)) {
+  if (resumed > until + tie(run, until)) {
     double rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
     strip(run, 3, rows, crossing->state);
     record(run, crossing, NAN, 0, 0);

@@ -6,12 +6,30 @@
 #define PARALLEL 1e-6
 #define CORRECTIONS 8
 
-/* The largest absolute value. */
-static double greatest(const double *x, int n) {
-  double most = fabs(x[0]);
-  for (int s = 1; s < n; s++) most = hs_max(most, fabs(x[s]));
-  return most;
+/* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
+static int flow_sizes(hs_run *run, double t, const double *x, const double *slope) {
+  const int n = run->here.dimension;
+  if (run->here.table->jacobian(run->here.p, t, x, run->jacobian)) return RAISED;
+  for (int i = 0; i < n; i++) {
+    double size = fabs(slope[i]);
+    for (int j = 0; j < n; j++) size = size + fabs(run->jacobian[i * n + j]) * run->scales[j];
+    run->flow_sizes[i] = size;
+  }
+  return 0;
 }
+
+/* A time in which no state moves by more than about half the digits of its scale. */
+static double instant(const hs_run *run, const double *slope) {
+  double least = run->until;
+  for (int s = 0; s < run->here.dimension; s++) {
+    const double scale = run->scales[s], speed = fabs(slope[s]);
+    if (scale > 0 && least * speed > scale) least = scale / speed;
+  }
+  return sqrt(HS_UNIT) * least;
+}
+
+/* How far a state that rests may be moved. */
+static double rest_noise(const hs_run *run, int s) { return SAME_UNITS * HS_UNIT * run->scales[s]; }
 
 /* Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move. */
 static int stays(hs_run *run, double t, const double *x, int k) {
@@ -19,7 +37,7 @@ static int stays(hs_run *run, double t, const double *x, int k) {
   int still = 1;
   if (here->table->edge[k].reset(here->p, t, x, run->after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
-    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * (1 + fabs(x[s]));
+    still &= fabs(run->after[s] - x[s]) <= rest_noise(run, s);
   if (!still) return 0;
   if (here->table->gradients[k](here->p, t, x, run->gradient)) return RAISED;
   return run->gradient[0] == 0 ? condition(run, k, t, x) : 0;
@@ -30,9 +48,9 @@ static int push_order(hs_run *run, double t, const double *x, int k) {
   const hs_here *here = &run->here;
   double rate, size = 0.0;
   if (here->table->flow(here->p, t, x, run->end) || here->table->gradients[k](here->p, t, x, run->gradient) ||
-      here->table->rates[k](here->p, t, x, &rate))
+      here->table->rates[k](here->p, t, x, &rate) || flow_sizes(run, t, x, run->end))
     return RAISED;
-  for (int s = 0; s < here->dimension; s++) size = size + fabs(run->gradient[s + 1]) * (1 + fabs(run->end[s]));
+  for (int s = 0; s < here->dimension; s++) size = size + fabs(run->gradient[s + 1]) * run->flow_sizes[s];
   if (fabs(rate) <= ZERO_UNITS * HS_UNIT * size) return 2;
   return rate > 0;
 }
@@ -48,7 +66,7 @@ static int push(hs_run *run, double t, const double *x, int k, int order, double
     if (mode->surface_line[k] >= 0) return *value = 2 * run->second[4 * mode->surface_line[k] + 2], 0;
   }
   if (mode->flow(here->p, t, x, run->end)) return RAISED;
-  const double small = sqrt(HS_UNIT) / (1 + greatest(run->end, here->dimension));
+  const double small = instant(run, run->end);
   for (int s = 0; s < here->dimension; s++) run->at[s] = x[s] + small * run->end[s];
   if (mode->rates[k](here->p, t + small, run->at, &ahead) || mode->rates[k](here->p, t, x, value)) return RAISED;
   *value = (ahead - *value) / small;
@@ -69,20 +87,22 @@ static int moves_alone(hs_run *run, double t, const double *x, int k) {
   const int n = here->dimension;
   double *const slope = run->end, *const ahead = run->at, *const back = run->after;
   if (here->table->flow(here->p, t, x, slope)) return RAISED;
-  const double largest = greatest(slope, n);
-  if (!(largest > 0)) return 0;
-  const double small = sqrt(HS_UNIT) * (1 + greatest(x, n)) / largest;
+  int along = -1;
+  for (int s = 0; s < n; s++)
+    if (slope[s] != 0) along = along < 0 ? s : along;
+  if (along < 0) return 0;
+  if (flow_sizes(run, t, x, slope)) return RAISED;
+  const double *const size = run->flow_sizes, small = instant(run, slope);
   for (int s = 0; s < n; s++) ahead[s] = x[s] + small * slope[s];
   if (here->table->edge[k].reset(here->p, t, ahead, back)) return RAISED;
-  int along = 0;
   for (int s = 0; s < n; s++) {
     back[s] = back[s] - ahead[s];
-    if (fabs(slope[s]) > fabs(slope[along])) along = s;
+    if (slope[s] != 0 && fabs(slope[s]) / size[s] > fabs(slope[along]) / size[along]) along = s;
   }
   const double share = back[along] / slope[along];
   if (!(share < 0)) return 0;
   for (int s = 0; s < n; s++)
-    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * largest)) return 0;
+    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * size[s] + rest_noise(run, s))) return 0;
   return 1;
 }
 

@@ -9,7 +9,14 @@ static hs_reason stopped(hs_run *run, hs_reason reason, double t) {
   stop->segment = run->here.segment;
   stop->h = run->control.h;
   copy(stop->x, run->x, run->here.dimension);
+  copy(stop->scales, run->scales, run->here.dimension);
   return reason;
+}
+
+/* Keep the scales of a mode's states, and have those of the next one's. */
+static void hand_on_scales(hs_run *run, const hs_mode *from, const hs_mode *to) {
+  for (int s = 0; from && s < from->dimension; s++) run->known[from->state[s]] = run->scales[s];
+  for (int s = 0; s < run->width; s++) run->scales[s] = s < to->dimension ? run->known[to->state[s]] : 0.0;
 }
 
 /* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
@@ -29,6 +36,7 @@ static void place(hs_run *run, int mode, int dimension, double t, const hs_here 
   }
   here.standing = 0;
   here.t = t;
+  hand_on_scales(run, run->here.table, here.table);
   run->here = here;
   begin(run, HS_FLOW);
   append(run, t, run->x, 0);
@@ -57,7 +65,7 @@ static void choose(hs_run *run, int count) {
   hs_crossing *first = &run->crossings[0];
   for (int i = 1; i < count; i++)
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
-  const double since = tie(first->time);
+  const double since = tie(run, first->time);
   double depth = first->depth;
   int chosen = first->edge;
   standing(run, first->time, first->state, since, run->tied);

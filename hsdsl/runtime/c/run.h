@@ -62,11 +62,13 @@ typedef struct {
 } hs_found;
 
 typedef struct {
-  double h, tolerance, largest;
+  double h, tolerance, largest, least;
   int order;
   int implicit;
   double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
   int64_t accepted, rejected;
+  double failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
+  int closer;       /* whether a look at the flow's round-off let one pass */
 } hs_control;
 
 /* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
@@ -88,6 +90,9 @@ typedef struct {
   double *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
   double *wanted[3], *right[3];
   double *largest, *error;
+  const double *scales; /* of the states, as the last step was solved with them */
+  double *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
+  int lifted;
 } hs_radau;
 
 typedef struct {
@@ -132,6 +137,10 @@ typedef struct {
   hs_patience patience;
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  double *scales, *known; /* of the states here, and of those of all modes before this one was entered */
+  double *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
+  int *lifted;
+  double *flow_sizes, *jacobian; /* see rest.c; jacobian: width * width */
   double **k;          /* stages, then the flow at the end */
   double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */
@@ -167,7 +176,7 @@ typedef struct {
   hs_made made[FREE];
 } hs_run;
 
-static inline double tie(double t) { return HS_TIE * hs_max(1.0, fabs(t)); }
+static inline double tie(const hs_run *run, double t) { return HS_TIE * hs_max(run->until, fabs(t)); }
 
 static inline int all_finite(const double *v, int n) {
   for (int i = 0; i < n; i++)

@@ -160,7 +160,7 @@ static void outputs_between(const hs_sampling *s, const hs_place *at, int64_t i)
 /* The number of the first time outside the run, or -1; those outside it to round-off are moved to its ends. */
 static int64_t outside(const hs_sampling *s) {
   const double start = s->times[0], end = s->times[s->rows - 1];
-  const double slack = HS_TIE * hs_max(hs_max(1.0, fabs(start)), fabs(end));
+  const double slack = HS_TIE * hs_max(fabs(start), fabs(end));
   for (int64_t i = 0; i < s->samples; i++) {
     const double t = s->time[i];
     if (!(t >= start - slack && t <= end + slack)) return i;

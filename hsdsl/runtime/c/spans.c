@@ -92,7 +92,7 @@ HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
     local_error(run, h);
-    run->ratio = error_ratio(run);
+    run->ratio = error_ratio(run, h);
     if (!(run->ratio <= 1)) return HS_ERROR;
   }
   for (int s = 0; s < n; s++) {
@@ -138,6 +138,23 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
   }
 }
 
+/* The smaller of two steps; of not-a-number and another one the other. */
+static double smaller(double least, double h) { return h != h ? least : least != least ? h : hs_min(h, least); }
+
+/* The step at which the first terms of a state that are left out stay below the tolerance beside the first that is not
+   0; not-a-number where there are none. */
+static double from_zero(const hs_run *run, int s, double tolerance) {
+  const int order = run->method->order;
+  const double *c = series_of(run, s);
+  double least = NAN;
+  int first = 1;
+  while (first < order && c[first] == 0) first++;
+  if (first == order) return NAN;
+  for (int m = order; m <= order + 1; m++)
+    if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / (tolerance * fabs(c[first])), m - first));
+  return least;
+}
+
 /* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
    See hsdsl/integrators/taylor.py. */
 static double proposed_step(const hs_run *run, int n, double tolerance) {
@@ -146,13 +163,12 @@ static double proposed_step(const hs_run *run, int n, double tolerance) {
   for (int m = order; m <= order + 1; m++) {
     double largest = 0.0;
     for (int s = 0; s < n; s++)
-      largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * (1 + fabs(run->x[s]))));
-    if (largest > 0 && (least != least || largest * least > before)) {
-      const double h = pow(1 / largest, 1.0 / m);
-      least = least != least ? h : hs_min(h, least);
-    }
+      if (run->scales[s] > 0) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
+    if (largest > 0 && (least != least || largest * least > before)) least = smaller(least, root(largest, m));
     before = largest;
   }
+  for (int s = 0; s < n; s++)
+    if (!(run->scales[s] > 0)) least = smaller(least, from_zero(run, s, tolerance));
   return least;
 }
 
@@ -237,7 +253,7 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (tolerance > 0) {
     taylor_error(run, n, h);
-    if (error_ratio(run) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
+    if (error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
   }
   return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
 }

@@ -1,0 +1,54 @@
+/* The scale of a state: the largest size it has had in a run, and what round-off in its flow makes of that.
+   See hsdsl/integrators/scales.py. */
+
+#define SHARE 32
+#define BLUR_UNITS 4 /* BLUR there */
+
+/* x**(-1/m); of x 2**(k m) it is exactly 2**-k times as much. */
+static double root(double x, int m) {
+  int exponent;
+  const double fraction = frexp(x, &exponent);
+  const int shift = exponent >= 0 ? exponent / m : -((-exponent + m - 1) / m);
+  return ldexp(pow(ldexp(fraction, exponent - shift * m), -1.0 / m), -shift);
+}
+
+/* The sizes of the terms of a flow, by what the last digits of states that were `moved` so far change in it, to `found`;
+   its value is `slope`. Not 0 where it has none nearby. */
+static int flow_terms(hs_run *run, double t, const double *x, const double *slope, const double *moved, double *found) {
+  static const double probes[4][2] = {{2, 2}, {-2, 2}, {6, -2}, {-6, -6}};
+  const int n = run->here.dimension;
+  double *const near = run->near, *const other = run->nearby;
+  for (int s = 0; s < n; s++) found[s] = 0.0;
+  for (int i = 0; i < 4; i++) {
+    const double odd = probes[i][0], even = probes[i][1];
+    for (int s = 0; s < n; s++) near[s] = x[s] + (s % 2 ? even : odd) * HS_UNIT * moved[s];
+    if (run->here.table->flow(run->here.p, t + even * HS_UNIT * t, near, other)) return 1;
+    for (int s = 0; s < n; s++) found[s] = hs_max(found[s], fabs(other[s] - slope[s]));
+  }
+  for (int s = 0; s < n; s++) found[s] = found[s] / (BLUR_UNITS * HS_UNIT);
+  return 0;
+}
+
+/* The scales over a step of length h from (t, x), none below a share of what the terms of its flow could move the state
+   by, to run->resolved. `rows` are the derivatives of the flow, or 0. Not 0 where the flow has no value nearby. */
+static int resolved(hs_run *run, double t, double h, const double *x, const double *rows) {
+  const int n = run->here.dimension;
+  double *const moved = run->resolved, *const least = run->least;
+  if (run->here.table->flow(run->here.p, t, x, run->unmoved)) return 1;
+  for (int s = 0; s < n; s++) moved[s] = run->scales[s], run->lifted[s] = 0;
+  for (int round = 0; round < n; round++) {
+    int further = 0;
+    if (flow_terms(run, t, x, run->unmoved, moved, least)) return 1;
+    for (int s = 0; s < n; s++) {
+      double size = h * least[s];
+      if (rows) size = size / (1 + h * fabs(rows[s * n + s]));
+      if (!(hs_finite(size) && size > SHARE * run->scales[s])) continue;
+      moved[s] = hs_max(moved[s], size);
+      further |= !run->lifted[s];
+      run->lifted[s] = 1;
+    }
+    if (!further) break;
+  }
+  for (int s = 0; s < n; s++) moved[s] = hs_max(run->scales[s], moved[s] / SHARE);
+  return 0;
+}

@@ -1,0 +1,58 @@
+"""The scales of states along a run: what errors are held against, and what counts as moving.
+
+See `hsdsl.integrators.scales`. What a flow is computed from is looked at only where a step would be rejected for
+the second time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.integrators.linear import Vector
+from hsdsl.integrators.scales import resolved, rows_of
+from hsdsl.integrators.stepper import State, Stepper
+from hsdsl.simulate.run import Here, Run
+
+
+def error_ratio(
+    run: Run, here: Here, method: Stepper, error: State, t: Number, h: Number, x: State, z: State
+) -> Number:
+    """Error ratio of a step from (t, x) to z; at most 1 is acceptable."""
+    control, had = run.control, here.arc.scales
+    scales: Sequence[Number] = had if method.scales is None else method.scales(False)
+    ratio = control.ratio(h, error, z, scales, had)
+    if not ratio > 1 or here.mode.jumps or not control.looks_closer(t):
+        return ratio
+    try:
+        if method.scales is not None:
+            scales = method.scales(True)
+        else:
+            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic)
+    except DOMAIN_ERRORS:
+        return ratio
+    ratio = control.ratio(h, error, z, scales, had)
+    control.closer = ratio <= 1
+    return ratio
+
+
+def flow_sizes(run: Run, here: Here, slope: State) -> Vector:
+    """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
+    mode, scales = run.program.modes.index(here.mode), here.arc.scales
+    found: Vector = []
+    rows = rows_of(run.kernel.jacobian(mode, here.segment.data)(here.t, *here.x), len(here.x))
+    for f, row in zip(slope, rows, strict=True):
+        total = abs(f)
+        for d, s in zip(row, scales, strict=True):
+            total = total + abs(d) * s
+        found.append(total)
+    return found
+
+
+def instant(run: Run, here: Here, slope: State) -> Number:
+    """A time in which no state moves by more than about half the digits of its scale."""
+    least = run.settings.until
+    for s, f in zip(here.arc.scales, slope, strict=True):
+        if s > 0 and least * abs(f) > s:
+            least = s / abs(f)
+    return run.arithmetic.sqrt(run.arithmetic.unit) * least
