@@ -52,14 +52,14 @@ def deflated(pieces: list[Piece]) -> list[Piece]:
     return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
 
 
-def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Number) -> Iterator[Rise]:
+def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: bool, unit: Number) -> Iterator[Rise]:
     """Give the points, in order, where the surface rises through zero and goes on above its level.
 
-    A surface that begins above its level counts from where it has come back to zero. One that begins within it and
-    rises without a root crosses where it begins. ``risen`` says that it is above
-    round-off at the end of the step: then it has crossed by then, so that no later step begins beyond it.
+    A surface that begins ``beyond`` round-off is transparent, and counts from where it has come back to zero. Any other
+    that rises without a root crosses where it begins. ``risen`` says that it is beyond round-off at the end of the
+    step: then it has crossed by then, so that the next step may begin beyond it.
     """
-    outside = pieces[0].coefficients[0] > level
+    outside = beyond
     for piece in pieces:
         c, at = piece.coefficients, piece.start * 0
         zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at), piece.off)

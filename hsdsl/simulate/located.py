@@ -107,7 +107,8 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
         return None
     first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
-    for rise in rises_along(pieces, max(first, last), span.ends[k] > last, unit):
+    beyond = pieces[0].coefficients[0] > first
+    for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:

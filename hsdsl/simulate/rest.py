@@ -127,7 +127,7 @@ def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | 
 
     degree, share = OVER_TIME
     pieces = interpolated(inward, 1, degree, lambda _: run.arithmetic.zero, share, run.arithmetic, far=False)[0]
-    rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
+    rise = next(rises_along(pieces, run.arithmetic.zero, False, False, run.arithmetic.unit), None)
     if rise is None:
         return None
     s = rise.share

@@ -154,9 +154,9 @@ class Surfaces:
         return beyond
 
     def leave(self, t: Number, x: State) -> None:
-        """Forget the surfaces that the state stood on and has left inwards."""
+        """Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false."""
         values = self.kernel.surfaces(t, *x)
-        self.stood_on.difference_update([k for k in self.stood_on if values[k] < -self.noise(k, t, x)])
+        self.stood_on.difference_update([k for k in self.stood_on if abs(values[k]) > self.noise(k, t, x)])
 
     def norm(self, t: Number, x: State, surface: int) -> Number:
         """|grad r| in (t, x)."""

@@ -61,7 +61,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   double first, last;
   if (is_passed_by(run, k)) return 0;
   if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t1, run->z, 0, &last)) return RAISED;
-  hs_walk walk = begin_walk(&run->curves, k, hs_max(first, last), run->ends[k] > last);
+  hs_walk walk = begin_walk(k, hs_max(first, last), coefficients_of(&run->curves, 0, k)[0] > first, run->ends[k] > last);
   hs_rise rise;
   while (next_rise(run, &walk, &rise)) {
     if (settled(run, k, &rise, crossing)) return RAISED;

@@ -118,7 +118,7 @@ static int released(hs_run *run, double *release) {
   if (interpolated(run, inward, 1, &run->task->interpolation[HS_OVER_TIME], nothing_more, 0, MOST_PIECES, 0))
     return RAISED;
   run->bernstein_of = 0;
-  hs_walk walk = begin_walk(&run->curves, 0, 0.0, 0);
+  hs_walk walk = begin_walk(0, 0.0, 0, 0);
   hs_rise rise;
   if (!next_rise(run, &walk, &rise)) return 0;
   double s = rise.share, value;

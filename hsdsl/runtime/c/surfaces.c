@@ -97,12 +97,12 @@ static int enter_surfaces(hs_run *run, double t, const double *values, double si
   return 0;
 }
 
-/* Forget the surfaces that the state stood on and has left inwards. */
+/* Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false. */
 static void leave(hs_run *run, double t, const double *x) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double r, noise;
     if (!run->stood_on[k] || surface(run, k, t, x, &r) || noise_of(run, k, t, x, 0, &noise)) continue;
-    if (r < -noise) run->stood_on[k] = 0, run->here.standing--;
+    if (fabs(r) > noise) run->stood_on[k] = 0, run->here.standing--;
   }
 }
 
