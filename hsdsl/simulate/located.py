@@ -18,9 +18,10 @@ from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.isolate import stays_below
 from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
-from hsdsl.simulate.rest import hold, rests
+from hsdsl.simulate.rest import rests
+from hsdsl.simulate.resting import RestSteps, release
 from hsdsl.simulate.run import Here, Run, choose, reset
-from hsdsl.simulate.spans import Span, stepping
+from hsdsl.simulate.spans import Span, Stepping, stepping
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
 from hsdsl.simulate.tails import close_tail, contraction
@@ -32,13 +33,10 @@ MOST_CORRECTIONS = 8
 def located(run: Run, here: Here | Stop) -> Stop:
     """Follow the execution from ``here`` until it stops."""
     while not isinstance(here, Stop):
-        edge = rests(run, here) if here.t < run.settings.until else None
-        if edge is not None:
-            here = hold(run, here, edge)
         outcome = flow(run, here) if here.t < here.segment.end else here
         if isinstance(outcome, Landing):
             here = jump(run, here, outcome)
-        elif isinstance(outcome, Here):
+        elif isinstance(outcome, Here) and not outcome.t < outcome.segment.end:
             here = at_boundary(run, outcome)
         else:
             here = outcome
@@ -46,8 +44,23 @@ def located(run: Run, here: Here | Stop) -> Stop:
 
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
-    """Step until a surface is crossed, or to the segment's end."""
-    t, x, limit, arc, steps = here.t, here.x, here.segment.end, here.arc, stepping(run, here)
+    """Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state."""
+    edge = rests(run, here)
+    until = None if edge is None else release(run, here, edge)
+    if edge is None or until is None:
+        return follow(run, here, stepping(run, here), here.segment.end)
+    still = here.resting(edge)
+    outcome = follow(run, still, RestSteps(run, still), until)
+    notes.at_rest(run.recorder, here.mode.edges[edge].name, here.t, here.arc.times[-1])
+    if not isinstance(outcome, Here) or not until < here.segment.end:
+        return outcome
+    mode, surfaces = run.program.modes.index(here.mode), here.surfaces
+    return run.place(mode, here.mode.states, until, here.x, surfaces.scale, stood_on=surfaces.stood_on)
+
+
+def follow(run: Run, here: Here, steps: Stepping, limit: Number) -> Landing | Here | Stop:
+    """Step until a surface is crossed, or to a time in the segment."""
+    t, x, arc = here.t, here.x, here.arc
     before: Span | None = None
     while t < limit:
         span = steps.next(t, x, limit)
@@ -201,7 +214,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
-    standing = [] if rests(run, here) is not None else standing_on(run, here)
+    standing = standing_on(run, here.resting(rests(run, here)))
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)

@@ -39,6 +39,10 @@ class Here:
         """Return the same place in the mode's life, later."""
         return Here(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
 
+    def resting(self, edge: int | None) -> Here:
+        """Return the same place as one at rest on the guard of an edge."""
+        return replace(self, surfaces=replace(self.surfaces, resting=edge))
+
 
 @dataclass(frozen=True)
 class Run:

@@ -116,7 +116,8 @@ class Surfaces:
     """A mode's surfaces with what is needed to judge a point.
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
-    ``stood_on``, on which the state stood then, until it has left them.
+    ``stood_on``, on which the state stood then, until it has left them. ``resting`` is the edge on whose guard the
+    state rests, if it does.
     """
 
     kernel: ModeKernel
@@ -124,6 +125,7 @@ class Surfaces:
     scale: State
     arithmetic: Arithmetic
     stood_on: set[int] = field(default_factory=set[int])
+    resting: int | None = None
 
     def noise(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
         """Round-off of surface k at a point; where its gradient has no value only the sides count."""
@@ -168,12 +170,16 @@ class Surfaces:
     def standing(self, t: Number, x: State, since: Number) -> list[int]:
         """Edges on whose guards the state stands, with the flow pointing out and `if` true.
 
-        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
+        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that. Of a
+        state at rest only time goes on.
         """
         found: list[int] = []
+        rates = self.kernel.rates if self.resting is None else self.kernel.gradients
         for k in range(len(self.edges)):
+            if k == self.resting:
+                continue
             try:
-                r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
+                r, rate = self.kernel.surfaces(t, *x)[k], rates[k](t, *x)[0]
                 near = abs(r) <= max(self.noise(k, t, x), rate * since)
                 if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)

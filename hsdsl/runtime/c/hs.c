@@ -40,6 +40,7 @@
 #include "curves.c"
 #include "spans.c"
 #include "rest.c"
+#include "resting.c"
 #include "tails.c"
 #include "located.c"
 #include "sample.c"

@@ -175,16 +175,15 @@ HS_INLINE void go_to_end(hs_run *run) {
   run->k[run->method->stages] = run->end;
 }
 
-/* Step until a surface is crossed, or to the segment's end. */
-HS_INLINE int located_flow_in(hs_run *run, const int n) {
+/* Step until a surface is crossed, or to a time in the segment. */
+HS_INLINE int follow(hs_run *run, const int n, double limit) {
   hs_here *const here = &run->here;
-  const double limit = run->task->timeline->end[here->segment];
   run->sloped = run->creeping = run->has_before = 0;
   run->ratio = 1;
   forget_steps(run);
   while (here->t < limit) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
-    const hs_obstacle obstacle = next_span(run, n, limit);
+    const hs_obstacle obstacle = run->resting < 0 ? next_span(run, n, limit) : next_rest(run, n, limit);
     if (obstacle != HS_CLEAR) return located_stuck(run, obstacle);
     const int event = first_event(run);
     if (event == WITHOUT_VALUE) return step_not_finite(run);
@@ -196,11 +195,30 @@ HS_INLINE int located_flow_in(hs_run *run, const int n) {
   return AT_BOUNDARY;
 }
 
+/* Rest until a surface is crossed, to the segment's end, or until the guard of edge k lets go of the state. */
+static int rest(hs_run *run, int k, double until) {
+  hs_here *const here = &run->here;
+  const double from = here->t;
+  run->resting = k;
+  const int outcome = follow(run, here->dimension, until);
+  note(run, HS_AT_REST, k, 0, from, run->task->now);
+  if (outcome != AT_BOUNDARY || !(until < run->task->timeline->end[here->segment])) return outcome;
+  const int standing_before = here->standing;
+  place(run, here->mode, here->dimension, until, 0);
+  here->standing = standing_before;
+  return GOES_ON;
+}
+
+/* Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state. */
 static int located_flow(hs_run *run) {
+  const double limit = run->task->timeline->end[run->here.segment];
+  const int edge = rests(run);
+  double until;
+  if (edge >= 0 && release(run, edge, &until)) return rest(run, edge, until);
   switch (run->here.dimension) {
-    case 1: return located_flow_in(run, 1);
-    case 2: return located_flow_in(run, 2);
-    default: return located_flow_in(run, run->here.dimension);
+    case 1: return follow(run, 1, limit);
+    case 2: return follow(run, 2, limit);
+    default: return follow(run, run->here.dimension, limit);
   }
 }
 
@@ -261,7 +279,8 @@ static int jump(hs_run *run) {
 static int located_at_boundary(hs_run *run) {
   const double t = run->here.t;
   if (t < run->until) return go_on(run);
-  const int count = rests(run) >= 0 ? 0 : standing_on(run);
+  run->resting = rests(run);
+  const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
   choose(run, count);
   sizes(run, run->x, run->x);
@@ -271,8 +290,6 @@ static int located_at_boundary(hs_run *run) {
 /* Follow the execution from where the run stands until it stops. */
 static void located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
-    const int edge = run->here.t < run->until ? rests(run) : -1;
-    if (edge >= 0) hold(run, edge);
     if (interrupted(run))
       outcome = stopped(run, HS_INTERRUPTED, run->here.t);
     else

@@ -113,6 +113,12 @@ typedef struct {
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
+/* What holds a state at rest on a window of time: an edge, and the derivative of its surface that does. */
+typedef struct {
+  int edge, order;
+  double start, width;
+} hs_held;
+
 /* One step of the located scheme. */
 typedef struct {
   double t, h, t1;
@@ -160,7 +166,8 @@ typedef struct {
   double *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
   double *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
-  int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
+  int resting;                      /* the edge on whose guard the state rests, or -1 */
+  hs_held held;
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
   hs_made made[FREE];
 } hs_run;
