@@ -25,10 +25,12 @@ def enter(
     scale: State,
     before: Here | None = None,
     since: Number = 0,
+    reset_at: Number = None,
 ) -> Here | Stop:
     """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops.
 
-    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point.
+    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. So
+    does one that moved past the state while it waited in a strip, since it was reset at ``reset_at``.
     """
     visited: set[tuple[int, State]] = set()
     while True:
@@ -41,7 +43,7 @@ def enter(
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
-            outside = here.surfaces.enter(t, x, values, since)
+            outside = here.surfaces.enter(t, x, values, since, reset_at)
         except DOMAIN_ERRORS:
             return not_finite(run, here, t, (x,))
         if not finite:
@@ -60,7 +62,7 @@ def enter(
             return outcome
         run.record(here, chosen, t, outcome[0], alternatives, entry=True)
         edge = edges[chosen.edge]
-        before, mode, states, (x, scale) = here, edge.target, edge.target_states, outcome
+        before, mode, states, (x, scale), reset_at = here, edge.target, edge.target_states, outcome, None
 
 
 def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tuple[Crossing, tuple[str, ...]]:

@@ -189,8 +189,13 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
     after, scale = outcome
     since = run.tie(t) if landing.alternatives or same_instant(run, t) else run.arithmetic.zero
     run.record(here, crossing, resumed, after, landing.alternatives)
-    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since)
-    return entered if isinstance(entered, Stop) else close_tail(run, entered, crossing.edge)
+    waited = t if resumed > t else None
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since, waited)
+    if isinstance(entered, Stop):
+        return entered
+    if run.returns(here, crossing, entered):
+        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+    return close_tail(run, entered, crossing.edge)
 
 
 def same_instant(run: Run, t: Number) -> bool:

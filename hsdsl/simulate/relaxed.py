@@ -14,6 +14,8 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
+from hsdsl.simulate import notes
+from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.patience import Patience
@@ -60,7 +62,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 + 2 * run.arithmetic.bits
     t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
-    stood_on = here.surfaces.stood_on
+    stood_on, emerging = here.surfaces.stood_on, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
@@ -91,7 +93,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             return Landing(*choose(here, found, run), t1, sizes(x, z, here))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
-        if stood_on:
+        if stood_on or emerging:
             here.surfaces.leave(t1, z)
         arc.times.append(t1)
         arc.values.append(z)
@@ -160,7 +162,21 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
     run.wait(here, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
     run.record(here, crossing, resumed, after, landing.alternatives)
-    return enter(run, edge.target, edge.target_states, resumed, after, scale, here)
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
+    if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
+        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+    return entered
+
+
+def moves_on(here: Here, crossing: Crossing, entered: Here) -> bool:
+    """Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest."""
+    if here.mode is entered.mode:
+        return False
+    try:
+        one, other = here.kernel.flow(crossing.time, *crossing.state), entered.kernel.flow(entered.t, *entered.x)
+    except DOMAIN_ERRORS:
+        return True
+    return not takes_back(one, other)
 
 
 def at_boundary(run: Run, here: Here) -> Here | Stop:
@@ -184,7 +200,9 @@ def go_on(run: Run, here: Here) -> Here | Stop:
     t, x, mode, surfaces = here.t, here.x, run.program.modes.index(here.mode), here.surfaces
     if run.timeline.at(t).jump:
         return enter(run, mode, here.mode.states, t, x, surfaces.scale)
-    return run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
+    after = run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
+    after.surfaces.emerging.update(surfaces.emerging)
+    return after
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:

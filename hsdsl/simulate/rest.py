@@ -7,13 +7,12 @@ direction that the reset takes back, and in no other. The execution stays there 
 from __future__ import annotations
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.integrators.stepper import State
+from hsdsl.simulate.cascade import greatest, takes_back
 from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
 
 SAME_UNITS = 4  # of round-off, relative to 1 + |x|: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
-PARALLEL = 1e-6
 
 
 def rests(run: Run, here: Here) -> int | None:
@@ -81,13 +80,4 @@ def moves_alone(run: Run, here: Here, k: int) -> bool:
     small: Number = run.arithmetic.sqrt(run.arithmetic.unit) * (1 + greatest(x)) / largest
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     back = tuple(a - b for a, b in zip(here.kernel.resets[k](t, *ahead), ahead, strict=True))
-    along = max(range(len(slope)), key=lambda i: abs(slope[i]))
-    share: Number = back[along] / slope[along]
-    return share < 0 and all(
-        abs(b - share * f) <= PARALLEL * abs(share) * largest for b, f in zip(back, slope, strict=True)
-    )
-
-
-def greatest(x: State) -> Number:
-    """The largest absolute value."""
-    return max(abs(a) for a in x)
+    return takes_back(slope, back)

@@ -116,7 +116,8 @@ class Surfaces:
     """A mode's surfaces with what is needed to judge a point.
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
-    ``stood_on``, on which the state stood then, until it has left them. ``resting`` is the edge on whose guard the
+    ``stood_on``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
+    state while it waited in a strip, and that the flow leads back through. ``resting`` is the edge on whose guard the
     state rests, if it does.
     """
 
@@ -125,6 +126,7 @@ class Surfaces:
     scale: State
     arithmetic: Arithmetic
     stood_on: set[int] = field(default_factory=set[int])
+    emerging: set[int] = field(default_factory=set[int])
     resting: int | None = None
 
     def noise(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
@@ -139,17 +141,23 @@ class Surfaces:
         scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
         return roundoff(unit, magnitude, gradient, x, scale)
 
-    def enter(self, t: Number, x: State, values: Vector, since: Number = 0) -> list[int]:
+    def enter(self, t: Number, x: State, values: Vector, since: Number = 0, reset_at: Number = None) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.
 
-        A surface that the flow passes within the time ``since`` counts as stood on.
+        A surface that the flow passes within the time ``since`` counts as stood on. So does one that the state was not
+        beyond when it was reset, before it waited in a strip.
         """
         beyond: list[int] = []
+        then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)
         for k, r in enumerate(values):
             noise = self.noise(k, t, x, entry=True)
             if since and abs(r) > noise:
                 noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
-            if r > noise:
+            if r > noise and not then[k] > noise:
+                self.stood_on.add(k)
+                if self.kernel.rates[k](t, *x)[0] < 0:
+                    self.emerging.add(k)
+            elif r > noise:
                 beyond.append(k)
             elif r >= -noise:
                 self.stood_on.add(k)
@@ -159,6 +167,16 @@ class Surfaces:
         """Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false."""
         values = self.kernel.surfaces(t, *x)
         self.stood_on.difference_update([k for k in self.stood_on if abs(values[k]) > self.noise(k, t, x)])
+        if self.emerging:
+            inside = [k for k in self.emerging if values[k] <= 0 or not self._falls(k, t, x)]
+            self.emerging.difference_update(inside)
+
+    def _falls(self, k: int, t: Number, x: State) -> bool:
+        """Whether the flow leads back through surface k, as far as is known."""
+        try:
+            return self.kernel.rates[k](t, *x)[0] < 0
+        except DOMAIN_ERRORS:
+            return True
 
     def norm(self, t: Number, x: State, surface: int) -> Number:
         """|grad r| in (t, x)."""
@@ -229,12 +247,14 @@ class Surfaces:
         noise = {k: self.noise(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
         beyond = [k for k in noise if not values[k] <= noise[k]]
         for k in beyond:
-            if k >= len(self.edges):
+            if k >= len(self.edges) and k not in self.emerging:
                 return Obstacle("wall", k)
-            if not self.edges[k].conditional and (obstacle := self._too_deep(trial, values, noise, k, epsilon)):
+            if not self._transparent(k) and (obstacle := self._too_deep(trial, values, noise, k, epsilon)):
                 return obstacle
         crossings: list[Crossing] = []
         for k in beyond:
+            if k >= len(self.edges):
+                continue
             found = self._crossing(trial, values, noise, k, epsilon)
             if isinstance(found, Obstacle):
                 return found
@@ -271,7 +291,21 @@ class Surfaces:
             return None
         if obstacle := self._too_deep(trial, values, noise, k, epsilon):
             return obstacle
+        if self._deeper_before(trial, piece, theta, k, values[k] + noise[k]):
+            return Obstacle("deep", k)
         return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
+
+    def _transparent(self, k: int) -> bool:
+        """Whether a state may be beyond surface k without having crossed it."""
+        return k in self.emerging or k >= len(self.edges) or self.edges[k].conditional
+
+    def _deeper_before(self, trial: Trial, piece: Polynomial, theta: Number, k: int, end: Number) -> bool:
+        """Whether a step was further beyond surface k between the crossing and its end: the end is on another flank."""
+        for i in range(1, SCAN):
+            s = theta + (1 - theta) * i / SCAN
+            if self.kernel.surfaces(trial.t + s * trial.h, *at(trial.x, piece, s))[k] > end:
+                return True
+        return False
 
     def _inward(self, trial: Trial, found: tuple[Number, Number, State], noise: Number, k: int) -> Number:
         """How far the flow at q would take r back inside over this step; 0 when not beyond round-off."""
@@ -292,7 +326,7 @@ class Surfaces:
 
         theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
         if theta is None:
-            if self.edges[k].conditional and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
+            if self._transparent(k) and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
                 return None
             theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
         if theta == 0:

@@ -29,6 +29,9 @@ def told(run: Run, number: int, index: int, k: int, count: int, time: float, oth
         notes.at_rest(recorder, mode.edges[k].name, time, other)
     elif kind == "replaced":
         notes.replaced(recorder, mode.edges[k].name, count, time, other)
+    elif kind == "slides":
+        source = run.program.modes[count]
+        return notes.slides(source.edges[k].name, source.name, mode.name, time)
     else:
         return notes.accumulates(recorder, mode.edges[k].name, time, other)
     return None

@@ -99,7 +99,7 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
-typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED } hs_notice;
+typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
 
 /* What a run says besides: see hsdsl/simulate/notes.py. `surface` is an edge where there is no doubt about a surface. */
 typedef struct {

@@ -247,6 +247,8 @@ static int jump(hs_run *run) {
   const double t = crossing->time, until = run->until;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
+  const double arc_start = run->here.entered_at;
+  const int mode = run->here.mode;
   double resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   const int without_value = reset(run, run->landed);
@@ -271,8 +273,9 @@ static int jump(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since);
-  return entered == GOES_ON ? close_tail(run, k) : entered;
+  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, t);
+  if (entered != GOES_ON) return entered;
+  return returns(run, t > arc_start) ? slides(run, mode, k) : close_tail(run, k);
 }
 
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */

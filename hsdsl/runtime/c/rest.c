@@ -3,14 +3,6 @@
 
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
-#define PARALLEL 1e-6
-
-/* The largest absolute value. */
-static double greatest(const double *x, int n) {
-  double most = fabs(x[0]);
-  for (int s = 1; s < n; s++) most = hs_max(most, fabs(x[s]));
-  return most;
-}
 
 /* Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move. */
 static int stays(hs_run *run, double t, const double *x, int k) {
@@ -73,16 +65,8 @@ static int moves_alone(hs_run *run, double t, const double *x, int k) {
   const double small = sqrt(HS_UNIT) * (1 + greatest(x, n)) / largest;
   for (int s = 0; s < n; s++) ahead[s] = x[s] + small * slope[s];
   if (here->table->edge[k].reset(here->p, t, ahead, back)) return RAISED;
-  int along = 0;
-  for (int s = 0; s < n; s++) {
-    back[s] = back[s] - ahead[s];
-    if (fabs(slope[s]) > fabs(slope[along])) along = s;
-  }
-  const double share = back[along] / slope[along];
-  if (!(share < 0)) return 0;
-  for (int s = 0; s < n; s++)
-    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * largest)) return 0;
-  return 1;
+  for (int s = 0; s < n; s++) back[s] = back[s] - ahead[s];
+  return takes_back(slope, back, n);
 }
 
 /* The edge on whose guard the state rests; -1 where it moves. */

@@ -27,8 +27,8 @@ static void place(hs_run *run, int mode, int dimension, double t, const hs_here 
     here.outputs = before->table->outputs;
     here.outputs_p = before->p;
   }
-  here.standing = 0;
-  here.t = t;
+  here.standing = here.emerging = 0;
+  here.t = here.entered_at = t;
   run->here = here;
   run->resting = -1;
   begin(run, HS_FLOW);

@@ -42,8 +42,8 @@ typedef struct {
   const double *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const double *outputs_p;
-  int standing;            /* number of surfaces in stood_on */
-  double t;
+  int standing, emerging;  /* numbers of surfaces in stood_on and in run->emerging */
+  double t, entered_at;
 } hs_here;
 
 /* One step as tried, from (t, x) to (t1, z). */
@@ -101,6 +101,13 @@ typedef struct {
   int mode, edge, target, entry;
 } hs_made;
 
+/* One of the states that transitions without flow between them led to, and how many they were since: room 0 for none. */
+typedef struct {
+  int mode;
+  long length, room;
+  double *x;
+} hs_cascade;
+
 /* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
 typedef struct {
   double low, high, *b;
@@ -136,6 +143,7 @@ typedef struct {
   hs_trial trial;
   hs_control control;
   hs_patience patience;
+  hs_cascade cascade;
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
   double **k;          /* stages, then the flow at the end */
@@ -143,7 +151,8 @@ typedef struct {
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
-  int *stood_on, *beyond;
+  int *stood_on, *beyond, *emerging;
+  double *source;      /* the flow that led to a transition */
   int *tied;           /* one for each edge */
   double *gradient;    /* width + 1 */
   double *both;        /* 2 width: states and sizes */

@@ -87,7 +87,7 @@ static int close_tail(hs_run *run, int k) {
   swap(&run->x, &run->z);
   place(run, here->mode, here->dimension, end, 0);
   here->table->values(here->p, end, run->x, run->ahead);
-  enter_surfaces(run, end, run->ahead, 0.0, run->beyond);
+  enter_surfaces(run, end, 0.0, end);
   if (!run->stood_on[k]) run->stood_on[k] = 1, here->standing++;
   return GOES_ON;
 }
