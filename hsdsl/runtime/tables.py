@@ -24,7 +24,7 @@ REASONS = (
     "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
     "entered outside", "stuck", "interrupted", "left", "step not finite", "accumulated",
 )  # fmt: skip
-OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved")
+OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved", "jump")
 
 
 class Edge(ctypes.Structure):

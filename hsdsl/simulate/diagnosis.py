@@ -9,8 +9,11 @@ from hsdsl.execution import Stop
 from hsdsl.integrators import RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import NoSeries, terms
+from hsdsl.simulate.chatter import jump_between
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.stops import show
+
+NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is looked for
 
 
 def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop:
@@ -31,6 +34,20 @@ def not_finite(run: Run, here: Here, t: Number, points: Iterable[State]) -> Stop
         sentence = f"the flow of mode {here.mode.name} has no derivatives at t = {show(t)}; another method may go on"
         return Stop("not_finite", t, sentence)
     return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
+
+
+def jump_near(run: Run, here: Here, slope: State) -> str | None:
+    """Name a component of the flow that jumps a few steps ahead of a state or behind it, and the place."""
+    h, flow = run.control.h, here.kernel.flow
+    for n in range(-NEAR, NEAR + 1):
+        for way in (h * 2**n, -h * 2**n):
+            t1, z = here.t + way, tuple(a + way * f for a, f in zip(here.x, slope, strict=True))
+            for k, (state, text) in enumerate(zip(here.mode.states, here.mode.flow_texts, strict=True)):
+                if jump := jump_between(flow, k, here.t, here.x, t1, z):
+                    point, before, behind = jump
+                    values = f"from {show(before)} to {show(behind)}"
+                    return f"the flow of {state}, {text}, jumps {values} at {_state(here, point)}"
+    return None
 
 
 def has_no_series(run: Run, here: Here, t: Number) -> bool:

@@ -16,7 +16,8 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate import notes
 from hsdsl.simulate.cascade import takes_back
-from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.chatter import Chatter
+from hsdsl.simulate.diagnosis import jump_near, not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset
@@ -61,7 +62,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 + 2 * run.arithmetic.bits
-    t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
+    t, x, limit, patience, chatter = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit), Chatter()
     stood_on, emerging = here.surfaces.stood_on, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
@@ -93,6 +94,8 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             return Landing(*choose(here, found, run), t1, sizes(x, z, here))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
+        if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
+            return stuck(run, here.moved(t, x), Obstacle("jump"), slope)
         if stood_on or emerging:
             here.surfaces.leave(t1, z)
         arc.times.append(t1)
@@ -230,6 +233,9 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
         h = run.control.h
         ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
         return not_finite(run, here, t, ahead)
+    if obstacle.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
+        why = f"{jump}, and the solution is driven back across that"
+        return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {here.mode.name}: {why}")
     why = {
         "unsolved": "the equations of an implicit step are not solved by Newton's method",
         "error": "the error estimate stays above the tolerance, as where a flow jumps",

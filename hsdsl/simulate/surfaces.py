@@ -42,7 +42,7 @@ class Crossing:
 class Obstacle:
     """Why a trial step ends outside the relaxed domain."""
 
-    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping"]
+    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump"]
     surface: int | None = None
 
 

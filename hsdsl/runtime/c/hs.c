@@ -35,6 +35,7 @@
 #include "visited.c"
 #include "entry.c"
 #include "cascade.c"
+#include "chatter.c"
 #include "relaxed.c"
 #include "isolate.c"
 #include "along.c"

@@ -163,7 +163,8 @@ typedef enum {
   HS_NOT_FINITE,
   HS_ERROR,
   HS_CREEPING,
-  HS_UNSOLVED
+  HS_UNSOLVED,
+  HS_JUMP
 } hs_obstacle;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;

@@ -178,7 +178,7 @@ HS_INLINE void go_to_end(hs_run *run) {
 /* Step until a surface is crossed, or to a time in the segment. */
 HS_INLINE int follow(hs_run *run, const int n, double limit) {
   hs_here *const here = &run->here;
-  run->sloped = run->creeping = run->has_before = 0;
+  run->sloped = run->creeping = run->has_before = run->chatter = 0;
   run->ratio = 1;
   forget_steps(run);
   while (here->t < limit) {

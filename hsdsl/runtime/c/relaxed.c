@@ -60,7 +60,7 @@ static int standing_on(hs_run *run) {
 
 /* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
 static int stuck(hs_run *run, hs_obstacle kind, int surface) {
-  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING;
+  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP;
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
@@ -100,7 +100,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const double limit = run->task->timeline->end[here->segment];
   run->patience.reached = NAN;
-  run->patience.idle = run->patience.creeping = 0;
+  run->patience.idle = run->patience.creeping = run->chatter = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(run);
@@ -146,6 +146,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       const hs_obstacle given_up = patience_ends(run, halvings, last.obstacle, last.surface, t1);
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
+    if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
     if (here->standing || here->emerging) leave(run, t1, run->z);
     append(run, t1, run->z, curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0);
     here->t = t1;

@@ -66,7 +66,8 @@ typedef struct {
   int order;
   int implicit;
   double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
-  int64_t accepted, rejected;
+  int64_t accepted, rejected; /* in a stretch of time */
+  double stretch;
 } hs_control;
 
 /* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
@@ -144,6 +145,7 @@ typedef struct {
   hs_control control;
   hs_patience patience;
   hs_cascade cascade;
+  int chatter;
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
   double **k;          /* stages, then the flow at the end */
@@ -152,7 +154,7 @@ typedef struct {
   hs_radau radau;
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
   int *stood_on, *beyond, *emerging;
-  double *source;      /* the flow that led to a transition */
+  double *source;      /* the flow that led to a transition, or between two states */
   int *tied;           /* one for each edge */
   double *gradient;    /* width + 1 */
   double *both;        /* 2 width: states and sizes */

@@ -122,6 +122,7 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
       h = limit - t, t1 = limit;
     const hs_obstacle tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
+      if (control->tolerance > 0 && chatters(run, n, t1)) return HS_JUMP;
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
       run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
       return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
