@@ -45,9 +45,9 @@ def enter(
             finite = all(map(run.arithmetic.isfinite, values))
             outside = here.surfaces.enter(t, x, values, since, reset_at)
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, (x,))
+            return not_finite(run, here, t, [(t, x)])
         if not finite:
-            return not_finite(run, here, t, (x,))
+            return not_finite(run, here, t, [(t, x)])
         edges = here.mode.edges
         beyond = [k for k in outside if k < len(edges) and not edges[k].conditional]
         if not beyond:

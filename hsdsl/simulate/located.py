@@ -70,7 +70,7 @@ def follow(run: Run, here: Here, steps: Stepping, limit: Number) -> Landing | He
             if event := first_event(run, here, before, span):
                 return event
         except DOMAIN_ERRORS:
-            return not_finite(run, here.moved(t, x), t, (x, span.z))
+            return not_finite(run, here.moved(t, x), t, [(t, x), (span.t1, span.z)])
         if here.surfaces.stood_on:
             here.surfaces.leave(span.t1, span.z)
         arc.append(span.t1, span.z, span.piece)
@@ -234,5 +234,5 @@ def stuck(run: Run, here: Here, obstacle: Obstacle) -> Landing | Stop:
     try:
         slope = here.kernel.flow(here.t, *here.x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, here.t, (here.x,))
+        return not_finite(run, here, here.t, [(here.t, here.x)])
     return no_way_on(run, here, obstacle, slope)

@@ -67,7 +67,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, t, (x,))
+        return not_finite(run, here, t, [(t, x)])
     control.begin(x, slope)
     while t < limit:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
@@ -231,7 +231,9 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     grown = any(a * a * run.arithmetic.unit > 1 for a in x)  # faster than time can follow
     if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
-        ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
+        ahead = (
+            (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True))) for n in range(40, -1, -1)
+        )
         return not_finite(run, here, t, ahead)
     if obstacle.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
         why = f"{jump}, and the solution is driven back across that"

@@ -51,14 +51,14 @@ def stop(run: Run, desk: Desk, reason: str, made: int) -> Stop:
         return stops.limit(run.settings.max_transitions, t)
     here = _here(run, desk, made)
     if reason == "here not finite":
-        return not_finite(run, here, t, (here.x,))
+        return not_finite(run, here, t, [(t, here.x)])
     if reason == "entered outside":
         return left_domain(here, found.surface, t, "was entered outside it")
     if reason == "left":
         return left_domain(here, found.surface, t, LEFT)
     slope = desk.slope(found.dimension)
     if reason == "step not finite":
-        return not_finite(run, here, t, (here.x, slope))
+        return not_finite(run, here, t, [(t, here.x), (found.h, slope)])
     assert reason == "stuck", reason
     run.control.h = found.h
     surface = None if found.surface < 0 else found.surface

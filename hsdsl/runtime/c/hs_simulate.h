@@ -168,7 +168,7 @@ typedef enum {
 } hs_obstacle;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
-   `slope` is the end of a step along which something has no value. */
+   `slope` and `h` are the state and time at the end of a step along which something has no value. */
 typedef struct {
   int32_t reason;
   int32_t mode;

@@ -159,7 +159,9 @@ static int located_stuck(hs_run *run, hs_obstacle kind) {
 
 static int step_not_finite(hs_run *run) {
   copy(run->task->stop.slope, run->z, run->here.dimension);
-  return stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+  stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+  run->task->stop.h = run->span.t1;
+  return HS_STEP_NOT_FINITE;
 }
 
 /* Go on at the end of the step. */
