@@ -75,7 +75,7 @@ def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: boo
             if high is None:
                 break
             root = _root(c, at, high, unit)
-            yield Rise(piece.start + root * piece.width, _slope(c, root) / piece.width, piece.certain)
+            yield Rise(piece.start + root * piece.width, slope_of(c, root) / piece.width, piece.certain)
             at, outside = high, True
 
 
@@ -87,7 +87,8 @@ def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
     return start if root is None else root
 
 
-def _slope(c: Coefficients, s: Number) -> Number:
+def slope_of(c: Coefficients, s: Number) -> Number:
+    """Evaluate the derivative of a polynomial."""
     slope = s * 0
     for k in range(len(c) - 1, 0, -1):
         slope = k * c[k] + s * slope

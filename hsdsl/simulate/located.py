@@ -25,6 +25,7 @@ from hsdsl.simulate.spans import Span, Stepping, stepping
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
 from hsdsl.simulate.tails import close_tail, contraction
+from hsdsl.simulate.touching import touched
 
 FREE = 16  # transitions within the relaxation that cost no time
 MOST_CORRECTIONS = 8
@@ -118,7 +119,7 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
     pieces = deflated(span.curves[k]) if k in surfaces.stood_on else span.curves[k]
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
-        return None
+        return touched(run, here, span, k, pieces)
     first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
     for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
@@ -127,7 +128,7 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
             if not rise.certain:
                 notes.unsettled(run.recorder, here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
-    return None
+    return touched(run, here, span, k, pieces)
 
 
 def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:

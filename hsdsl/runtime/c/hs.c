@@ -44,6 +44,7 @@
 #include "rest.c"
 #include "resting.c"
 #include "tails.c"
+#include "touching.c"
 #include "located.c"
 #include "sample.c"
 #include "pack.c"

@@ -59,7 +59,7 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   double first, last;
-  if (is_passed_by(run, k)) return 0;
+  if (is_passed_by(run, k)) return touched(run, k, crossing);
   if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t1, run->z, 0, &last)) return RAISED;
   hs_walk walk = begin_walk(k, hs_max(first, last), coefficients_of(&run->curves, 0, k)[0] > first, run->ends[k] > last);
   hs_rise rise;
@@ -73,7 +73,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     crossing->depth = 0.0;
     return 1;
   }
-  return 0;
+  return touched(run, k, crossing);
 }
 
 /* The sizes of the numbers behind the chosen crossing's state, to run->landed: the terms of its step and of the one
