@@ -18,13 +18,13 @@ METHOD_KINDS = ("table", "taylor", "radau")
 INTERPOLANTS = ("secant", "hermite", "dense")
 KINDS = ("flow", "strip")
 SCHEMES = ("relaxed", "located")
-NOTICES = ("crowded", "at rest", "replaced", "accumulates", "unsettled")
+NOTICES = ("crowded", "at rest", "replaced", "accumulates", "unsettled", "slides")
 NOTE = np.dtype([("kind", "i4"), ("mode", "i4"), ("surface", "i8"), ("number", "i8"), ("time", "f8"), ("other", "f8")])
 REASONS = (
     "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
     "entered outside", "stuck", "interrupted", "left", "step not finite", "accumulated",
 )  # fmt: skip
-OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved")
+OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved", "jump")
 
 
 class Edge(ctypes.Structure):

@@ -56,14 +56,14 @@ def deflated(pieces: list[Piece]) -> list[Piece]:
     return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
 
 
-def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Number) -> Iterator[Rise]:
+def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: bool, unit: Number) -> Iterator[Rise]:
     """Give the points, in order, where the surface rises through zero and goes on above its level.
 
-    A surface that begins above its level counts from where it has come back to zero. One that begins within it and
-    rises without a root crosses where it begins. ``risen`` says that it is above
-    round-off at the end of the step: then it has crossed by then, so that no later step begins beyond it.
+    A surface that begins ``beyond`` round-off is transparent, and counts from where it has come back to zero. Any other
+    that rises without a root crosses where it begins. ``risen`` says that it is beyond round-off at the end of the
+    step: then it has crossed by then, so that the next step may begin beyond it.
     """
-    outside = pieces[0].coefficients[0] > level
+    outside = beyond
     for piece in pieces:
         c, at = piece.coefficients, piece.start * 0
         zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at), piece.off)
@@ -79,7 +79,7 @@ def rises_along(pieces: Sequence[Piece], level: Number, risen: bool, unit: Numbe
             if high is None:
                 break
             root = _root(c, at, high, unit)
-            yield Rise(piece.start + root * piece.width, _slope(c, root) / piece.width, piece.certain)
+            yield Rise(piece.start + root * piece.width, slope_of(c, root) / piece.width, piece.certain)
             at, outside = high, True
 
 
@@ -91,7 +91,8 @@ def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
     return start if root is None else root
 
 
-def _slope(c: Coefficients, s: Number) -> Number:
+def slope_of(c: Coefficients, s: Number) -> Number:
+    """Evaluate the derivative of a polynomial."""
     slope = s * 0
     for k in range(len(c) - 1, 0, -1):
         slope = k * c[k] + s * slope

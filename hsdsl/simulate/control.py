@@ -29,7 +29,8 @@ from hsdsl.integrators.stepper import State
 from hsdsl.simulate.settings import Settings
 
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
-MOST_REJECTIONS = 10_000
+MOST_REJECTIONS = 2_000  # in a stretch
+STRETCH = 1e-3  # of the largest step: the time in which rejections are counted together
 BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
 NOTHING = 2.0**-960  # below this numbers have no digits left
@@ -58,6 +59,7 @@ class Control:
     before: tuple[Number, Number] | None = None
     accepted: int = 0
     rejected: int = 0
+    stretch: Number = 0
     least: Number = 0
     failed_at: Number | None = None
     closer: bool = False
@@ -108,6 +110,9 @@ class Control:
     def accept(self, taken: Number, ratio: Number) -> None:
         """Learn from an accepted, unhalved step; one cut short by a boundary never shrinks the next."""
         self.accepted += 1
+        self.stretch = self.stretch + taken
+        if self.stretch > self.largest * STRETCH:
+            self.accepted, self.rejected, self.stretch = 0, 0, taken * 0
         proposed = taken * (self.predicted(taken, ratio) if self.implicit else self.factor(ratio))
         self.h = min(self.largest, max(proposed, self.h) if taken < self.h else proposed)
 
@@ -139,7 +144,7 @@ class Control:
 
     @property
     def struggles(self) -> bool:
-        """Whether rejections keep pace with steps and have done so for long: the flow jumps, and no step fits it."""
+        """Whether rejections keep pace with steps for a stretch of time: the flow jumps, and no step fits it."""
         return self.rejected > MOST_REJECTIONS and 4 * self.rejected > self.accepted
 
 

@@ -26,11 +26,13 @@ def enter(
     before: Here | None = None,
     since: Number = 0,
     inside: frozenset[int] = frozenset(),
+    reset_at: Number = None,
 ) -> Here | Stop:
     """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops.
 
-    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. One
-    of an edge in ``inside`` was not reached before an input jumped: on it counts as beyond.
+    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. So
+    does one that moved past the state while it waited in a strip, since it was reset at ``reset_at``. One of an edge in
+    ``inside`` was not reached before an input jumped: on it counts as beyond.
     """
     visited: set[tuple[int, State]] = set()
     while True:
@@ -43,11 +45,11 @@ def enter(
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
-            outside = here.surfaces.enter(t, x, values, since, inside)
+            outside = here.surfaces.enter(t, x, values, since, inside, reset_at)
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, (x,))
+            return not_finite(run, here, t, [(t, x)])
         if not finite:
-            return not_finite(run, here, t, (x,))
+            return not_finite(run, here, t, [(t, x)])
         edges = here.mode.edges
         beyond = [k for k in outside if k < len(edges) and not edges[k].conditional]
         if not beyond:
@@ -63,7 +65,7 @@ def enter(
         run.record(here, chosen, t, outcome[0], alternatives, entry=True)
         edge = edges[chosen.edge]
         before, mode, states, (x, scale) = here, edge.target, edge.target_states, outcome
-        inside = frozenset()
+        inside, reset_at = frozenset(), None
 
 
 def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tuple[Crossing, tuple[str, ...]]:

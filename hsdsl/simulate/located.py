@@ -18,12 +18,14 @@ from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.isolate import stays_below
 from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
-from hsdsl.simulate.rest import hold, rests
+from hsdsl.simulate.rest import rests
+from hsdsl.simulate.resting import RestSteps, release
 from hsdsl.simulate.run import Here, Run, choose, reset
-from hsdsl.simulate.spans import Span, stepping
+from hsdsl.simulate.spans import Span, Stepping, stepping
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
 from hsdsl.simulate.tails import close_tail, contraction
+from hsdsl.simulate.touching import touched
 
 FREE = 16  # transitions within the relaxation that cost no time
 MOST_CORRECTIONS = 8
@@ -32,13 +34,10 @@ MOST_CORRECTIONS = 8
 def located(run: Run, here: Here | Stop) -> Stop:
     """Follow the execution from ``here`` until it stops."""
     while not isinstance(here, Stop):
-        edge = rests(run, here) if here.t < run.settings.until else None
-        if edge is not None:
-            here = hold(run, here, edge)
         outcome = flow(run, here) if here.t < here.segment.end else here
         if isinstance(outcome, Landing):
             here = jump(run, here, outcome)
-        elif isinstance(outcome, Here):
+        elif isinstance(outcome, Here) and not outcome.t < outcome.segment.end:
             here = at_boundary(run, outcome)
         else:
             here = outcome
@@ -46,8 +45,23 @@ def located(run: Run, here: Here | Stop) -> Stop:
 
 
 def flow(run: Run, here: Here) -> Landing | Here | Stop:
-    """Step until a surface is crossed, or to the segment's end."""
-    t, x, limit, arc, steps = here.t, here.x, here.segment.end, here.arc, stepping(run, here)
+    """Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state."""
+    edge = rests(run, here)
+    until = None if edge is None else release(run, here, edge)
+    if edge is None or until is None:
+        return follow(run, here, stepping(run, here), here.segment.end)
+    still = here.resting(edge)
+    outcome = follow(run, still, RestSteps(run, still), until)
+    notes.at_rest(run.recorder, here.mode.edges[edge].name, here.t, here.arc.times[-1])
+    if not isinstance(outcome, Here) or not until < here.segment.end:
+        return outcome
+    mode, surfaces = run.program.modes.index(here.mode), here.surfaces
+    return run.place(mode, here.mode.states, until, here.x, surfaces.scale, stood_on=surfaces.stood_on)
+
+
+def follow(run: Run, here: Here, steps: Stepping, limit: Number) -> Landing | Here | Stop:
+    """Step until a surface is crossed, or to a time in the segment."""
+    t, x, arc = here.t, here.x, here.arc
     before: Span | None = None
     while t < limit:
         span = steps.next(t, x, limit)
@@ -57,7 +71,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             if event := first_event(run, here, before, span):
                 return event
         except DOMAIN_ERRORS:
-            return not_finite(run, here.moved(t, x), t, (x, span.z))
+            return not_finite(run, here.moved(t, x), t, [(t, x), (span.t1, span.z)])
         if here.surfaces.stood_on:
             here.surfaces.leave(span.t1, span.z)
         arc.append(span.t1, span.z, span.piece)
@@ -105,15 +119,16 @@ def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
     pieces = deflated(span.curves[k]) if k in surfaces.stood_on else span.curves[k]
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
-        return None
+        return touched(run, here, span, k, pieces)
     first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
-    for rise in rises_along(pieces, max(first, last), span.ends[k] > last, unit):
+    beyond = pieces[0].coefficients[0] > first
+    for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:
                 notes.unsettled(run.recorder, here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
-    return None
+    return touched(run, here, span, k, pieces)
 
 
 def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
@@ -175,8 +190,13 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
     after, scale = outcome
     since = run.tie(t) if landing.alternatives or same_instant(run, t) else run.arithmetic.zero
     run.record(here, crossing, resumed, after, landing.alternatives)
-    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since)
-    return entered if isinstance(entered, Stop) else close_tail(run, entered, crossing.edge)
+    waited = t if resumed > t else None
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since, reset_at=waited)
+    if isinstance(entered, Stop):
+        return entered
+    if run.returns(here, crossing, entered):
+        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+    return close_tail(run, entered, crossing.edge)
 
 
 def same_instant(run: Run, t: Number) -> bool:
@@ -200,7 +220,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
-    standing = [] if rests(run, here) is not None else standing_on(run, here)
+    standing = standing_on(run, here.resting(rests(run, here)))
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)
@@ -215,5 +235,5 @@ def stuck(run: Run, here: Here, obstacle: Obstacle) -> Landing | Stop:
     try:
         slope = here.kernel.flow(here.t, *here.x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, here.t, (here.x,))
+        return not_finite(run, here, here.t, [(here.t, here.x)])
     return no_way_on(run, here, obstacle, slope)

@@ -46,6 +46,17 @@ def accumulates(recorder: Recorder, edge: str, end: Number, t: Number) -> Stop:
     return Stop("zeno", t, sentence)
 
 
+def slides(edge: str, source: str, target: str, t: Number) -> Stop:
+    """Transitions without flow between them return to the same state: the run stops at t."""
+    how = (
+        f"{edge} leads back to the same state of mode {source} without end, since the flow presses on its guard"
+        if source == target
+        else f"transitions lead from mode {source} to mode {target} and back to the same state without end, since the "
+        "flow of each leads into the other"
+    )
+    return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")
+
+
 def unsettled(recorder: Recorder, mode: str, k: int, t: Number) -> None:
     """A crossing was found on a piece of a surface that is no polynomial."""
     sentence = f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}"

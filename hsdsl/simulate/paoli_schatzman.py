@@ -105,7 +105,7 @@ def step_through(run: Run, here: Here, path: Path, routines: Callable[[Number], 
         try:
             force = routines(t).flow(t, *still)[1 - o.position]
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, (still,))
+            return not_finite(run, here, t, [(t, still)])
         if n == 0:
             z.append(z[0] + h * v + h * h / 2 * (force - 2 * o.damping * v - o.stiffness * z[0]))
         else:

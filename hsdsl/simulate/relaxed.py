@@ -14,7 +14,10 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
-from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate import notes
+from hsdsl.simulate.cascade import takes_back
+from hsdsl.simulate.chatter import Chatter
+from hsdsl.simulate.diagnosis import jump_near, not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
 from hsdsl.simulate.patience import Patience
 from hsdsl.simulate.run import Here, Run, choose, reset
@@ -60,12 +63,12 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 + 2 * run.arithmetic.bits
-    t, x, limit, patience = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit)
-    stood_on = here.surfaces.stood_on
+    t, x, limit, patience, chatter = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit), Chatter()
+    stood_on, emerging = here.surfaces.stood_on, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, t, (x,))
+        return not_finite(run, here, t, [(t, x)])
     control.begin(arc.scales, slope)
     while t < limit:
         h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
@@ -92,7 +95,9 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
             return Landing(*choose(here, found, run), t1, sizes(x, z, here))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
-        if stood_on:
+        if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
+            return stuck(run, here.moved(t, x), Obstacle("jump"), slope)
+        if stood_on or emerging:
             here.surfaces.leave(t1, z)
         arc.times.append(t1)
         arc.values.append(z)
@@ -162,7 +167,21 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
     run.wait(here, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
     run.record(here, crossing, resumed, after, landing.alternatives)
-    return enter(run, edge.target, edge.target_states, resumed, after, scale, here)
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
+    if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
+        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+    return entered
+
+
+def moves_on(here: Here, crossing: Crossing, entered: Here) -> bool:
+    """Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest."""
+    if here.mode is entered.mode:
+        return False
+    try:
+        one, other = here.kernel.flow(crossing.time, *crossing.state), entered.kernel.flow(entered.t, *entered.x)
+    except DOMAIN_ERRORS:
+        return True
+    return len(one) != len(other) or not takes_back(one, other, [abs(f) for f in one], [f * 0 for f in one])
 
 
 def at_boundary(run: Run, here: Here) -> Here | Stop:
@@ -188,9 +207,11 @@ def go_on(run: Run, here: Here) -> Here | Stop:
         try:
             inside = surfaces.inside(t, x)
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, (x,))
+            return not_finite(run, here, t, [(t, x)])
         return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside)
-    return run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
+    after = run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
+    after.surfaces.emerging.update(surfaces.emerging)
+    return after
 
 
 def standing_on(run: Run, here: Here) -> list[Crossing]:
@@ -219,8 +240,13 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
     )  # faster than time can follow
     if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
-        ahead = (tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)) for n in range(40, -1, -1))
+        ahead = (
+            (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True))) for n in range(40, -1, -1)
+        )
         return not_finite(run, here, t, ahead)
+    if obstacle.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
+        why = f"{jump}, and the solution is driven back across that"
+        return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {here.mode.name}: {why}")
     why = {
         "unsolved": "the equations of an implicit step are not solved by Newton's method",
         "error": "the error estimate stays above the tolerance, as where a flow jumps",

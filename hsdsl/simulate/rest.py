@@ -7,18 +7,13 @@ direction that the reset takes back, and in no other. The execution stays there 
 from __future__ import annotations
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.integrators.stepper import State
-from hsdsl.simulate import notes
-from hsdsl.simulate.along import interpolated, rises_along
-from hsdsl.simulate.interpolation import OVER_TIME
+from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.scales import flow_sizes, instant
 
 SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that rests
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
-PARALLEL = 1e-6
-CORRECTIONS = 8  # of the root of a push
 
 
 def rests(run: Run, here: Here) -> int | None:
@@ -89,48 +84,4 @@ def moves_alone(run: Run, here: Here, k: int) -> bool:
     sizes, small = flow_sizes(run, here, slope), instant(run, here, slope)
     ahead = tuple(a + small * f for a, f in zip(x, slope, strict=True))
     back = tuple(a - b for a, b in zip(here.kernel.resets[k](t, *ahead), ahead, strict=True))
-    along = max((i for i, f in enumerate(slope) if f != 0), key=lambda i: abs(slope[i]) / sizes[i])
-    share: Number = back[along] / slope[along]
-    return share < 0 and all(
-        abs(b - share * f) <= PARALLEL * abs(share) * size + noise
-        for b, f, size, noise in zip(back, slope, sizes, _noise(run, here), strict=True)
-    )
-
-
-def hold(run: Run, here: Here, k: int) -> Here:
-    """Stay at rest until the flow no longer pushes out, or to the end of the inputs' segment.
-
-    Where the push has no value later on the state is not held: transitions go on as long as they can.
-    """
-    end = here.segment.end
-    try:
-        order = push_order(run, here, k)
-        assert order is not None
-        release = released(run, here, k, order, end)
-    except DOMAIN_ERRORS:
-        return here
-    edge, until = here.mode.edges[k].name, end if release is None else release
-    here.arc.append(until, here.x, (tuple(run.arithmetic.zero for _ in here.x),))
-    notes.at_rest(run.recorder, edge, here.t, until)
-    if release is None:
-        return here.moved(end, here.x)
-    mode = run.program.modes.index(here.mode)
-    return run.place(mode, here.mode.states, until, here.x, here.surfaces.scale, stood_on={k})
-
-
-def released(run: Run, here: Here, k: int, order: int, end: Number) -> Number | None:
-    """When the push falls through zero: isolated on an interpolant over time, then solved on the push itself."""
-    t, span = here.t, end - here.t
-
-    def inward(s: Number) -> State:
-        return (-push(run, here, k, order, t + s * span),)
-
-    degree, share = OVER_TIME
-    pieces = interpolated(inward, 1, degree, lambda _: run.arithmetic.zero, share, run.arithmetic, far=False)[0]
-    rise = next(rises_along(pieces, run.arithmetic.zero, False, run.arithmetic.unit), None)
-    if rise is None:
-        return None
-    s = rise.share
-    for _ in range(CORRECTIONS):
-        s = min(s * 0 + 1, max(s * 0, s - inward(s)[0] / rise.slope)) if rise.slope != 0 else s
-    return t + s * span
+    return takes_back(slope, back, sizes, _noise(run, here))

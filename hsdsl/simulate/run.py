@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.execution import Stop, Transition
@@ -12,6 +12,7 @@ from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import Kernel, ModeKernel
 from hsdsl.program import ModeProgram, Program
+from hsdsl.simulate.cascade import Cascade
 from hsdsl.simulate.control import Control
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.settings import Settings
@@ -39,6 +40,10 @@ class Here:
         """Return the same place in the mode's life, later."""
         return Here(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
 
+    def resting(self, edge: int | None) -> Here:
+        """Return the same place as one at rest on the guard of an edge."""
+        return replace(self, surfaces=replace(self.surfaces, resting=edge))
+
 
 @dataclass(frozen=True)
 class Run:
@@ -50,6 +55,7 @@ class Run:
     settings: Settings
     control: Control
     recorder: Recorder
+    cascade: Cascade = field(default_factory=Cascade)
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -108,6 +114,10 @@ class Run:
             return self.kernel.bind(mode, self.timeline.at(t).data).outputs(t, *x)
 
         self.recorder.strip(here.arc, rows, q, outputs if rows[-1][0] > here.segment.end else here.arc.outputs)
+
+    def returns(self, here: Here, made: Crossing, entered: Here) -> bool:
+        """Whether a transition from an arc without any flow led back to where its cascade has been."""
+        return self.cascade.returns(made.time > here.arc.times[0], self.program.modes.index(entered.mode), entered.x)
 
     def limit_reached(self, t: Number) -> Stop | None:
         """Stop where one more transition would exceed what the run may make."""

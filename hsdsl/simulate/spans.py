@@ -6,7 +6,7 @@ A step is bounded by its error alone; where surfaces are crossed inside is asked
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Protocol
 
@@ -17,6 +17,7 @@ from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
 from hsdsl.simulate.along import Piece, TooFast, settles, without_zeros
+from hsdsl.simulate.chatter import Chatter
 from hsdsl.simulate.curves import Curves, curves_along
 from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE
 from hsdsl.simulate.isolate import value
@@ -82,6 +83,7 @@ class TableSteps:
     method: Stepper
     slope: State | None = None
     at_time: Number = None
+    _chatter: Chatter = field(default_factory=Chatter)
 
     def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
         """Make one step: rejected by the error estimate, halved where something has no value."""
@@ -99,6 +101,9 @@ class TableSteps:
             tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
             if isinstance(tried, tuple):
                 ratio, span = tried
+                assert self.slope is not None
+                if control.tolerance is not None and self._chatter.across(flow, t, x, slope, t1, span.z, self.slope):
+                    return Obstacle("jump")
                 if control.tolerance is not None and halvings == 0:
                     control.accept(h, ratio)
                 control.slow_enough(mode, h)

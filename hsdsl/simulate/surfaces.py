@@ -42,7 +42,7 @@ class Crossing:
 class Obstacle:
     """Why a trial step ends outside the relaxed domain."""
 
-    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping"]
+    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump"]
     surface: int | None = None
 
 
@@ -116,7 +116,9 @@ class Surfaces:
     """A mode's surfaces with what is needed to judge a point.
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
-    ``stood_on``, on which the state stood then, until it has left them.
+    ``stood_on``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
+    state while it waited in a strip, and that the flow leads back through. ``resting`` is the edge on whose guard the
+    state rests, if it does.
     """
 
     kernel: ModeKernel
@@ -124,6 +126,8 @@ class Surfaces:
     scale: State
     arithmetic: Arithmetic
     stood_on: set[int] = field(default_factory=set[int])
+    emerging: set[int] = field(default_factory=set[int])
+    resting: int | None = None
 
     def noise(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
         """Round-off of surface k at a point; where its gradient has no value only the sides count."""
@@ -138,18 +142,30 @@ class Surfaces:
         return roundoff(unit, magnitude, gradient, t, x, scale)
 
     def enter(
-        self, t: Number, x: State, values: Vector, since: Number = 0, inside: frozenset[int] = frozenset()
+        self,
+        t: Number,
+        x: State,
+        values: Vector,
+        since: Number = 0,
+        inside: frozenset[int] = frozenset(),
+        reset_at: Number = None,
     ) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.
 
-        A surface that the flow passes within the time ``since`` counts as stood on; on one ``inside`` as beyond.
+        A surface that the flow passes within the time ``since`` counts as stood on. So does one that the state was not
+        beyond when it was reset, before it waited in a strip. On one ``inside`` counts as beyond.
         """
         beyond: list[int] = []
+        then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)
         for k, r in enumerate(values):
             noise = self.noise(k, t, x, entry=True)
             if since and abs(r) > noise:
                 noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
-            if r > noise or (k in inside and r >= -noise):
+            if r > noise and not then[k] > noise:
+                self.stood_on.add(k)
+                if self.kernel.rates[k](t, *x)[0] < 0:
+                    self.emerging.add(k)
+            elif r > noise or (k in inside and r >= -noise):
                 beyond.append(k)
             elif r >= -noise:
                 self.stood_on.add(k)
@@ -161,9 +177,19 @@ class Surfaces:
         return frozenset(k for k in plain if values[k] < -self.noise(k, t, x))
 
     def leave(self, t: Number, x: State) -> None:
-        """Forget the surfaces that the state stood on and has left inwards."""
+        """Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false."""
         values = self.kernel.surfaces(t, *x)
-        self.stood_on.difference_update([k for k in self.stood_on if values[k] < -self.noise(k, t, x)])
+        self.stood_on.difference_update([k for k in self.stood_on if abs(values[k]) > self.noise(k, t, x)])
+        if self.emerging:
+            inside = [k for k in self.emerging if values[k] <= 0 or not self._falls(k, t, x)]
+            self.emerging.difference_update(inside)
+
+    def _falls(self, k: int, t: Number, x: State) -> bool:
+        """Whether the flow leads back through surface k, as far as is known."""
+        try:
+            return self.kernel.rates[k](t, *x)[0] < 0
+        except DOMAIN_ERRORS:
+            return True
 
     def norm(self, t: Number, x: State, surface: int) -> Number:
         """|grad r| in (t, x)."""
@@ -175,12 +201,16 @@ class Surfaces:
     def standing(self, t: Number, x: State, since: Number) -> list[int]:
         """Edges on whose guards the state stands, with the flow pointing out and `if` true.
 
-        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
+        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that. Of a
+        state at rest only time goes on.
         """
         found: list[int] = []
+        rates = self.kernel.rates if self.resting is None else self.kernel.gradients
         for k in range(len(self.edges)):
+            if k == self.resting:
+                continue
             try:
-                r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
+                r, rate = self.kernel.surfaces(t, *x)[k], rates[k](t, *x)[0]
                 near = abs(r) <= max(self.noise(k, t, x), rate * since)
                 if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)
@@ -230,12 +260,14 @@ class Surfaces:
         noise = {k: self.noise(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
         beyond = [k for k in noise if not values[k] <= noise[k]]
         for k in beyond:
-            if k >= len(self.edges):
+            if k >= len(self.edges) and k not in self.emerging:
                 return Obstacle("wall", k)
-            if not self.edges[k].conditional and (obstacle := self._too_deep(trial, values, noise, k, epsilon)):
+            if not self._transparent(k) and (obstacle := self._too_deep(trial, values, noise, k, epsilon)):
                 return obstacle
         crossings: list[Crossing] = []
         for k in beyond:
+            if k >= len(self.edges):
+                continue
             found = self._crossing(trial, values, noise, k, epsilon)
             if isinstance(found, Obstacle):
                 return found
@@ -272,7 +304,21 @@ class Surfaces:
             return None
         if obstacle := self._too_deep(trial, values, noise, k, epsilon):
             return obstacle
+        if self._deeper_before(trial, piece, theta, k, values[k] + noise[k]):
+            return Obstacle("deep", k)
         return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
+
+    def _transparent(self, k: int) -> bool:
+        """Whether a state may be beyond surface k without having crossed it."""
+        return k in self.emerging or k >= len(self.edges) or self.edges[k].conditional
+
+    def _deeper_before(self, trial: Trial, piece: Polynomial, theta: Number, k: int, end: Number) -> bool:
+        """Whether a step was further beyond surface k between the crossing and its end: the end is on another flank."""
+        for i in range(1, SCAN):
+            s = theta + (1 - theta) * i / SCAN
+            if self.kernel.surfaces(trial.t + s * trial.h, *at(trial.x, piece, s))[k] > end:
+                return True
+        return False
 
     def _inward(self, trial: Trial, found: tuple[Number, Number, State], noise: Number, k: int) -> Number:
         """How far the flow at q would take r back inside over this step; 0 when not beyond round-off."""
@@ -293,7 +339,7 @@ class Surfaces:
 
         theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
         if theta is None:
-            if self.edges[k].conditional and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
+            if self._transparent(k) and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
                 return None
             theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
         if theta == 0:

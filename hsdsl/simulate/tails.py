@@ -54,7 +54,7 @@ def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
         if q is None:
             return here
         limit = here.moved(end, q)
-        if not is_pushed(run, limit, k) or not stays(run, limit, k):
+        if not is_pushed(run, limit, k) or not stays(run, limit, k) or meets_another(here, limit, k):
             return here
         alone = moves_alone(run, limit, k)
     except DOMAIN_ERRORS:
@@ -65,7 +65,21 @@ def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
     notes.replaced(run.recorder, edge, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     mode = run.program.modes.index(here.mode)
-    return run.place(mode, here.mode.states, end, q, here.surfaces.scale, stood_on={k})
+    rest = run.place(mode, here.mode.states, end, q, here.surfaces.scale)
+    rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
+    rest.surfaces.stood_on.add(k)
+    return rest
+
+
+def meets_another(here: Here, limit: Here, k: int) -> bool:
+    """Whether a surface other than k is passed on the way to a limit."""
+    surfaces = here.surfaces
+    before, after = here.kernel.surfaces(here.t, *here.x), here.kernel.surfaces(limit.t, *limit.x)
+    for j, (one, two) in enumerate(zip(before, after, strict=True)):
+        rises = two > surfaces.noise(j, limit.t, limit.x) and not one > surfaces.noise(j, here.t, here.x)
+        if j != k and rises:
+            return True
+    return False
 
 
 def fixed_point(run: Run, here: Here, k: int, t: Number) -> State | None:

@@ -29,6 +29,9 @@ def told(run: Run, number: int, index: int, k: int, count: int, time: float, oth
         notes.at_rest(recorder, mode.edges[k].name, time, other)
     elif kind == "replaced":
         notes.replaced(recorder, mode.edges[k].name, count, time, other)
+    elif kind == "slides":
+        source = run.program.modes[count]
+        return notes.slides(source.edges[k].name, source.name, mode.name, time)
     else:
         return notes.accumulates(recorder, mode.edges[k].name, time, other)
     return None
@@ -48,14 +51,14 @@ def stop(run: Run, desk: Desk, reason: str, made: int) -> Stop:
         return stops.limit(run.settings.max_transitions, t)
     here = _here(run, desk, made)
     if reason == "here not finite":
-        return not_finite(run, here, t, (here.x,))
+        return not_finite(run, here, t, [(t, here.x)])
     if reason == "entered outside":
         return left_domain(here, found.surface, t, "was entered outside it")
     if reason == "left":
         return left_domain(here, found.surface, t, LEFT)
     slope = desk.slope(found.dimension)
     if reason == "step not finite":
-        return not_finite(run, here, t, (here.x, slope))
+        return not_finite(run, here, t, [(t, here.x), (found.h, slope)])
     assert reason == "stuck", reason
     run.control.h = found.h
     surface = None if found.surface < 0 else found.surface

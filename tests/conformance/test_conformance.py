@@ -46,7 +46,7 @@ from hsdsl.simulate.compiled import SCHEMES as COMPILED
 
 HERE = Path(__file__).parent
 CASES = {path.name.removesuffix(".expect.yaml"): path for path in sorted((HERE / "cases").glob("*.expect.yaml"))}
-MEANING = [f"M{k}" for k in range(1, 11)]
+MEANING = [f"M{k}" for k in range(1, 12)]
 SCHEMES = ("relaxed", "located")
 LIMIT = 30  # seconds for one run; most take a thousandth of it
 ENGINES: dict[str, dict[str, Any]] = {"python": {"engine": "python"}} | ({"c": {"engine": "c"}} if COMPILER else {})

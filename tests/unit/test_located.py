@@ -20,8 +20,8 @@ def run(directory: Any, text: str, **more: Any) -> Any:
 
 CHATTER = """
 modes:
-  a: {flow: {x: 1}, transitions: [{when: x >= 0, to: b}]}
-  b: {flow: {x: -1}, transitions: [{when: x <= 0, to: a}]}
+  a: {flow: {x: 1}, transitions: [{when: x >= 1e-5, to: b}]}
+  b: {flow: {x: -1}, transitions: [{when: x <= -1e-5, to: a}]}
 initial: {mode: a, x: -1}
 experiment: {until: 1.1, relaxation: 1e-3}
 """
@@ -33,7 +33,7 @@ def test_strips_open_only_after_sixteen_transitions_within_the_relaxation(method
     delays = [t.resumed - t.time for t in made.transitions if t.resumed is not None]
     assert delays[:16] == [0] * 16
     assert delays[16:] == pytest.approx([1e-3] * len(delays[16:]), abs=1e-12)
-    assert 100 <= len(delays[16:]) <= 101
+    assert 97 <= len(delays[16:]) <= 99  # of 1.02 ms with the way between the surfaces, in the last tenth of a second
     assert made.verdict.theorem == "left" and "in strips" in made.verdict.reasons[0]
 
 

@@ -15,7 +15,7 @@ typedef struct {
   int certain;
 } hs_rise;
 
-/* A walk along surface k; `risen` says that it is above round-off at the end of the step. */
+/* A walk along surface k; `outside` says at first whether it begins beyond round-off, `risen` whether it ends there. */
 typedef struct {
   int k, risen, outside, part;
   double level, at;
@@ -29,8 +29,8 @@ static double *off_of(const hs_curves *curves, int part, int k) { return &curves
 
 static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
 
-static hs_walk begin_walk(const hs_curves *curves, int k, double level, int risen) {
-  const hs_walk walk = {k, risen, coefficients_of(curves, 0, k)[0] > level, 0, level, 0.0};
+static hs_walk begin_walk(int k, double level, int beyond, int risen) {
+  const hs_walk walk = {k, risen, beyond, 0, level, 0.0};
   return walk;
 }
 

@@ -3,7 +3,8 @@
 #define SAFETY 0.9
 #define LEAST 0.2
 #define MOST 5.0
-#define MOST_REJECTIONS 10000
+#define MOST_REJECTIONS 2000
+#define STRETCH 1e-3
 #define BAND_FROM 0.9
 #define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
@@ -79,6 +80,8 @@ static double predicted(hs_control *control, double taken, double ratio) {
 
 static void accept(hs_control *control, double taken, double ratio) {
   control->accepted++;
+  control->stretch = control->stretch + taken;
+  if (control->stretch > control->largest * STRETCH) control->accepted = control->rejected = 0, control->stretch = 0.0;
   const double proposed = taken * (control->implicit ? predicted(control, taken, ratio) : factor(control, ratio));
   control->h = hs_min(control->largest, taken < control->h ? hs_max(proposed, control->h) : proposed);
 }

@@ -24,19 +24,21 @@ static void choose_entry(hs_run *run, const int *beyond, double t) {
 }
 
 /* Enter a mode at (t, run->x), sizes in run->scale, and make the transitions that fire at once.
-   A surface that the flow passes within the time `since` counts as stood on: tied transitions share one point. One of
-   an edge that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
-static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since, int jumped) {
+   A surface that the flow passes within the time `since` counts as stood on: tied transitions share one point. So does
+   one that moved past the state while it waited in a strip, where it was reset before t, at `reset_at`. One of an edge
+   that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
+static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since, int jumped,
+                 double reset_at) {
   hs_here before = run->here;
   forget(&run->task->visited);
-  for (;; from_here = 1, jumped = 0) {
+  for (;; from_here = 1, jumped = 0, reset_at = t) {
     place(run, mode, dimension, t, from_here ? &before : 0);
     before = run->here;
     const hs_mode *table = run->here.table;
     if (table->final) return stopped(run, HS_FINAL, t);
     if (make_room(run)) return stopped(run, HS_INTERRUPTED, t);
     if (visit(&run->task->visited, run->width, mode, run->x, dimension)) return stopped(run, HS_ZENO, t);
-    if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, run->ahead, since, jumped, run->beyond))
+    if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, since, jumped, reset_at))
       return stopped(run, HS_HERE_NOT_FINITE, t);
     if (!all_finite(run->ahead, table->surfaces)) return stopped(run, HS_HERE_NOT_FINITE, t);
     int fires = 0;

@@ -35,13 +35,17 @@
 #include "run.c"
 #include "visited.c"
 #include "entry.c"
+#include "cascade.c"
+#include "chatter.c"
 #include "relaxed.c"
 #include "isolate.c"
 #include "along.c"
 #include "curves.c"
 #include "spans.c"
 #include "rest.c"
+#include "resting.c"
 #include "tails.c"
+#include "touching.c"
 #include "located.c"
 #include "sample.c"
 #include "pack.c"
@@ -107,8 +111,11 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->both = numbers(store, 2 * (int64_t)w);
   run->stood_on = take(store, m, sizeof(int));
   run->beyond = take(store, m, sizeof(int));
+  run->emerging = take(store, m, sizeof(int));
   run->tied = take(store, e, sizeof(int));
   run->alternatives = take(store, e, sizeof(int));
+  run->cascade.x = numbers(store, w);
+  run->source = numbers(store, w);
   run->trial.piece = polynomial(store, run);
   run->cubic = polynomial(store, run);
   run->crossings = take(store, m, sizeof(hs_crossing));
@@ -215,7 +222,7 @@ void hs_simulate(hs_task *task) {
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   for (int i = 0; i < run.model->states; i++) run.known[i] = 0.0;
-  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0);
+  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
   if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else

@@ -99,7 +99,7 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
-typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED } hs_notice;
+typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
 
 /* What a run says besides: see hsdsl/simulate/notes.py. `surface` is an edge where there is no doubt about a surface. */
 typedef struct {
@@ -163,11 +163,13 @@ typedef enum {
   HS_NOT_FINITE,
   HS_ERROR,
   HS_CREEPING,
-  HS_UNSOLVED
+  HS_UNSOLVED,
+  HS_JUMP
 } hs_obstacle;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
-   `slope` is the end of a step along which something has no value, `scales` are those of the states. */
+   `slope` and `h` are the state and time at the end of a step along which something has no value; `scales` are those of
+   the states. */
 typedef struct {
   int32_t reason;
   int32_t mode;

@@ -59,9 +59,9 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   double first, last;
-  if (is_passed_by(run, k)) return 0;
+  if (is_passed_by(run, k)) return touched(run, k, crossing);
   if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t1, run->z, 0, &last)) return RAISED;
-  hs_walk walk = begin_walk(&run->curves, k, hs_max(first, last), run->ends[k] > last);
+  hs_walk walk = begin_walk(k, hs_max(first, last), coefficients_of(&run->curves, 0, k)[0] > first, run->ends[k] > last);
   hs_rise rise;
   while (next_rise(run, &walk, &rise)) {
     if (settled(run, k, &rise, crossing)) return RAISED;
@@ -73,7 +73,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     crossing->depth = 0.0;
     return 1;
   }
-  return 0;
+  return touched(run, k, crossing);
 }
 
 /* The sizes of the numbers behind the chosen crossing's state, to run->landed: the terms of its step and of the one
@@ -159,7 +159,9 @@ static int located_stuck(hs_run *run, hs_obstacle kind) {
 
 static int step_not_finite(hs_run *run) {
   copy(run->task->stop.slope, run->z, run->here.dimension);
-  return stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+  stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+  run->task->stop.h = run->span.t1;
+  return HS_STEP_NOT_FINITE;
 }
 
 /* Go on at the end of the step. */
@@ -175,16 +177,15 @@ HS_INLINE void go_to_end(hs_run *run) {
   run->k[run->method->stages] = run->end;
 }
 
-/* Step until a surface is crossed, or to the segment's end. */
-HS_INLINE int located_flow_in(hs_run *run, const int n) {
+/* Step until a surface is crossed, or to a time in the segment. */
+HS_INLINE int follow(hs_run *run, const int n, double limit) {
   hs_here *const here = &run->here;
-  const double limit = run->task->timeline->end[here->segment];
-  run->sloped = run->creeping = run->has_before = 0;
+  run->sloped = run->creeping = run->has_before = run->chatter = 0;
   run->ratio = 1;
   forget_steps(run);
   while (here->t < limit) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
-    const hs_obstacle obstacle = next_span(run, n, limit);
+    const hs_obstacle obstacle = run->resting < 0 ? next_span(run, n, limit) : next_rest(run, n, limit);
     if (obstacle != HS_CLEAR) return located_stuck(run, obstacle);
     const int event = first_event(run);
     if (event == WITHOUT_VALUE) return step_not_finite(run);
@@ -196,11 +197,30 @@ HS_INLINE int located_flow_in(hs_run *run, const int n) {
   return AT_BOUNDARY;
 }
 
+/* Rest until a surface is crossed, to the segment's end, or until the guard of edge k lets go of the state. */
+static int rest(hs_run *run, int k, double until) {
+  hs_here *const here = &run->here;
+  const double from = here->t;
+  run->resting = k;
+  const int outcome = follow(run, here->dimension, until);
+  note(run, HS_AT_REST, k, 0, from, run->task->now);
+  if (outcome != AT_BOUNDARY || !(until < run->task->timeline->end[here->segment])) return outcome;
+  const int standing_before = here->standing;
+  place(run, here->mode, here->dimension, until, 0);
+  here->standing = standing_before;
+  return GOES_ON;
+}
+
+/* Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state. */
 static int located_flow(hs_run *run) {
+  const double limit = run->task->timeline->end[run->here.segment];
+  const int edge = rests(run);
+  double until;
+  if (edge >= 0 && release(run, edge, &until)) return rest(run, edge, until);
   switch (run->here.dimension) {
-    case 1: return located_flow_in(run, 1);
-    case 2: return located_flow_in(run, 2);
-    default: return located_flow_in(run, run->here.dimension);
+    case 1: return follow(run, 1, limit);
+    case 2: return follow(run, 2, limit);
+    default: return follow(run, run->here.dimension, limit);
   }
 }
 
@@ -229,6 +249,8 @@ static int jump(hs_run *run) {
   const double t = crossing->time, until = run->until;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
+  const double arc_start = run->here.entered_at;
+  const int mode = run->here.mode;
   double resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   const int without_value = reset(run, run->landed);
@@ -253,15 +275,17 @@ static int jump(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0);
-  return entered == GOES_ON ? close_tail(run, k) : entered;
+  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
+  if (entered != GOES_ON) return entered;
+  return returns(run, t > arc_start) ? slides(run, mode, k) : close_tail(run, k);
 }
 
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int located_at_boundary(hs_run *run) {
   const double t = run->here.t;
   if (t < run->until) return go_on(run);
-  const int count = rests(run) >= 0 ? 0 : standing_on(run);
+  run->resting = rests(run);
+  const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
   choose(run, count);
   sizes(run, run->x, run->x);
@@ -271,8 +295,6 @@ static int located_at_boundary(hs_run *run) {
 /* Follow the execution from where the run stands until it stops. */
 static void located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
-    const int edge = run->here.t < run->until ? rests(run) : -1;
-    if (edge >= 0) hold(run, edge);
     if (interrupted(run))
       outcome = stopped(run, HS_INTERRUPTED, run->here.t);
     else

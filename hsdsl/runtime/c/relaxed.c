@@ -60,7 +60,7 @@ static int standing_on(hs_run *run) {
 
 /* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
 static int stuck(hs_run *run, hs_obstacle kind, int surface) {
-  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING;
+  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP;
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
@@ -100,7 +100,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const double limit = run->task->timeline->end[here->segment];
   run->patience.reached = NAN;
-  run->patience.idle = run->patience.creeping = 0;
+  run->patience.idle = run->patience.creeping = run->chatter = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(run);
@@ -146,7 +146,8 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       const hs_obstacle given_up = patience_ends(run, halvings, last.obstacle, last.surface, t1);
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
-    if (here->standing) leave(run, t1, run->z);
+    if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
+    if (here->standing || here->emerging) leave(run, t1, run->z);
     append(run, t1, run->z, curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0);
     here->t = t1;
     swap(&run->x, &run->z);
@@ -173,11 +174,22 @@ static int in_strip(hs_run *run, hs_reason reason, double t) {
   return stopped(run, reason, t);
 }
 
+/* Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest. */
+static int moves_on(hs_run *run, const hs_here *before, int unknown) {
+  const hs_here *here = &run->here;
+  if (before->mode == here->mode) return 0;
+  if (unknown || here->table->flow(here->p, here->t, run->x, run->end)) return 1;
+  if (before->dimension != here->dimension) return 1;
+  for (int s = 0; s < here->dimension; s++) run->flow_sizes[s] = fabs(run->source[s]), run->at[s] = 0.0;
+  return !takes_back(run->source, run->end, run->flow_sizes, run->at, here->dimension);
+}
+
 /* Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14). */
 static int through_strip(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
   const double t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
-  const hs_edge *edge = &run->here.table->edge[crossing->edge];
+  const int k = crossing->edge;
+  const hs_edge *edge = &run->here.table->edge[k];
   if (crossing->theta > 0) append(run, t, crossing->state, &crossing->piece);
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   double resumed = t1 + (run->epsilon - depth);
@@ -195,20 +207,24 @@ static int through_strip(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  return enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0);
+  const hs_here before = run->here;
+  const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
+  const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
+  if (entered != GOES_ON || !returns(run, t > before.entered_at)) return entered;
+  return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 
 /* Enter the next segment of the inputs: anew where one of them jumps. */
 static int go_on(hs_run *run) {
   const double t = run->here.t;
-  const int standing_before = run->here.standing;
+  const hs_here before = run->here;
   const int64_t segment = segment_at(run->task->timeline, t);
   if (run->task->timeline->jump[segment]) {
     if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
-    return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1);
+    return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
   }
   place(run, run->here.mode, run->here.dimension, t, 0);
-  run->here.standing = standing_before;
+  run->here.standing = before.standing, run->here.emerging = before.emerging;
   return GOES_ON;
 }
 

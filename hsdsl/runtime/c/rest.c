@@ -3,8 +3,6 @@
 
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
-#define PARALLEL 1e-6
-#define CORRECTIONS 8
 
 /* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
 static int flow_sizes(hs_run *run, double t, const double *x, const double *slope) {
@@ -92,18 +90,11 @@ static int moves_alone(hs_run *run, double t, const double *x, int k) {
     if (slope[s] != 0) along = along < 0 ? s : along;
   if (along < 0) return 0;
   if (flow_sizes(run, t, x, slope)) return RAISED;
-  const double *const size = run->flow_sizes, small = instant(run, slope);
+  const double small = instant(run, slope);
   for (int s = 0; s < n; s++) ahead[s] = x[s] + small * slope[s];
   if (here->table->edge[k].reset(here->p, t, ahead, back)) return RAISED;
-  for (int s = 0; s < n; s++) {
-    back[s] = back[s] - ahead[s];
-    if (slope[s] != 0 && fabs(slope[s]) / size[s] > fabs(slope[along]) / size[along]) along = s;
-  }
-  const double share = back[along] / slope[along];
-  if (!(share < 0)) return 0;
-  for (int s = 0; s < n; s++)
-    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * size[s] + rest_noise(run, s))) return 0;
-  return 1;
+  for (int s = 0; s < n; s++) back[s] = back[s] - ahead[s], ahead[s] = rest_noise(run, s);
+  return takes_back(slope, back, run->flow_sizes, ahead, n);
 }
 
 /* The edge on whose guard the state rests; -1 where it moves. */
@@ -115,55 +106,4 @@ static int rests(hs_run *run) {
         is_pushed(run, here->t, run->x, k) == 1 && moves_alone(run, here->t, run->x, k) == 1)
       return k;
   return -1;
-}
-
-/* The push of the edge that holds the state, inwards, at the share s of the time that is left. */
-static int inward(hs_run *run, double s, double *value) {
-  const hs_here *here = &run->here;
-  const double span = run->task->timeline->end[here->segment] - here->t;
-  if (push(run, here->t + s * span, run->x, run->held, run->held_order, value)) return RAISED;
-  *value = -*value;
-  return 0;
-}
-
-static int nothing_more(hs_run *run, int k, double *allowed) {
-  (void)run, (void)k;
-  *allowed = 0.0;
-  return 0;
-}
-
-/* When the push falls through zero, isolated on an interpolant over time, then solved on the push itself: 1, or 0. */
-static int released(hs_run *run, double *release) {
-  const double t = run->here.t, span = run->task->timeline->end[run->here.segment] - t;
-  if (interpolated(run, inward, 1, &run->task->interpolation[HS_OVER_TIME], nothing_more, 0, MOST_PIECES, 0))
-    return RAISED;
-  run->bernstein_of = 0;
-  hs_walk walk = begin_walk(&run->curves, 0, 0.0, 0);
-  hs_rise rise;
-  if (!next_rise(run, &walk, &rise)) return 0;
-  double s = rise.share, value;
-  for (int i = 0; i < CORRECTIONS && rise.slope != 0; i++) {
-    if (inward(run, s, &value)) return RAISED;
-    s = hs_min(1.0, hs_max(0.0, s - value / rise.slope));
-  }
-  *release = t + s * span;
-  return 1;
-}
-
-/* Stay at rest on the guard of edge k until the flow no longer pushes out, or to the end of the inputs' segment. */
-static void hold(hs_run *run, int k) {
-  hs_here *const here = &run->here;
-  const double end = run->task->timeline->end[here->segment];
-  double release;
-  run->held = k;
-  run->held_order = push_order(run, here->t, run->x, k);
-  const int found = run->held_order > 0 ? released(run, &release) : RAISED;
-  if (found == RAISED) return;
-  const double until = found ? release : end;
-  append(run, until, run->x, 0);
-  note(run, HS_AT_REST, k, 0, here->t, until);
-  if (found)
-    stand(run, until, k);
-  else
-    here->t = end;
 }

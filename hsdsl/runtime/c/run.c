@@ -34,20 +34,14 @@ static void place(hs_run *run, int mode, int dimension, double t, const hs_here 
     here.outputs = before->table->outputs;
     here.outputs_p = before->p;
   }
-  here.standing = 0;
-  here.t = t;
+  here.standing = here.emerging = 0;
+  here.t = here.entered_at = t;
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
+  run->resting = -1;
   begin(run, HS_FLOW);
   append(run, t, run->x, 0);
   copy(run->entered, run->x, dimension);
-}
-
-/* Be in the same mode later, standing on the surface of edge k alone. */
-static void stand(hs_run *run, double t, int k) {
-  place(run, run->here.mode, run->here.dimension, t, 0);
-  for (int i = 0; i < run->here.table->surfaces; i++) run->stood_on[i] = i == k;
-  run->here.standing = 1;
 }
 
 static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }

@@ -42,8 +42,8 @@ typedef struct {
   const double *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const double *outputs_p;
-  int standing;            /* number of surfaces in stood_on */
-  double t;
+  int standing, emerging;  /* numbers of surfaces in stood_on and in run->emerging */
+  double t, entered_at;
 } hs_here;
 
 /* One step as tried, from (t, x) to (t1, z). */
@@ -66,7 +66,8 @@ typedef struct {
   int order;
   int implicit;
   double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
-  int64_t accepted, rejected;
+  int64_t accepted, rejected; /* in a stretch of time */
+  double stretch;
   double failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
   int closer;       /* whether a look at the flow's round-off let one pass */
 } hs_control;
@@ -106,6 +107,13 @@ typedef struct {
   int mode, edge, target, entry;
 } hs_made;
 
+/* One of the states that transitions without flow between them led to, and how many they were since: room 0 for none. */
+typedef struct {
+  int mode;
+  long length, room;
+  double *x;
+} hs_cascade;
+
 /* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
 typedef struct {
   double low, high, *b;
@@ -117,6 +125,12 @@ typedef struct {
   double *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
+
+/* What holds a state at rest on a window of time: an edge, and the derivative of its surface that does. */
+typedef struct {
+  int edge, order;
+  double start, width;
+} hs_held;
 
 /* One step of the located scheme. */
 typedef struct {
@@ -135,6 +149,8 @@ typedef struct {
   hs_trial trial;
   hs_control control;
   hs_patience patience;
+  hs_cascade cascade;
+  int chatter;
   /* in the workspace, a state's room each unless said otherwise */
   double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
   double *scales, *known; /* of the states here, and of those of all modes before this one was entered */
@@ -146,7 +162,8 @@ typedef struct {
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
-  int *stood_on, *beyond;
+  int *stood_on, *beyond, *emerging;
+  double *source;      /* the flow that led to a transition, or between two states */
   int *tied;           /* one for each edge */
   double *gradient;    /* width + 1 */
   double *both;        /* 2 width: states and sizes */
@@ -169,7 +186,8 @@ typedef struct {
   double *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
   double *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
-  int held, held_order;             /* the edge that holds a state at rest, and the derivative that does */
+  int resting;                      /* the edge on whose guard the state rests, or -1 */
+  hs_held held;
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
   double *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */

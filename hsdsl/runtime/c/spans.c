@@ -24,6 +24,7 @@ static int span_point(hs_run *run, double s, double *time, double **state) {
   *time = s == 1 ? span->t1 : span->t + s * span->h;
   if (s == 1) return copy(*state, run->z, n), 0;
   if (!(s > 0)) return copy(*state, run->x, n), 0;
+  if (run->resting >= 0) return copy(*state, run->x, n), 0;
   if (run->method->kind == HS_TAYLOR) return at(run, &span->piece, s, *state), 0;
   aside(run, state);
   const int status = part_of_step(run, n, span->t, s * span->h);
@@ -41,7 +42,7 @@ static int shorter_piece(hs_run *run, double s, hs_polynomial *piece) {
 /* The interpolant of the states up to the share s of the step, over [0, 1]. */
 static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
   int status = 1;
-  if (run->method->kind != HS_TAYLOR) {
+  if (run->method->kind != HS_TAYLOR && run->resting < 0) {
     aside(run, &run->q);
     status = shorter_piece(run, s, piece);
     aside(run, &run->q);
@@ -122,6 +123,7 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
     run->refused = 0;
     const hs_obstacle tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
+      if (control->tolerance > 0 && chatters(run, n, t1)) return HS_JUMP;
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
       slow_enough(run, h);
       run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;

@@ -79,20 +79,28 @@ static int noise_of(hs_run *run, int k, double t, const double *x, int entry, do
   return 0;
 }
 
-/* Look at the surfaces on entry: mark in `beyond` those the state is beyond, and note those it stands on.
-   A surface that the flow passes within the time `since` counts as stood on; where an input `jumped`, one that `beyond`
+/* Look at the surfaces on entry, whose values are run->ahead: mark in run->beyond those the state is beyond, and note
+   those it stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the
+   state was not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one that run->beyond
    marks as not reached before counts as beyond. */
-static int enter_surfaces(hs_run *run, double t, const double *values, double since, int jumped, int *beyond) {
+static int enter_surfaces(hs_run *run, double t, double since, int jumped, double reset_at) {
+  const double *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
+  int *const beyond = run->beyond;
+  if (reset_at < t && run->here.table->values(run->here.p, reset_at, run->x, run->noise)) return RAISED;
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double noise, rate;
     const int inside = jumped && beyond[k];
-    run->stood_on[k] = beyond[k] = 0;
+    run->stood_on[k] = run->emerging[k] = beyond[k] = 0;
     if (noise_of(run, k, t, run->x, 1, &noise)) return RAISED;
     if (since != 0 && fabs(values[k]) > noise) {
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
     }
-    if (values[k] > noise || (inside && values[k] >= -noise))
+    if (values[k] > noise && !(then[k] > noise)) {
+      run->stood_on[k] = 1, run->here.standing++;
+      if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
+      if (rate < 0) run->emerging[k] = 1, run->here.emerging++;
+    } else if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
     else if (values[k] >= -noise)
       run->stood_on[k] = 1, run->here.standing++;
@@ -114,12 +122,18 @@ static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
   return 0;
 }
 
-/* Forget the surfaces that the state stood on and has left inwards. */
+/* Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false. */
 static void leave(hs_run *run, double t, const double *x) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double r, noise;
     if (!run->stood_on[k] || surface(run, k, t, x, &r) || noise_of(run, k, t, x, 0, &noise)) continue;
-    if (r < -noise) run->stood_on[k] = 0, run->here.standing--;
+    if (fabs(r) > noise) run->stood_on[k] = 0, run->here.standing--;
+  }
+  for (int k = 0; run->here.emerging && k < run->here.table->surfaces; k++) {
+    double r, rate = 0.0;
+    if (!run->emerging[k] || surface(run, k, t, x, &r)) continue;
+    if (!(r <= 0) && (run->here.table->rates[k](run->here.p, t, x, &rate) || rate < 0)) continue;
+    run->emerging[k] = 0, run->here.emerging--;
   }
 }
 
@@ -146,14 +160,23 @@ static int condition(hs_run *run, int k, double t, const double *x) {
   return answer;
 }
 
+/* How fast surface k changes. */
+static int rate_of(hs_run *run, int k, double t, const double *x, double *rate) {
+  if (run->resting < 0) return run->here.table->rates[k](run->here.p, t, x, rate) ? RAISED : 0;
+  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
+  *rate = run->gradient[0];
+  return 0;
+}
+
 /* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
-   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
+   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. Of a state at
+   rest only time goes on. */
 static int standing(hs_run *run, double t, const double *x, double since, int *found) {
   int count = 0;
   for (int k = 0; k < run->here.table->edges; k++) {
     double r, rate, noise;
     found[k] = 0;
-    if (surface(run, k, t, x, &r) || run->here.table->rates[k](run->here.p, t, x, &rate)) continue;
+    if (k == run->resting || surface(run, k, t, x, &r) || rate_of(run, k, t, x, &rate)) continue;
     if (noise_of(run, k, t, x, 0, &noise)) continue;
     if (fabs(r) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1) found[k] = 1, count++;
   }
@@ -278,13 +301,29 @@ static int smallest(hs_run *run, int k, double *small) {
   return 0;
 }
 
+/* Whether a state may be beyond surface k without having crossed it. */
+static int is_transparent(const hs_run *run, int k) {
+  const hs_mode *mode = run->here.table;
+  return run->emerging[k] || k >= mode->edges || mode->edge[k].conditional;
+}
+
+/* Whether a step was further beyond surface k than `end` between the crossing and its end: that is on another flank. */
+static int deeper_before(hs_run *run, const hs_polynomial *piece, double theta, int k, double end) {
+  for (int i = 1; i < SCAN; i++) {
+    double r;
+    if (on_piece(run, piece, k, theta + (1 - theta) * i / SCAN, &r)) return RAISED;
+    if (r > end) return 1;
+  }
+  return 0;
+}
+
 /* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
 static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
   const hs_trial *trial = &run->trial;
   double small, theta, r, noise;
   if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
   if (theta != theta) {
-    if (run->here.table->edge[k].conditional) {
+    if (is_transparent(run, k)) {
       at(run, piece, 0.0, run->at);
       if (surface(run, k, trial->t + 0.0 * trial->h, run->at, &r)) return RAISED;
       if (noise_of(run, k, trial->t, run->x, 0, &noise)) return RAISED;
@@ -341,6 +380,8 @@ static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *cr
   if (status != 1) return status;
   status = too_deep(run, k, values, found);
   if (status) return status == RAISED ? RAISED : 0;
+  status = deeper_before(run, piece, crossing->theta, k, values[k] + run->noise[k]);
+  if (status) return status == RAISED ? RAISED : (*found = obstacle(HS_DEEP, k), 0);
   crossing->edge = k;
   crossing->depth = hs_min(run->epsilon, values[k] / norm);
   shortened(run, piece, crossing->theta, &crossing->piece);
@@ -356,8 +397,8 @@ static int judge(hs_run *run, const double *values, hs_found *found) {
     if (!(values[k] <= 0) && noise_of(run, k, run->trial.t1, run->z, 0, &run->noise[k])) return RAISED;
   for (int k = 0; k < mode->surfaces; k++) {
     if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    if (k >= mode->edges) return *found = obstacle(HS_WALL, k), 0;
-    if (mode->edge[k].conditional) continue;
+    if (k >= mode->edges && !run->emerging[k]) return *found = obstacle(HS_WALL, k), 0;
+    if (is_transparent(run, k)) continue;
     const int status = too_deep(run, k, values, found);
     if (status) return status == RAISED ? RAISED : 0;
   }

@@ -49,6 +49,21 @@ static int fixed_point(hs_run *run, int k, double t) {
   return !(fabs(r) > noise);
 }
 
+/* Whether a surface other than k is passed on the way from x to a limit q: 1, 0 or RAISED. */
+static int meets_another(hs_run *run, double t, const double *x, double end, const double *q, int k) {
+  const hs_here *here = &run->here;
+  const int m = here->table->surfaces;
+  if (here->table->values(here->p, t, x, run->ahead) || here->table->values(here->p, end, q, run->ends)) return RAISED;
+  for (int j = 0; j < m; j++) {
+    double noise, before;
+    if (noise_of(run, j, end, q, 0, &noise)) return RAISED;
+    if (!(run->ends[j] > noise)) continue;
+    if (noise_of(run, j, t, x, 0, &before)) return RAISED;
+    if (j != k && !(run->ahead[j] > before)) return 1;
+  }
+  return 0;
+}
+
 /* Go to the limit of a tail of edge k that is nearly over; stop at one where more than the impacts goes on. */
 static int close_tail(hs_run *run, int k) {
   hs_here *const here = &run->here;
@@ -59,6 +74,7 @@ static int close_tail(hs_run *run, int k) {
   if (left > run->epsilon || end > run->task->timeline->end[here->segment]) return GOES_ON;
   double *const q = run->z;
   if (fixed_point(run, k, end) != 1 || is_pushed(run, end, q, k) != 1 || stays(run, end, q, k) != 1) return GOES_ON;
+  if (meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
   const int alone = moves_alone(run, end, q, k);
   if (alone == RAISED) return GOES_ON;
   if (!alone) {
@@ -69,6 +85,9 @@ static int close_tail(hs_run *run, int k) {
   secant(run, &run->cubic);
   append(run, end, q, &run->cubic);
   swap(&run->x, &run->z);
-  stand(run, end, k);
+  place(run, here->mode, here->dimension, end, 0);
+  here->table->values(here->p, end, run->x, run->ahead);
+  enter_surfaces(run, end, 0.0, 0, end);
+  if (!run->stood_on[k]) run->stood_on[k] = 1, here->standing++;
   return GOES_ON;
 }

@@ -1,0 +1,38 @@
+/* Transitions that follow each other without any flow between them. See hsdsl/simulate/cascade.py. */
+
+#define PARALLEL 1e-6
+
+/* Count a transition that led to run->x of the present mode, after some flow or none; say whether one of the same
+   cascade has led there before (Brent's algorithm). */
+static int returns(hs_run *run, int flowed) {
+  hs_cascade *const cascade = &run->cascade;
+  const int n = run->here.dimension, mode = run->here.mode;
+  if (!flowed && cascade->room) {
+    if (mode == cascade->mode && same_state(run->x, cascade->x, n)) return 1;
+    if (++cascade->length != cascade->room) return 0;
+  }
+  cascade->room = flowed || !cascade->room ? 1 : 2 * cascade->room;
+  cascade->length = 0;
+  cascade->mode = mode;
+  copy(cascade->x, run->x, n);
+  return 0;
+}
+
+/* Whether one direction is opposite to another that is not zero, relative to each component's size. */
+static int takes_back(const double *slope, const double *back, const double *size, const double *noise, int n) {
+  int along = -1;
+  for (int s = 0; s < n; s++)
+    if (slope[s] != 0 && (along < 0 || fabs(slope[s]) / size[s] > fabs(slope[along]) / size[along])) along = s;
+  if (along < 0) return 0;
+  const double share = back[along] / slope[along];
+  if (!(share < 0)) return 0;
+  for (int s = 0; s < n; s++)
+    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * size[s] + noise[s])) return 0;
+  return 1;
+}
+
+/* Stop where a cascade has returned, after edge k of a mode. */
+static int slides(hs_run *run, int mode, int k) {
+  note(run, HS_SLIDES, k, mode, run->here.t, run->here.t);
+  return stopped(run, HS_ACCUMULATED, run->here.t);
+}

@@ -1,0 +1,55 @@
+"""Guards that are reached tangentially, at the edge of what the flow is defined for: tanks that empty."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import pytest
+from engines import assert_engines_agree, needs_compiler
+
+import hsdsl
+
+METHODS = {"taylor": 1e-9, "dopri5": 1e-5, "dop853": 1e-5, "radau": 1e-5, "auto": 1e-5}  # relative to the time
+
+TANK = """hsdsl: 1
+parameters: {c: 0.7, full: 1}
+modes:
+  a: {flow: {h: -c*sqrt(h), out: c*sqrt(h)}, transitions: [{when: h <= 0, to: e}]}
+  e: {flow: {h: 0, out: 0}}
+initial: {mode: a, h: full, out: 0}
+experiment: {until: 3.7*sqrt(full)/c}
+"""
+
+
+def tank(directory: Any) -> Any:
+    path = directory / "tank.yaml"
+    path.write_text(TANK)
+    return hsdsl.load(path)
+
+
+@pytest.mark.parametrize(("c", "full"), [(0.7, 1), (0.31, 900), (20, 5)])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_tank_empties(method: str, c: float, full: float, tmp_path: Any) -> None:
+    run = tank(tmp_path).simulate(method=method, parameters={"c": c, "full": full}, engine="python")
+    (made,) = run.transitions
+    assert made.time == pytest.approx(2 * sqrt(full) / c, rel=METHODS[method])
+    assert run.final.state["out"] == pytest.approx(full, abs=1e-6)
+    assert len(run.times) < 2000
+
+
+@needs_compiler
+def test_engines_agree_on_it(tmp_path: Any) -> None:
+    for method in METHODS:
+        assert_engines_agree(tank(tmp_path), method=method)
+
+
+def test_what_only_comes_near_is_not_empty(tmp_path: Any) -> None:
+    """H' = 1e-3 - sqrt(h) runs to h = 1e-6 and stays there."""
+    path = tmp_path / "model.yaml"
+    path.write_text(
+        "hsdsl: 1\nmodes: {a: {flow: {h: 1e-3 - sqrt(h)}, transitions: [{when: h <= 0, to: e}]}, e: {flow: {h: 0}}}\n"
+        "initial: {mode: a, h: 1}\nexperiment: {until: 4}\n"
+    )
+    for method in ("taylor", "dopri5", "radau"):
+        assert hsdsl.load(path).simulate(method=method).transitions == ()
