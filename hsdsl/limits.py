@@ -25,6 +25,8 @@ class Limits:
         Modes, and entries of any other mapping.
     seconds : float
         Processor time for the symbolic work on the whole file, once to read it and once to lower it.
+    compile : float
+        Seconds for the C compiler to make one library.
     folders : tuple of Path
         Where data files may lie besides the model's own folder.
     """
@@ -33,6 +35,7 @@ class Limits:
     values: int = 200_000
     modes: int = 10_000
     seconds: float = 60.0
+    compile: float = 60.0
     folders: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:

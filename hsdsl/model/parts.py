@@ -20,6 +20,7 @@ from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.settings import arithmetic_of, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
+from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, prepare
 from hsdsl.simulate.timeline import make_timeline
@@ -73,7 +74,7 @@ class Parts:
             self.program = program
         self._limits, self._key, self._left_out = limits, key, left_out
         self.seconds = {"load": load_seconds, "compile": 0.0}
-        self._compiled: CompiledModel | None = None
+        self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
 
     @cached_property
@@ -128,11 +129,18 @@ class Parts:
         return Values(lambda: self.system, program, self.kernels[arithmetic.digits])
 
     def _compile(self) -> CompiledModel:
+        """Compile the model, once: what failed is not tried again."""
         if self._compiled is None:
             program = self.program
             began = time.perf_counter()
-            self._compiled = CompiledModel(program)
+            try:
+                with applied(self._limits):
+                    self._compiled = CompiledModel(program)
+            except NoCompiler as error:
+                self._compiled = error
             self.seconds["compile"] += time.perf_counter() - began
+        if isinstance(self._compiled, NoCompiler):
+            raise self._compiled
         return self._compiled
 
     def prepare(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
+from contextvars import copy_context
 from threading import Lock, Thread
 from typing import Any
 
@@ -29,6 +30,7 @@ SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Dou
 
 
 MODEL: Effort = "-O2"
+SYMBOL = "hs_the_model"
 
 Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
 _loaded: dict[Parts, ctypes.CDLL] = {}
@@ -48,7 +50,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
     parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
     with _loading:  # another thread may be at it: see `begin`
         if parts not in _loaded:
-            library = load(_text(parts), lambda: _text(parts), _effort(parts))
+            library = load(_text(parts), "hs_simulate", lambda: _text(parts), _effort(parts))
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
             library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -68,7 +70,7 @@ def begin(scheme: str, method: str) -> None:
     with suppress(NoCompiler):
         parts = _parts(scheme, method)
         if not is_kept(_text(parts), _effort(parts)):
-            Thread(target=compile_runtime, daemon=True).start()
+            Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
 
 
 def _parts(scheme: str, method: str) -> Parts:
@@ -97,8 +99,8 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
-        self._library = load(repr((sizes, program.modes)), lambda: _source(program), MODEL)
-        self.table = tables.Model.in_dll(self._library, "hs_the_model")
+        self._library = load(repr((sizes, program.modes)), SYMBOL, lambda: _source(program), MODEL)
+        self.table = tables.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
 
     def workspace(self, method: tables.Method, scheme: str) -> int:
