@@ -78,14 +78,14 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     OSError
         The folder is refused or cannot be written.
     """
-    import secrets
+    from hsdsl.unfinished import part_in
 
     if refusal := private(folder()):
         raise PermissionError(refusal)
     entry = folder() / kind / key
     entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    part = entry.parent / f"{secrets.token_hex(8)}.part"  # beside the entry, which another process may prune
-    try:
+    with part_in(entry.parent) as (part, descriptor):  # beside the entry, which another process may prune
+        os.close(descriptor)
         write(part)
         path = entry / f"{_checksum(part.read_bytes())}{suffix}"
         entry.mkdir(mode=0o700, exist_ok=True)
@@ -93,8 +93,6 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
         for other in entry.iterdir():
             if other != path and other.suffix != ".part":
                 other.unlink(missing_ok=True)
-    finally:
-        part.unlink(missing_ok=True)
     _prune(folder() / kind)
     return path
 

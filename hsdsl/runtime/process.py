@@ -15,6 +15,8 @@ from pathlib import Path
 from threading import Thread
 from typing import IO
 
+from hsdsl import interrupts
+
 PATIENCE = 5.0  # seconds without a question
 MOST_SAID = 1 << 16  # bytes that are kept of what a command says
 _running: dict[subprocess.Popen[bytes], Path] = {}
@@ -101,3 +103,6 @@ def end_all() -> None:
         with suppress(OSError):
             _end(process)
         shutil.rmtree(folder, ignore_errors=True)
+
+
+interrupts.before_leaving.append(end_all)

@@ -17,6 +17,7 @@ from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
 from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
+from hsdsl.interrupts import Noted
 from hsdsl.program import Program
 from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
@@ -27,7 +28,6 @@ from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
-from hsdsl.simulate.interrupt import Noted
 from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.errors import UsageError
+from hsdsl.unfinished import part_in
 
 
 @contextmanager
@@ -28,23 +28,16 @@ def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO, None, None]:
     target = Path(os.path.realpath(path))
     try:
         _refuse_special(target, path)
-        beside = target.with_name(f".hsdsl-{secrets.token_hex(6)}.part")
-        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-    except OSError as error:
-        raise UsageError(_sentence(path, target, error)) from None
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        with suppress(FileNotFoundError):
-            os.chmod(beside, stat.S_IMODE(target.stat().st_mode))
-        os.replace(beside, target)
+        with part_in(target.parent) as (beside, descriptor):
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            with suppress(FileNotFoundError):
+                os.chmod(beside, stat.S_IMODE(target.stat().st_mode))
+            os.replace(beside, target)
     except OSError as error:
         raise UsageError(_sentence(path, target, error)) from error
-    finally:
-        with suppress(FileNotFoundError):
-            beside.unlink()
 
 
 def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:

@@ -36,7 +36,7 @@ print([name for name in sys.argv[2:] if name in sys.modules])
 """
 LIGHT_COMMAND = """
 import sys
-from hsdsl.cli import app
+from hsdsl.cli.verbs import app
 app(["run", sys.argv[1], "--json"], standalone_mode=False)
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
@@ -103,6 +103,13 @@ def test_compiled_code_is_kept_and_made_again_where_damaged(monkeypatch: pytest.
     kept.write_bytes(b"no library")
     assert CompiledKernel(program, CompiledModel(program)).arithmetic is FLOAT64
     assert len(made) == 2
+
+
+def test_what_a_killed_process_left_goes_with_the_next_entry(folder: Path) -> None:
+    cache.keep("kind", "key", ".txt", lambda target: open(target, "w").close())
+    (folder / "kind" / ".hsdsl-0123.part").write_text("half")
+    cache.keep("kind", "other", ".txt", lambda target: open(target, "w").close())
+    assert sorted(path.name for path in (folder / "kind").iterdir()) == ["key", "other"]
 
 
 @needs_compiler
