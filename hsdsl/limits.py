@@ -25,6 +25,8 @@ class Limits:
         Modes, and entries of any other mapping.
     seconds : float
         Processor time for the symbolic work on the whole file, once to read it and once to lower it.
+    memory : int
+        Bytes of the rows that a run keeps, and of samples.
     compile : float
         Seconds for the C compiler to make one library.
     folders : tuple of Path
@@ -35,6 +37,7 @@ class Limits:
     values: int = 200_000
     modes: int = 10_000
     seconds: float = 60.0
+    memory: int = 1 << 31
     compile: float = 60.0
     folders: tuple[Path, ...] = ()
 

@@ -31,6 +31,9 @@ def main() -> None:
         code = WRONG_USAGE
         _drop_output()
         print(f"hsdsl: the answer cannot be written: {error.strerror or error}", file=sys.stderr)
+    except MemoryError:
+        code = WRONG_USAGE
+        print("hsdsl: there is not enough memory for this", file=sys.stderr)
     except KeyboardInterrupt:
         code = interrupts.INTERRUPTED
     sys.exit(code)

@@ -23,6 +23,7 @@ from hsdsl.model.instances import (
     split,
 )
 from hsdsl.model.requests import KEYS
+from hsdsl.model.settings import check_memory
 from hsdsl.model.values import Values
 from hsdsl.model.workers import Progress, run_compiled, run_in_turn
 from hsdsl.names import did_you_mean
@@ -73,6 +74,11 @@ class Asked:
         """What the single run of one instance is asked for."""
         own = [{name: float(a[index]) for name, a in self.arrays(initial).items()} for initial in (False, True)]
         return self.call | {"parameters": self.parameters | own[0], "initial": self.initial | own[1]}
+
+    @property
+    def sample_count(self) -> int:
+        """How many samples are taken of each instance."""
+        return self.samples if isinstance(self.samples, int) else 0 if self.samples is None else len(self.samples)
 
     def times(self, until: Array) -> Array:
         """The sample times of every instance, shape (instances, samples)."""
@@ -201,6 +207,8 @@ def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Pre
         why = next(iter(columns.refused.values()), "there is none")
         raise UsageError(f"no instance of the ensemble can be run: {why}")
     base = prepare(asked.single(first))
+    kept = 2 * len(base.states) + asked.transition_times + asked.sample_count * (1 + len(model.columns))
+    check_memory(base.settings.memory, columns.count, "instances", kept)
     start = initial_rows(columns, base.states, asked.initial, asked.arrays(initial=True))
     settings = settings_rows(columns, base.settings, request)
     places = [k for k in range(columns.count) if k not in columns.refused]

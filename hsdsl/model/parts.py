@@ -156,7 +156,8 @@ class Parts:
         request = self.resolve(settings, asked)
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
-        chosen = settings_of(request, values)
+        with applied(self._limits):
+            chosen = settings_of(request, values)
         mode, states, x = initial_state(values, initial)
         if request.method is None:
             from hsdsl.model.mechanical import one_stop

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators import Method
+from hsdsl.limits import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Settings:
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
+    ``memory`` is how many bytes of rows a run may keep.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -45,6 +47,7 @@ class Settings:
     samples: int | tuple[Number, ...] | None = None
     one_stop: OneStop | None = None
     method_chosen: str | None = None
+    memory: int = DEFAULT.memory
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):
