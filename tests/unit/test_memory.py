@@ -88,7 +88,7 @@ def test_samples_that_would_fill_the_memory_are_refused():
             model.simulate(samples=samples)
         with pytest.raises(UsageError, match="limit 'memory'"):
             model.ensemble(samples=samples)
-    assert model.simulate(samples=100).stop.complete
+    assert model.simulate(samples=100, until=1).stop.complete
     with pytest.raises(UsageError, match="limit 'memory'"):
         model.ensemble(parameters={"c": [0.5] * 1000}, transition_times=10**6)
 
