@@ -10,7 +10,19 @@ from typing import Any
 import click
 from click.exceptions import Exit
 
-NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "click", "matplotlib")
+NEEDED = (
+    "pyyaml",
+    "pydantic",
+    "sympy",
+    "mpmath",
+    "numpy",
+    "click",
+    "matplotlib",
+    "scipy",
+    "clarabel",
+    "pint",
+    "threadpoolctl",
+)
 OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
 
 

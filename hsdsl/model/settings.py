@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from operator import index
+from typing import Any, SupportsIndex
+
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
@@ -79,6 +82,21 @@ def _sampled(asked: Asked, values: Values) -> int | tuple[Number, ...]:
     if values.has("sample_times"):
         return values.constant("sample_times")
     return samples(values, values.constant("sample_count")[0])
+
+
+def whole(value: Any, name: str, least: int) -> int:
+    """Return an argument that must be a whole number.
+
+    Raises
+    ------
+    UsageError
+        It is none, or below ``least``.
+    """
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise UsageError(f"{name} must be a whole number, not {value!r}")
+    if index(value) < least:
+        raise UsageError(f"{name} must be at least {least}, not {value}")
+    return index(value)
 
 
 def check_memory(most: int, count: int, what: str, columns: int) -> None:

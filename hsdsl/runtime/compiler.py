@@ -37,6 +37,10 @@ class NoCompiler(Exception):
     """There is no C compiler, or it does not do its work; the message says which."""
 
 
+class TooSlow(NoCompiler):
+    """The compiler takes more time than it may."""
+
+
 @dataclass(frozen=True)
 class Compiler:
     """A command that compiles C, and what tells it from another one."""
@@ -65,7 +69,7 @@ class Compiler:
             raise NoCompiler(f"{self} cannot be run: {error.strerror}") from None
         if done.code is None:
             slow = f"{self} takes more than {seconds:g} s; --limit compile={10 * seconds:g} allows more"
-            raise NoCompiler(slow if _responding.get(self, True) else self._endless())
+            raise TooSlow(slow) if _responding.get(self, True) else NoCompiler(self._endless())
         if done.code:
             raise NoCompiler(f"{self} failed: {_complaint(done, target.parent)}")
         if not target.is_file():

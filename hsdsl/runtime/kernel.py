@@ -18,7 +18,7 @@ from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import tables
-from hsdsl.runtime.compiler import Effort, NoCompiler
+from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
 from hsdsl.runtime.library import is_kept, load
 
 Address = int | None
@@ -29,7 +29,7 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-MODEL: Effort = "-O2"
+LARGE = 1 << 17  # characters of a program
 SYMBOL = "hs_the_model"
 
 Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
@@ -99,7 +99,11 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         sizes = len(program.parameters), len(program.inputs), len(program.outputs), program.initial_states
-        self._library = load(repr((sizes, program.modes)), SYMBOL, lambda: _source(program), MODEL)
+        content = repr((sizes, program.modes))
+        try:
+            self._library = load(content, SYMBOL, lambda: _source(program), _model_effort(content))
+        except TooSlow as error:
+            raise NoCompiler(f"{error}; {_longest(program)}") from None
         self.table = tables.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
 
@@ -116,6 +120,23 @@ class CompiledModel:
 def runtime_of(method: tables.Method, scheme: str) -> ctypes.CDLL:
     """The runtime that has a method and a scheme; what runs there leaves the interpreter free meanwhile."""
     return runtime(scheme, tables.METHOD_KINDS[int(method.kind)])
+
+
+def _model_effort(content: str) -> Effort:
+    """Of a large model -O2 takes several times as long as -O1, and few runs are long enough to win that back."""
+    return "-O1" if len(content) > LARGE else "-O2"
+
+
+def _longest(program: Program) -> str:
+    """Say where most of the work of a model is."""
+    flows = (
+        (text, f"the flow of {state} in mode {mode.name}")
+        for mode in program.modes
+        for state, text in zip(mode.states, mode.flow_texts, strict=True)
+    )
+    guards = ((edge.text, f"the guard of {edge.name}") for mode in program.modes for edge in mode.edges)
+    text, where = max((*flows, *guards), key=lambda pair: len(pair[0]), default=("", "none"))
+    return f"the longest expression is {where}, with {len(text):,} characters"
 
 
 def _source(program: Program) -> str:
