@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
+from time import monotonic
 from typing import IO
 
 from hsdsl import interrupts
@@ -60,7 +61,7 @@ def run(command: Sequence[str], folder: Path, seconds: float, responds: Callable
     listener = Thread(target=_listen, args=(process.stderr, said), daemon=True)
     listener.start()
     try:
-        code = _wait(process, seconds, responds)
+        code = _wait(process, listener, seconds, responds)
     finally:
         _end(process)
         del _running[process]
@@ -68,12 +69,18 @@ def run(command: Sequence[str], folder: Path, seconds: float, responds: Callable
     return Done(code, b"".join(said).decode(errors="replace"))
 
 
-def _wait(process: subprocess.Popen[bytes], seconds: float, responds: Callable[[], bool]) -> int | None:
-    with suppress(subprocess.TimeoutExpired):
-        return process.wait(min(seconds, PATIENCE))
-    if seconds > PATIENCE and responds():
+def _wait(
+    process: subprocess.Popen[bytes], listener: Thread, seconds: float, responds: Callable[[], bool]
+) -> int | None:
+    """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
+    first = min(seconds, PATIENCE)
+    for patience in (first, seconds - first):
+        end = monotonic() + patience
+        listener.join(patience)
         with suppress(subprocess.TimeoutExpired):
-            return process.wait(seconds - PATIENCE)
+            return process.wait(max(0.0, end - monotonic()))
+        if seconds <= first or not responds():
+            break
     return None
 
 

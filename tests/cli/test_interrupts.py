@@ -16,7 +16,14 @@ from signals import interruptible
 
 MODELS = Path(__file__).parents[2] / "models"
 BALL = str(MODELS / "bouncing-ball.yaml")
-START = "from hsdsl.cli import main\nimport os\nos.write(1, b'.')\nmain()"
+START = """
+import os
+from hsdsl import interrupts
+interrupts.expect()
+os.write(1, b".")
+from hsdsl.cli import main
+main()
+"""
 COMMANDS = {
     "run": ["run", BALL, "--engine", "python", "--json"],
     "plot": ["run", BALL, "--engine", "python", "--out", "run.csv", "--plot", "run.png", "--json"],
