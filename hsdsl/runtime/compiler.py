@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hsdsl.runtime.process import Done
 
 NAMES = ("cc", "gcc", "clang")
+TRIAL = 5.0  # seconds for an empty function, which takes a hundredth of them
 Effort = Literal["-O1", "-O2"]
 EXACT = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
 FLAGS = (
@@ -94,7 +95,7 @@ def _responds(compiler: Compiler) -> bool:
             source = folder / "empty.c"
             source.write_text("void hs_empty(void) {}\n")
             command = [*compiler.command, "-c", "-o", str(folder / "empty.o"), str(source)]
-            _responding[compiler] = process.run(command, folder, process.PATIENCE, lambda: False).code is not None
+            _responding[compiler] = process.run(command, folder, TRIAL, lambda: True).code is not None
     return _responding[compiler]
 
 

@@ -52,6 +52,7 @@ def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Nothing is compiled, nothing has been said, and a compiler has a second."""
     monkeypatch.setattr(kernel, "_loaded", {})
     monkeypatch.setattr(process, "PATIENCE", 1.0)
+    monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
@@ -85,8 +86,10 @@ def assert_python_runs_with_one_remark(said: str, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize("fault", FAULTY)
-def test_a_faulty_compiler(fault: str, use, capsys, tmp_path: Path) -> None:
+def test_a_faulty_compiler(fault: str, use, capsys, monkeypatch, tmp_path: Path) -> None:
     script, said = FAULTY[fault]
+    if said == "does not end":
+        monkeypatch.setattr(compiler, "TRIAL", 1.0)
     use(script)
     assert_python_runs_with_one_remark(said, capsys)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith("hsdsl-")]
@@ -104,7 +107,8 @@ def test_a_file_that_is_no_program(use, capsys) -> None:
     assert_python_runs_with_one_remark("is no command here", capsys)
 
 
-def test_all_that_a_compiler_started_ends_with_it(use, tmp_path: Path) -> None:
+def test_all_that_a_compiler_started_ends_with_it(use, monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(compiler, "TRIAL", 1.0)
     use(f"sleep 600 & echo $! >> {tmp_path}/children; wait")
     assert hsdsl.load(MODEL).simulate().engine == "python"
     for child in (tmp_path / "children").read_text().split():
