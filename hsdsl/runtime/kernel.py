@@ -157,6 +157,10 @@ class CompiledKernel:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         return self._python.constant(name, parameters)
 
+    def has_constant(self, name: str) -> bool:
+        """Whether the program gives this constant."""
+        return self._python.has_constant(name)
+
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
         return self._python.expressions(mode, data)

@@ -40,7 +40,7 @@ SCOPE = Scope(
 )
 # all that generated text may consist of, besides numbers and punctuation
 _GENERATED = re.compile(
-    r"def|return|bind|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
+    r"def|return|bind|given|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
     r"|flow|surfaces|magnitudes|outputs|(?:gradient|rate|reset|spread|expression|parameter|minimum|maximum|input)_\d+"
     r"|condition_\d+_\d+|initial|until|step|tolerance|relaxation|max_transitions|sample_times|sample_count"
     r"|[xpabcsvwg]\d+|q_m?\d+_\d+"

@@ -62,7 +62,7 @@ def test_memory_that_is_refused_by_the_system_ends_a_run_as_well(monkeypatch):
 
     def empty(*arguments, **named):
         opened.append(arguments)
-        if len(opened) == 100:
+        if len(opened) == 40:
             raise MemoryError
         return original(*arguments, **named)
 
