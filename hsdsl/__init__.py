@@ -12,12 +12,14 @@ Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013)
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # that of `typing` would have it imported before the command line expects Ctrl-C
 
 __version__ = "0.1.0"
 __all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__version__", "distance", "load", "loads"]
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from hsdsl.errors import ModelError, UsageError
     from hsdsl.execution import Execution
     from hsdsl.limits import Limits

@@ -110,13 +110,13 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     OSError
         The folder is refused or cannot be written.
     """
-    import secrets
+    from hsdsl.unfinished import part_in
 
     entry = folder() / kind / key
     if refusal := private(folder()) or private(entry.parent):
         raise PermissionError(refusal)
-    part = entry.parent / f"{secrets.token_hex(8)}.part"  # beside the entry, which another process may prune
-    try:
+    with part_in(entry.parent) as (part, descriptor):  # beside the entry, which another process may prune
+        os.close(descriptor)
         write(part)
         part.chmod(0o600)
         path = entry / f"{_checksum(part.read_bytes())}{suffix}"
@@ -126,8 +126,6 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
         for other in entry.iterdir():
             if other != path and other.suffix != ".part":
                 other.unlink(missing_ok=True)
-    finally:
-        part.unlink(missing_ok=True)
     _prune(folder() / kind)
     return path
 

@@ -27,6 +27,10 @@ class Limits:
         Processor time for the symbolic work on the whole file, once to read it and once to lower it.
     switches : int
         How often each floor, sign, abs, min, max and atan2 of time may switch in a run.
+    memory : int
+        Bytes of the rows that a run keeps, and of samples.
+    compile : float
+        Seconds for the C compiler to make one library.
     folders : tuple of Path
         Where data files may lie besides the model's own folder.
     """
@@ -36,6 +40,8 @@ class Limits:
     modes: int = 10_000
     seconds: float = 60.0
     switches: int = 100_000
+    memory: int = 1 << 31
+    compile: float = 60.0
     folders: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:

@@ -120,6 +120,17 @@ class EdgeProgram:
 
 
 @dataclass(frozen=True)
+class Jacobian:
+    """Derivatives of a mode's flow by its states: of n * n, row by row, those that are not zero everywhere.
+
+    ``routines`` has one routine, ``jacobian``, called like those of a mode; its values stand at ``places``, in order.
+    """
+
+    routines: Routines
+    places: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class ModeProgram:
     """A mode: what is known of it without numbers, and its routines.
 
@@ -139,8 +150,7 @@ class ModeProgram:
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
-    ``jacobian`` has one routine, ``jacobian``, called like the others: the n * n derivatives of the flow by the states,
-    row by row. It stands apart because only implicit methods ask for it.
+    ``jacobian`` gives the derivatives of the flow by the states; it stands apart, as only implicit methods need it.
 
     ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
     everywhere.
@@ -160,7 +170,7 @@ class ModeProgram:
     flow_texts: tuple[str, ...]
     routines: Routines
     affine: bool
-    jacobian: Routines
+    jacobian: Jacobian
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines

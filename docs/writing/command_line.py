@@ -7,7 +7,7 @@ from typing import Any
 import click
 from writing.markdown import table
 
-from hsdsl import cli
+from hsdsl.cli import verbs
 
 COMMAND_LINE = """# Command line
 
@@ -27,9 +27,9 @@ Answers go to standard output, messages and progress to standard error.
 def command_line() -> str:
     """Document every verb and option from the program itself."""
     parts = [COMMAND_LINE]
-    context = click.Context(cli.app)
-    for name in cli.VERBS:
-        command: Any = cli.app.get_command(context, name)
+    context = click.Context(verbs.app)
+    for name in verbs.VERBS:
+        command: Any = verbs.app.get_command(context, name)
         parts.append(f"## hsdsl {name}\n\n{(command.help or '').strip()}\n\n")
         parameters = [p for p in command.params if p.name != "help"]
         rows = [(as_typed(p), (getattr(p, "help", None) or "").strip()) for p in parameters]

@@ -77,6 +77,10 @@ class PythonKernel:
             self._switches[arithmetic.name] = compile_routines(routines, arithmetic, "switches")
         return dict(zip(routines.names, self._switches[arithmetic.name](*data), strict=True))
 
+    def has_constant(self, name: str) -> bool:
+        """Whether the program gives this constant."""
+        return name in self._constants
+
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""
         routines = self._program.modes[mode].routines
@@ -110,16 +114,32 @@ class PythonKernel:
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states; compiled when they are first asked for."""
+        program = self._program.modes[mode]
         if mode not in self._jacobians:
-            text = self._program.modes[mode].jacobian
+            text = program.jacobian.routines
             self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
-        return self._jacobians[mode](*data)[0]
+        size = len(program.states) ** 2
+        return _spread_out(self._jacobians[mode](*data)[0], program.jacobian.places, size, self.arithmetic.zero)
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
         program = self._program.modes[mode]
         functions = compile_routines(program.diagnosis, self.arithmetic, f"expressions of mode {mode}")(*data)
         return tuple(zip(program.expressions, functions, strict=True))
+
+
+def _spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number) -> Routine:
+    """Put a routine's values in their places among zeros."""
+    if len(places) == size:
+        return routine
+
+    def spread(*arguments: Number) -> Vector:
+        whole = [zero] * size
+        for place, value in zip(places, routine(*arguments), strict=True):
+            whole[place] = value
+        return tuple(whole)
+
+    return spread
 
 
 PLAIN = ("flow", "surfaces", "magnitudes", "outputs")

@@ -10,8 +10,20 @@ from typing import Any
 import click
 from click.exceptions import Exit
 
-NEEDED = ("pyyaml", "pydantic", "sympy", "mpmath", "numpy", "click", "matplotlib")
-OPTIONAL = {"pandas": "data frames", "pyarrow": "Parquet files"}
+NEEDED = (
+    "pyyaml",
+    "pydantic",
+    "sympy",
+    "mpmath",
+    "numpy",
+    "click",
+    "matplotlib",
+    "scipy",
+    "clarabel",
+    "pint",
+    "threadpoolctl",
+)
+OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
 
 
 @click.command()

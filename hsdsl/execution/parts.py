@@ -62,6 +62,7 @@ REASONS = (
     "left_domain",
     "zeno",
     "transition_limit",
+    "memory_limit",
     "not_finite",
     "step_underflow",
     "interrupted",

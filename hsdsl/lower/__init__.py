@@ -116,11 +116,15 @@ def _sampled(given: SampledInput) -> lowered.SampledInput:
 
 
 def _constants(system: HybridSystem, names: Names):
-    def define(name, *expressions, arguments=names.parameters):
-        return Definition(name, arguments, tuple(sp.sympify(e).xreplace(names.shared) for e in expressions))
+    places = {parameter: i for i, parameter in enumerate(names.parameters)}
+    done: dict[sp.Basic, sp.Basic] = {}
+
+    def define(name, *expressions):
+        results = tuple(replaced(sp.sympify(e), names.shared, done) for e in expressions)
+        return Definition(name, names.parameters, results, places=places)
 
     for i, parameter in enumerate(system.parameters):
-        yield define(f"parameter_{i}", parameter.value, arguments=names.parameters[:i])
+        yield define(f"parameter_{i}", parameter.value)
         if parameter.minimum is not None:
             yield define(f"minimum_{i}", parameter.minimum)
         if parameter.maximum is not None:
@@ -163,7 +167,7 @@ def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram
         flow_texts=mode.flow_texts,
         routines=print_routines(_mode_routines(mode, names), names.data),
         affine=_affine(mode, names),
-        jacobian=print_routines((_jacobian(mode, names),), names.data),
+        jacobian=_jacobian(mode, names),
         tape=_tape(mode, names),
         expressions=tuple(text for text, _ in _expressions(mode)),
         diagnosis=print_routines(_diagnosis(mode, names), names.data),
@@ -179,17 +183,22 @@ def _affine(mode: Mode, names: Names) -> bool:
 
 def _constant_slopes(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> bool:
     slopes = Gradient((expression,), arguments)
-    return not slopes.statements and not any(slope.free_symbols & set(arguments) for slope in slopes.rows[0])
+    own = set(arguments)
+    return not slopes.statements and not any(slope.free_symbols & own for slope in slopes.sparse[0].values())
 
 
 def _residuals(mode: Mode) -> list[sp.Expr]:
     return [edge.surface.residual for edge in mode.edges] + [wall.residual for wall in mode.walls]
 
 
-def _jacobian(mode: Mode, names: Names) -> Definition:
+def _jacobian(mode: Mode, names: Names) -> lowered.Jacobian:
     states, mapping, done = names.of_states(mode.states), names.mapping(mode.states), {}
     slopes = Gradient([replaced(sp.sympify(e), mapping, done) for e in mode.flow], states)
-    return Definition("jacobian", (TIME, *states), tuple(d for row in slopes.rows for d in row), slopes.statements)
+    column = {state: i for i, state in enumerate(states)}
+    places = [k * len(states) + column[state] for k, row in enumerate(slopes.sparse) for state in row]
+    values = tuple(slope for row in slopes.sparse for slope in row.values())
+    definition = Definition("jacobian", (TIME, *states), values, slopes.statements)
+    return lowered.Jacobian(print_routines((definition,), names.data), tuple(places))
 
 
 def _tape(mode: Mode, names: Names) -> lowered.Tape | None:
@@ -211,11 +220,12 @@ def _expressions(mode: Mode):
 
 
 def _diagnosis(mode: Mode, names: Names):
-    mapping = names.mapping(mode.states)
+    mapping, arguments = names.mapping(mode.states), (TIME, *names.of_states(mode.states))
     done: dict[sp.Basic, sp.Basic] = {}
+    places = {argument: i for i, argument in enumerate(arguments)}
     for k, (_, expression) in enumerate(_expressions(mode)):
         result = replaced(sp.sympify(expression), mapping, done)
-        yield Definition(f"expression_{k}", (TIME, *names.of_states(mode.states)), (result,))
+        yield Definition(f"expression_{k}", arguments, (result,), places=places)
 
 
 def _mode_routines(mode: Mode, names: Names):
@@ -239,9 +249,9 @@ def _mode_routines(mode: Mode, names: Names):
     yield Definition("outputs", arguments, outputs)
     for k, residual in enumerate(residuals):
         slope = Gradient((residual,), arguments)
-        row = slope.rows[0]
-        rate = sp.Add(row[0], *(d * f for d, f in zip(row[1:], flow, strict=True)))
-        yield Definition(f"gradient_{k}", arguments, row, slope.statements)
+        row, along = slope.sparse[0], dict(zip(arguments, (sp.S.One, *flow), strict=True))
+        rate = sp.Add(*(d * along[argument] for argument, d in row.items()))
+        yield Definition(f"gradient_{k}", arguments, slope.rows[0], slope.statements)
         yield Definition(f"rate_{k}", arguments, (rate,), slope.statements)
     for k, edge in enumerate(mode.edges):
         condition = sp.true if edge.condition is None else edge.condition
@@ -252,10 +262,11 @@ def _mode_routines(mode: Mode, names: Names):
         reset = place(edge.reset)
         yield Definition(f"reset_{k}", arguments, reset)
         changes = Gradient(reset, states)
-        spreads = tuple(_spread(r, row, states, scales) for r, row in zip(reset, changes.rows, strict=True))
+        sizes, own = dict(zip(states, scales, strict=True)), set(states)
+        spreads = tuple(_spread(r, row, own, sizes) for r, row in zip(reset, changes.sparse, strict=True))
         yield Definition(f"spread_{k}", (*arguments, *scales), spreads, changes.statements)
 
 
 def _spread(value: sp.Expr, slopes, states, scales):
-    parts = sp.Add(*(absolute(slope) * s for slope, s in zip(slopes, scales, strict=True)))
+    parts = sp.Add(*(absolute(slope) * scales[state] for state, slope in slopes.items()))
     return parts if value in states else maximum(absolute(value), parts)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,19 +20,28 @@ from hsdsl.program import Routines
 class Definition:
     """A routine before printing: its name, arguments and tuple of results.
 
-    ``statements`` are the names that the results use besides the arguments, and what they stand for.
+    ``statements`` are the names that the results use besides the arguments, and what they stand for. With ``places``
+    only the arguments that are used have a name in the text: of many small routines with many arguments each, the
+    heads would be all there is. ``places`` says where each argument stands.
     """
 
     name: str
     arguments: tuple[sp.Symbol, ...]
     results: tuple
     statements: Sequence[Statement] = ()
+    places: Mapping[sp.Symbol, int] | None = None
 
 
 def text_of(definition: Definition) -> str:
     """Print one routine as a Python function."""
-    head = f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n"
-    return head + _body(definition.results, tuple(definition.statements))
+    body = _body(definition.results, tuple(definition.statements))
+    if definition.places is None:
+        return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
+    parts = (*definition.results, *(expr for _, expr in definition.statements))
+    used = set[sp.Symbol]().union(*(sp.sympify(expr).free_symbols for expr in parts)) & definition.places.keys()
+    places = sorted((definition.places[symbol], symbol.name) for symbol in used)
+    named = "".join(f"    {name} = given[{i}]\n" for i, name in places)
+    return f"def {definition.name}(*given):\n{named}{body}"
 
 
 @lru_cache(maxsize=4096)  # the modes of a large model have most of their routines in common

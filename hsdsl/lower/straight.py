@@ -99,6 +99,8 @@ class Gradient:
 
     Attributes
     ----------
+    sparse : tuple of dict
+        For each expression its derivatives by those arguments where they are not zero, in the arguments' order.
     rows : tuple of tuple of sympy.Expr
         For each expression its derivative by each argument.
     statements : list of (symbol, expression)
@@ -107,24 +109,28 @@ class Gradient:
 
     def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> None:
         self._arguments = arguments
+        self._order = {argument: i for i, argument in enumerate(arguments)}
         self._cut = Cut("g")
         small = [self._cut.down(e) for e in expressions]
         self._slopes: dict[sp.Symbol, dict[sp.Symbol, sp.Expr]] = {}
         for symbol, expr in tuple(self._cut.statements):
-            row = self._row(expr)
-            self._slopes[symbol] = {a: self._cut.name(d) for a, d in zip(arguments, row, strict=True) if d != 0}
-        self.rows = tuple(self._row(e) for e in small)
+            self._slopes[symbol] = {a: self._cut.name(d) for a, d in self._row(expr).items()}
+        self.sparse = tuple(self._row(e) for e in small)
         self.statements = self._cut.statements
 
-    def _row(self, expr: sp.Expr) -> tuple[sp.Expr, ...]:
+    @property
+    def rows(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        return tuple(tuple(row.get(a, sp.S.Zero) for a in self._arguments) for row in self.sparse)
+
+    def _row(self, expr: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
         present = expr.free_symbols
-        direct = {a: _derivative(expr, a) if a in present else sp.S.Zero for a in self._arguments}
+        direct = {a: _derivative(expr, a) for a in present & self._order.keys()}
         through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
             slope = self._cut.name(expr.diff(symbol))
             for argument, inner in self._slopes[symbol].items():
-                direct[argument] += slope * inner
-        return tuple(direct[a] for a in self._arguments)
+                direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
+        return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
 
 
 @lru_cache(maxsize=4096)  # the modes of a large model have most of their derivatives in common

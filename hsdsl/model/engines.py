@@ -67,7 +67,9 @@ def choose(
     why = _refusal(settings, precision)
     if why is None:
         try:
-            return make()
+            compiled = make()
+            kernel.runtime(settings.scheme, settings.method.name if settings.method else "")
+            return compiled
         except NoCompiler as error:
             why = str(error)
         if engine == "auto":

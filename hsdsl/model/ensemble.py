@@ -23,6 +23,7 @@ from hsdsl.model.instances import (
     split,
 )
 from hsdsl.model.requests import KEYS
+from hsdsl.model.settings import check_memory, whole
 from hsdsl.model.values import Values
 from hsdsl.model.workers import Progress, run_compiled, run_in_turn
 from hsdsl.names import did_you_mean
@@ -72,6 +73,11 @@ class Asked:
         """What the single run of one instance is asked for."""
         own = [{name: float(a[index]) for name, a in self.arrays(initial).items()} for initial in (False, True)]
         return self.call | {"parameters": self.parameters | own[0], "initial": self.initial | own[1]}
+
+    @property
+    def sample_count(self) -> int:
+        """How many samples are taken of each instance."""
+        return self.samples if isinstance(self.samples, int) else 0 if self.samples is None else len(self.samples)
 
     def times(self, until: Array) -> Array:
         """The sample times of every instance, shape (instances, samples)."""
@@ -153,7 +159,7 @@ class Ready:
         shape, settings = self.asked.varied.shape, self.base.settings
         program, plan, states = self.base.program, self.base.plan, self._states(kept)
 
-        def whole(array: Array, missing: Any) -> Array:
+        def placed(array: Array, missing: Any) -> Array:
             """Put what was kept in its place among all instances."""
             full = np.full((self.columns.count, *array.shape[1:]), missing, dtype=array.dtype)
             full[self.places] = array
@@ -173,15 +179,15 @@ class Ready:
             method=settings.method.name if settings.method else "two-step",
             shape=shape,
             varied={name: array.reshape(shape) for name, array in self.asked.varied.arrays.items()},
-            stop=whole(self._stops(kept), "refused"),
-            time=whole(kept.ended, nan),
-            mode=whole(modes[kept.mode], ""),
-            state={name: whole(column, nan) for name, column in states.items()},
-            outputs={name: whole(column, nan) for name, column in outputs.items()},
-            transitions=whole(kept.transitions, 0),
-            transition_times=whole(kept.crossed, nan),
-            sample_times=whole(self.instances.time, nan),
-            samples={name: whole(column, nan) for name, column in samples.items() if self.instances.time.shape[1]},
+            stop=placed(self._stops(kept), "refused"),
+            time=placed(kept.ended, nan),
+            mode=placed(modes[kept.mode], ""),
+            state={name: placed(column, nan) for name, column in states.items()},
+            outputs={name: placed(column, nan) for name, column in outputs.items()},
+            transitions=placed(kept.transitions, 0),
+            transition_times=placed(kept.crossed, nan),
+            sample_times=placed(self.instances.time, nan),
+            samples={name: placed(column, nan) for name, column in samples.items() if self.instances.time.shape[1]},
             seconds={"simulate": seconds},
             refusals=refused,
             again=self.again,
@@ -218,6 +224,8 @@ def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Pre
         why = next(iter(columns.refused.values()), "there is none")
         raise UsageError(f"no instance of the ensemble can be run: {why}")
     base = prepare(asked.single(first))
+    kept = 2 * len(base.states) + asked.transition_times + asked.sample_count * (1 + len(model.columns))
+    check_memory(base.settings.memory, columns.count, "instances", kept)
     start = initial_rows(columns, base.states, asked.initial, asked.arrays(initial=True))
     settings = settings_rows(columns, base.settings, request)
     places = [k for k in range(columns.count) if k not in columns.refused]
@@ -245,7 +253,6 @@ def check(asked: Mapping[str, Any], threads: int | None, transition_times: int) 
     for name in asked:
         if name == "samples" or name not in known:
             raise UsageError(f"an ensemble has no argument '{name}'", did_you_mean(name, known))
-    if threads is not None and threads < 1:
-        raise UsageError(f"threads must be at least 1, not {threads}")
-    if transition_times < 0:
-        raise UsageError(f"transition_times must not be negative, not {transition_times}")
+    if threads is not None:
+        whole(threads, "threads", least=1)
+    whole(transition_times, "transition_times", least=0)

@@ -54,6 +54,10 @@ def split(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Array]]:
         if isinstance(value, str) or np.ndim(value) == 0:
             shared[name] = value.item() if isinstance(value, np.generic | np.ndarray) else value
             continue
+        if np.ma.is_masked(value):
+            raise UsageError(
+                f"{name}: elements of the array are masked, and have no value", "leave those instances out"
+            )
         try:
             varied[name] = np.asarray(value, dtype=float)
         except (TypeError, ValueError):

@@ -20,6 +20,7 @@ from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.written import Written
 from hsdsl.program import Program
+from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, prepare
 from hsdsl.simulate.timeline import Timeline, make_timeline
@@ -61,7 +62,7 @@ class Parts:
             self.program = program
         self._written, self._part, self._left_out = written, part, left_out
         self.seconds = {"load": load_seconds, "compile": 0.0}
-        self._compiled: CompiledModel | None = None
+        self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -125,11 +126,18 @@ class Parts:
         return Values(lambda: self.system, program, self.kernels[arithmetic.digits])
 
     def _compile(self) -> CompiledModel:
+        """Compile the model, once: what failed is not tried again."""
         if self._compiled is None:
             program = self.program
             began = time.perf_counter()
-            self._compiled = CompiledModel(program)
+            try:
+                with applied(None if self._written is None else self._written.limits):
+                    self._compiled = CompiledModel(program)
+            except NoCompiler as error:
+                self._compiled = error
             self.seconds["compile"] += time.perf_counter() - began
+        if isinstance(self._compiled, NoCompiler):
+            raise self._compiled
         return self._compiled
 
     def prepare(
@@ -145,7 +153,8 @@ class Parts:
         request = self.resolve(settings, asked)
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
-        chosen = replace(settings_of(request, values), overrides=recorded(parameters, initial, request))
+        with applied(None if self._written is None else self._written.limits):
+            chosen = replace(settings_of(request, values), overrides=recorded(parameters, initial, request))
         mode, states, x = initial_state(values, initial)
         if request.method is None:
             from hsdsl.model.mechanical import one_stop

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from operator import index
+from typing import Any, SupportsIndex
 
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
-from hsdsl.model.requests import DEFAULT, FILE, Request, check_digits, check_smooth, check_tolerance
+from hsdsl.limits import current
+from hsdsl.model.requests import DEFAULT, FILE, Asked, Request, check_digits, check_smooth, check_tolerance
 from hsdsl.model.values import Values, samples
 from hsdsl.simulate import Settings
 
@@ -65,6 +68,7 @@ def settings_of(request: Request, values: Values) -> Settings:
         until=until,
         max_transitions=int(most),
         samples=_samples(request, values),
+        memory=current().memory,
     )
 
 
@@ -84,11 +88,49 @@ def _samples(request: Request, values: Values) -> int | tuple[Number, ...] | Non
     asked = request.values.get("samples")
     if asked is None:
         return None
+    found = _sampled(asked, values)
+    if isinstance(found, int):
+        width = max(len(mode.states) for mode in values.program.modes)
+        check_memory(current().memory, found, "samples", 1 + width + len(values.program.outputs))
+    return found
+
+
+def _sampled(asked: Asked, values: Values) -> int | tuple[Number, ...]:
     if asked.place != FILE:
         return samples(values, asked.value)
     if values.has("sample_times"):
         return values.constant("sample_times")
     return samples(values, values.constant("sample_count")[0])
+
+
+def whole(value: Any, name: str, least: int) -> int:
+    """Return an argument that must be a whole number.
+
+    Raises
+    ------
+    UsageError
+        It is none, or below ``least``.
+    """
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise UsageError(f"{name} must be a whole number, not {value!r}")
+    if index(value) < least:
+        raise UsageError(f"{name} must be at least {least}, not {value}")
+    return index(value)
+
+
+def check_memory(most: int, count: int, what: str, columns: int) -> None:
+    """Refuse more numbers than may be kept.
+
+    Raises
+    ------
+    UsageError
+        So many of ``what``, each with so many numbers, take more than ``most`` bytes.
+    """
+    wanted = 8 * count * columns
+    if wanted > most:
+        sentence = f"{count:.6g} {what} of {columns:.6g} numbers take {wanted:.3g} bytes"
+        hint = f"allow more with --limit memory={10 * wanted:.0e}"
+        raise UsageError(f"{sentence}, and the limit 'memory' is {most:.3g}", hint)
 
 
 def arithmetic_of(precision: int | None) -> Arithmetic:

@@ -16,6 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Samples, Stop
 from hsdsl.execution.samples import split
 from hsdsl.model.requests import KEYS
+from hsdsl.model.settings import whole
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.layouts import Layouts
@@ -144,8 +145,7 @@ def check(
     target = Path(path)
     if target.suffix.lower() != ".csv":
         raise UsageError(f"{target} should end in .csv: only such a file can be written while a run goes on")
-    if every < 1:
-        raise UsageError(f"every must be at least 1, not {every}")
+    whole(every, "every", least=1)
     if columns is not None:
         split(columns, tuple(model.columns), model.program.outputs)
     return target

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ class Values:
     read: Callable[[], HybridSystem]
     program: Program
     kernel: PythonKernel
-    parameters: tuple[Number, ...] = ()
+    parameters: Sequence[Number] = ()
 
     @property
     def system(self) -> HybridSystem:
@@ -94,7 +94,7 @@ class Values:
 
     def has(self, name: str) -> bool:
         """Whether the file gives this constant."""
-        return name in self.program.constants.names
+        return self.kernel.has_constant(name)
 
 
 def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
@@ -103,15 +103,17 @@ def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
     for name in overrides:
         if name not in program.parameters:
             raise UsageError(f"the model has no parameter '{name}'", _elsewhere(name, program))
+    found: list[Number] = []
+    earlier = Values(values.read, program, values.kernel, found)
     for i, name in enumerate(program.parameters):
         if name in overrides:
-            value = values.number(overrides[name], f"parameter {name}")
-        else:
-            try:
-                value = values.constant(f"parameter_{i}")[0]
-            except DOMAIN_ERRORS:
-                raise UsageError(f"parameter {name} has no finite value with these parameters") from None
-        values = Values(values.read, program, values.kernel, (*values.parameters, value))
+            found.append(earlier.number(overrides[name], f"parameter {name}"))
+            continue
+        try:
+            found.append(earlier.constant(f"parameter_{i}")[0])
+        except DOMAIN_ERRORS:
+            raise UsageError(f"parameter {name} has no finite value with these parameters") from None
+    values = replace(values, parameters=tuple(found))
     _check_bounds(values)
     return values
 

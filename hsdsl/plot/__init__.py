@@ -9,12 +9,13 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.names import visible_lines
 from hsdsl.plot.guards import GuardLine
+from hsdsl.plot.style import styled
 from hsdsl.store.atomic import replacing
 
 if TYPE_CHECKING:
@@ -23,26 +24,6 @@ if TYPE_CHECKING:
 __all__ = ["GuardLine", "plot", "save"]
 
 FORMATS = (".png", ".svg", ".html")
-
-# Everything that a person's own matplotlib settings could change is reset; the salt makes the SVG's ids repeatable.
-STYLE: dict[str, Any] = {
-    "svg.hashsalt": "hsdsl",
-    "svg.fonttype": "path",
-    "font.size": 9.0,
-    "axes.labelsize": 9.0,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#555555",
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
-    "axes.labelcolor": "#222222",
-    "text.color": "#222222",
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
-    "agg.path.chunksize": 20_000,
-}
 
 
 def plot(
@@ -75,11 +56,9 @@ def plot(
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
         raise UsageError(f"{target} should end in .png, .svg or .html: the suffix says what to draw")
-    import matplotlib.style
+    with styled(), warnings.catch_warnings(), replacing(target) as file:
+        from hsdsl.plot.figure import draw
 
-    from hsdsl.plot.figure import draw
-
-    with matplotlib.style.context(["default", STYLE]), warnings.catch_warnings(), replacing(target) as file:
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a script the font lacks is no reason to alarm
         figure = draw(execution, guards=guards, units=units or {}, title=title)
         if suffix == ".html":
@@ -107,9 +86,7 @@ def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
     UsageError
         For a file that cannot be written.
     """
-    import matplotlib.style
-
-    with matplotlib.style.context(["default", STYLE]):
+    with styled():
         figure = draw()
         for path in map(Path, paths):
             with replacing(path) as file:

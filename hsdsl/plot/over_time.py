@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hsdsl.errors import UsageError
+from hsdsl.plot.style import styled
 from hsdsl.store.atomic import replacing
 
 Array = npt.NDArray[Any]
@@ -44,12 +45,11 @@ def plot_over_time(
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
-    import matplotlib.style
-    from matplotlib.figure import Figure
+    with styled(), replacing(target) as file:
+        from matplotlib.figure import Figure
 
-    from hsdsl.plot import STYLE, write_figure
+        from hsdsl.plot import write_figure
 
-    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")
         axis = figure.add_subplot()
         finite = [v[np.isfinite(v)] for pair in bounds.values() for v in pair]

@@ -17,6 +17,7 @@ from hsdsl.metrics.geometry import Array, Domain, Gate, Space
 from hsdsl.metrics.line import interval_of
 from hsdsl.metrics.paths import Piece
 from hsdsl.plot.colours import ALARM, FAINT, INK
+from hsdsl.plot.style import styled
 from hsdsl.store.atomic import replacing
 
 FORMATS = (".png", ".svg")
@@ -47,12 +48,11 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"--plot {target}: the name should end in .png or .svg")
     modes = _visited(space, pieces)
-    import matplotlib.style
-    from matplotlib.figure import Figure
+    with styled(), replacing(target) as file:
+        from matplotlib.figure import Figure
 
-    from hsdsl.plot import STYLE, write_figure
+        from hsdsl.plot import write_figure
 
-    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
         columns = min(3, len(modes))
         rows = -(-len(modes) // columns)
         figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.errors import UsageError
 from hsdsl.plot.colours import FAINT, PALETTE
+from hsdsl.plot.style import styled
 from hsdsl.store.atomic import replacing
 
 if TYPE_CHECKING:
@@ -71,15 +72,14 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
-    import matplotlib.style
-    from matplotlib.figure import Figure
-
-    from hsdsl.plot import STYLE, write_figure
-
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
     places, down, across = _places(columns)
-    with matplotlib.style.context(["default", STYLE]), replacing(target) as file:
+    with styled(), replacing(target) as file:
+        from matplotlib.figure import Figure
+
+        from hsdsl.plot import write_figure
+
         figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
         axes = figure.subplots(down, across, squeeze=False)
         for k in range(down):

@@ -8,9 +8,16 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+from hsdsl import limits
+from hsdsl.names import shown
+
+if TYPE_CHECKING:
+    from hsdsl.runtime.process import Done
 
 NAMES = ("cc", "gcc", "clang")
+TRIAL = 5.0  # seconds for an empty function, which takes a hundredth of them
 Effort = Literal["-O1", "-O2"]
 EXACT = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
 FLAGS = (
@@ -31,6 +38,10 @@ class NoCompiler(Exception):
     """There is no C compiler, or it does not do its work; the message says which."""
 
 
+class TooSlow(NoCompiler):
+    """The compiler takes more time than it may."""
+
+
 @dataclass(frozen=True)
 class Compiler:
     """A command that compiles C, and what tells it from another one."""
@@ -38,25 +49,61 @@ class Compiler:
     command: tuple[str, ...]
     identity: str
 
-    def build(self, sources: Sequence[Path], includes: Sequence[Path], target: Path, effort: Effort) -> None:
-        """Compile sources to a shared library, with so much effort to make it fast.
+    def build(self, source: Path, includes: Sequence[Path], target: Path, effort: Effort) -> None:
+        """Compile a source to a shared library in the same folder, with so much effort to make it fast.
 
         Raises
         ------
         NoCompiler
-            It fails; the message holds the first line of what it says.
+            It fails, does not end, or makes no file; the message holds the first error that it prints.
         """
-        import subprocess  # what is compiled already needs none
+        from hsdsl.runtime import process  # what is compiled already needs none
 
-        command = [*self.command, effort, *FLAGS, *(f"-I{folder}" for folder in includes), "-o", str(target)]
-        command += [*map(str, sources), "-lm"]
+        if _responding.get(self) is False:
+            raise NoCompiler(self._endless())
+        seconds = limits.current().compile
+        options = (effort, *FLAGS, *(f"-I{folder}" for folder in includes))
+        command = [*self.command, *options, "-o", str(target), str(source), "-lm"]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+            done = process.run(command, target.parent, seconds, lambda: _responds(self))
         except OSError as error:
-            raise NoCompiler(f"{self.command[0]} cannot be run: {error.strerror}") from None
-        if done.returncode:
-            said = next(iter(done.stderr.strip().splitlines()), f"exit code {done.returncode}")
-            raise NoCompiler(f"{' '.join(self.command)} failed: {said}")
+            raise NoCompiler(f"{self} cannot be run: {error.strerror}") from None
+        if done.code is None:
+            slow = f"{self} takes more than {seconds:g} s; --limit compile={10 * seconds:g} allows more"
+            raise TooSlow(slow) if _responding.get(self, True) else NoCompiler(self._endless())
+        if done.code:
+            raise NoCompiler(f"{self} failed: {_complaint(done, target.parent)}")
+        if not target.is_file():
+            raise NoCompiler(f"{self} made no library")
+
+    def _endless(self) -> str:
+        return f"{self} does not end: it takes longer than a few seconds for an empty function"
+
+    def __str__(self) -> str:
+        return shown(" ".join(self.command), 80)
+
+
+_responding: dict[Compiler, bool] = {}
+
+
+def _responds(compiler: Compiler) -> bool:
+    """Whether a compiler that has taken long ends at all."""
+    from hsdsl.runtime import process
+
+    if compiler not in _responding:
+        with process.workshop() as folder:
+            source = folder / "empty.c"
+            source.write_text("void hs_empty(void) {}\n")
+            command = [*compiler.command, "-c", "-o", str(folder / "empty.o"), str(source)]
+            _responding[compiler] = process.run(command, folder, TRIAL, lambda: True).code is not None
+    return _responding[compiler]
+
+
+def _complaint(done: Done, folder: Path) -> str:
+    """The first line of what a compiler says that names an error."""
+    lines = [line.strip() for line in done.said.replace(f"{folder}{os.sep}", "").splitlines() if line.strip()]
+    ended = f"exit code {done.code}" if (done.code or 0) >= 0 else f"ended by signal {-(done.code or 0)}"
+    return shown(next((line for line in lines if "error" in line), (lines or [ended])[0]), 200)
 
 
 def find_compiler() -> Compiler:
@@ -70,7 +117,7 @@ def find_compiler() -> Compiler:
     if given := _words(os.environ.get("CC", "")):
         path = shutil.which(given[0])
         if path is None:
-            raise NoCompiler(f"CC is {given[0]}, which is not there")
+            raise NoCompiler(f"CC is {shown(given[0], 80)}, which is no command here")
         return Compiler(tuple(given), _identity(path, given[1:]))
     for name in NAMES:
         if path := shutil.which(name):
@@ -83,15 +130,22 @@ def find_compiler() -> Compiler:
 
 
 def _words(text: str) -> list[str]:
-    if not text:
-        return []
+    """The words of a command line; a file's name is one, blanks and all."""
+    if not text or shutil.which(text):
+        return [text] * bool(text)
     import shlex
 
-    return shlex.split(text)
+    try:
+        return shlex.split(text)
+    except ValueError:
+        raise NoCompiler(f"CC is {shown(text, 80)}, where a quotation mark is left open") from None
 
 
 def _identity(path: str, arguments: Sequence[str] = ()) -> str:
     """Tell a compiler from another by its file: to ask it for its version would start a process in every run."""
-    file = Path(path).resolve()
-    status = file.stat()
+    try:
+        file = Path(path).resolve()
+        status = file.stat()
+    except OSError as error:
+        raise NoCompiler(f"{shown(path, 80)} cannot be looked at: {error.strerror}") from None
     return f"{file} {status.st_size} {status.st_mtime_ns} {' '.join(arguments)}"

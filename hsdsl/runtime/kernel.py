@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
+from contextvars import copy_context
 from threading import Lock, Thread
 from typing import Any
 
@@ -17,7 +18,7 @@ from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import tables
-from hsdsl.runtime.compiler import Effort, NoCompiler
+from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
 from hsdsl.runtime.library import is_kept, load
 
 Address = int | None
@@ -28,7 +29,8 @@ SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Do
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
 
-MODEL: Effort = "-O2"
+LARGE = 1 << 17  # characters of a program
+SYMBOL = "hs_the_model"
 
 Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
 _loaded: dict[Parts, ctypes.CDLL] = {}
@@ -48,7 +50,7 @@ def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
     parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
     with _loading:  # another thread may be at it: see `begin`
         if parts not in _loaded:
-            library = load(_text(parts), lambda: _text(parts), _effort(parts))
+            library = load(_text(parts), "hs_simulate", lambda: _text(parts), _effort(parts))
             library.hs_workspace.restype = ctypes.c_int64
             library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
             library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -68,7 +70,7 @@ def begin(scheme: str, method: str) -> None:
     with suppress(NoCompiler):
         parts = _parts(scheme, method)
         if not is_kept(_text(parts), _effort(parts)):
-            Thread(target=compile_runtime, daemon=True).start()
+            Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
 
 
 def _parts(scheme: str, method: str) -> Parts:
@@ -97,9 +99,12 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         data = len(program.parameters), len(program.inputs), len(program.switches)
-        sizes = *data, len(program.outputs), program.initial_states
-        self._library = load(repr((sizes, program.modes)), lambda: _source(program), MODEL)
-        self.table = tables.Model.in_dll(self._library, "hs_the_model")
+        content = repr(((*data, len(program.outputs), program.initial_states), program.modes))
+        try:
+            self._library = load(content, SYMBOL, lambda: _source(program), _model_effort(content))
+        except TooSlow as error:
+            raise NoCompiler(f"{error}; {_longest(program)}") from None
+        self.table = tables.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
 
     def workspace(self, method: tables.Method, scheme: str) -> int:
@@ -115,6 +120,23 @@ class CompiledModel:
 def runtime_of(method: tables.Method, scheme: str) -> ctypes.CDLL:
     """The runtime that has a method and a scheme; what runs there leaves the interpreter free meanwhile."""
     return runtime(scheme, tables.METHOD_KINDS[int(method.kind)])
+
+
+def _model_effort(content: str) -> Effort:
+    """Of a large model -O2 takes several times as long as -O1, and few runs are long enough to win that back."""
+    return "-O1" if len(content) > LARGE else "-O2"
+
+
+def _longest(program: Program) -> str:
+    """Say where most of the work of a model is."""
+    flows = (
+        (text, f"the flow of {state} in mode {mode.name}")
+        for mode in program.modes
+        for state, text in zip(mode.states, mode.flow_texts, strict=True)
+    )
+    guards = ((edge.text, f"the guard of {edge.name}") for mode in program.modes for edge in mode.edges)
+    text, where = max((*flows, *guards), key=lambda pair: len(pair[0]), default=("", "none"))
+    return f"the longest expression is {where}, with {len(text):,} characters"
 
 
 def _source(program: Program) -> str:
@@ -139,6 +161,10 @@ class CompiledKernel:
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         return self._python.constant(name, parameters)
+
+    def has_constant(self, name: str) -> bool:
+        """Whether the program gives this constant."""
+        return self._python.has_constant(name)
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""

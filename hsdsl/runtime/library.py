@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import platform
 import sys
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from hsdsl.cache import find, keep, key_of
+from hsdsl.names import shown
 from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_compiler
 
 RUNTIME = Path(__file__).parent / "c"
@@ -17,8 +19,10 @@ PRINTER = Path(__file__).parents[1] / "backends" / "c"
 KIND = "compiled"
 
 
-def load(content: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
-    """Load the library that ``source`` compiles to; ``content`` stands for it in the cache, so it need not be written.
+def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
+    """Load the library that ``source`` compiles to and that has ``symbol``.
+
+    ``content`` stands for the source in the cache, so it need not be written.
 
     Raises
     ------
@@ -33,10 +37,7 @@ def load(content: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL
             return ctypes.CDLL(str(path))
         except OSError:
             pass  # made for something else than what runs now: it is made again
-    try:
-        return ctypes.CDLL(str(keep(KIND, key, ".so", lambda target: _compile(compiler, source(), target, effort))))
-    except OSError as refusal:
-        return _load_unkept(compiler, source(), refusal, effort)
+    return _made(compiler, key, symbol, source, effort)
 
 
 def is_kept(content: str, effort: Effort) -> bool:
@@ -65,26 +66,50 @@ def _processor() -> str:
     return f"{sys.platform} {platform.machine()} {sys.maxsize}"
 
 
-def _compile(compiler: Compiler, source: str, target: Path, effort: Effort) -> None:
-    import shutil
-    import tempfile
+def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
+    """Compile a library, try it, and keep it where anything can be kept."""
+    from hsdsl.runtime.process import workshop
 
-    with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
-        text, library = Path(folder) / "model.c", Path(folder) / "model.so"
-        text.write_text(source)
-        compiler.build([text], [RUNTIME], library, effort)
-        shutil.copyfile(library, target)
+    text = source()
+    try:
+        with workshop() as folder:
+            library = folder / "model.so"
+            _compile(compiler, text, library, effort)
+            loaded = _tried(compiler, library, symbol)
+            _keep(key, library)
+            return loaded
+    except OSError as error:
+        raise NoCompiler(f"there is no room to compile: {error.strerror or error}") from None
 
 
-def _load_unkept(compiler: Compiler, source: str, refusal: OSError, effort: Effort) -> ctypes.CDLL:
-    """Compile for this process alone where nothing can be kept."""
-    import tempfile
+def _compile(compiler: Compiler, source: str, library: Path, effort: Effort) -> None:
+    text = library.with_name("model.c")
+    text.write_text(source)
+    compiler.build(text, [RUNTIME], library, effort)
 
+
+def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:
+    try:
+        loaded = ctypes.CDLL(str(library))
+    except OSError as error:
+        complaint = str(error).replace(f"{library.parent}{os.sep}", "")
+        raise NoCompiler(f"what {compiler} made cannot be loaded: {shown(complaint, 200)}") from None
+    if not hasattr(loaded, symbol):
+        raise NoCompiler(f"what {compiler} made has no {symbol}")
+    return loaded
+
+
+def _keep(key: str, library: Path) -> None:
+    try:
+        keep(KIND, key, ".so", lambda target: _copy(library, target))
+    except OSError as refusal:
+        _say_unkept(str(refusal))
+
+
+def _copy(library: Path, target: Path) -> None:
+    target.write_bytes(library.read_bytes())
+
+
+@cache
+def _say_unkept(refusal: str) -> None:
     print(f"hsdsl: compiled code is not kept: {refusal}", file=sys.stderr)
-    with tempfile.TemporaryDirectory(prefix="hsdsl-") as folder:
-        library = Path(folder) / "model.so"
-        _compile(compiler, source, library, effort)
-        try:
-            return ctypes.CDLL(str(library))
-        except OSError as error:
-            raise NoCompiler(f"what {' '.join(compiler.command)} made cannot be loaded: {error}") from None

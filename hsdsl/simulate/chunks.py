@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Arc, Array, Transition
+from hsdsl.limits import DEFAULT
 from hsdsl.program import Program
 from hsdsl.runtime import tables
 from hsdsl.simulate.columns import Columns, Counts, Gathered, Packed, Shape
@@ -34,21 +35,33 @@ class Chunks:
         self._full: list[dict[str, Array]] = []
         self._rows = 0  # of the chunk that is there
         self._before = 0  # rows of a run that needed more than one chunk
+        self._memory, self._taken = DEFAULT.memory, 0  # bytes that the chunks of a run may take, and do
+        self.full = False
         self.sink: Sink | None = None  # takes what is written, which then is not kept
 
-    def clear(self, rows: float) -> None:
-        """Make ready for a run that may write about so many rows."""
-        wanted = min(max(rows, self._before, LEAST_ROWS), MOST_ROWS)
+    def clear(self, rows: float, memory: int) -> None:
+        """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
+        self._memory, self._taken, self.full = memory, 0, False
+        wanted = min(max(rows, self._before), MOST_ROWS, memory // self._shape.row_bytes)
+        wanted = max(wanted, LEAST_ROWS)
         if wanted > self._rows:
             self._open(int(wanted))
 
     def flush(self) -> None:
-        """Keep what was written and open another chunk, twice as large."""
+        """Keep what was written and open another chunk, twice as large; a small one where no more may be kept."""
         if self.sink is not None:
             self.sink(self._written())
             return self._reset()
         self._full.append(self._written())
-        self._open(min(2 * self._rows, MOST_ROWS))
+        taken = sum(column.nbytes for column in self._columns.values())
+        self._taken += taken
+        left = (self._memory - self._taken) * self._rows // taken
+        self.full = left < min(LEAST_ROWS, self._rows)
+        try:
+            self._open(LEAST_ROWS if self.full else min(2 * self._rows, MOST_ROWS, left))
+        except MemoryError:
+            self.full = True
+            self._open(LEAST_ROWS)
 
     def rest(self) -> dict[str, Array]:
         """What is in the chunk that is being written."""

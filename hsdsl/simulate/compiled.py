@@ -17,6 +17,7 @@ from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
 from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
+from hsdsl.interrupts import Noted
 from hsdsl.program import Program
 from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
@@ -27,7 +28,6 @@ from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.desk import Desk, Desks
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
-from hsdsl.simulate.interrupt import Noted
 from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
@@ -72,12 +72,12 @@ class CompiledPlan:
         self.sampled = Sampled(runtime_of(method, scheme), compiled, self.timeline)
         self._mode, self._x = mode, np.array(x, np.float64)
         self._start = len(x), self._x.ctypes.data
-        self.until = settings.until
+        self.until, self.memory = settings.until, settings.memory
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, desk: Desk) -> None:
         """Put everything on a desk, unless it lies there from the run before."""
-        desk.clear(0 if desk.chunks.sink else self._rows)
+        desk.clear(0 if desk.chunks.sink else self._rows, self.memory)
         if desk.laid is self:
             return
         task, desk.laid = desk.task, self
@@ -198,6 +198,8 @@ class CompiledRun:
             return stops.reached(found.time)
         if reason == "final":
             return stops.entered_final(self.plan.program.modes[found.mode].name, found.time)
+        if reason == "interrupted" and self.desk.chunks.full:
+            return stops.memory(self.plan.memory, self.now)
         if reason == "interrupted":
             return stops.interrupted(self.now)
         from hsdsl.simulate.telling import stop

@@ -46,11 +46,11 @@ class Desk:
         self._runtime, self._where = runtime_of(method, scheme), ctypes.addressof(self.task)
         _desks[self._where] = self
 
-    def clear(self, rows: float) -> None:
-        """Make ready for a run that may write about so many rows."""
+    def clear(self, rows: float, memory: int) -> None:
+        """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
         self.pressed = False
         self.failed.clear()
-        self.chunks.clear(rows)
+        self.chunks.clear(rows, memory)
         if len(self._visited) > 1:  # a large set takes long to forget
             self._visited = [grown(self.task.visited, VISITED, self._width)]
         self.task.now, self.task.made = 0.0, 0
@@ -90,7 +90,7 @@ class Desk:
         except BaseException as error:  # none can pass through C
             self.failed.append(error)
             return 2
-        return int(self.pressed)
+        return int(self.pressed or self.chunks.full)
 
     def more_visited(self, larger: tables.Visited) -> int:
         """Make room for twice as many visited states."""

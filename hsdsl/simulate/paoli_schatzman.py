@@ -21,6 +21,7 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.recorder import Counted
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
@@ -65,13 +66,15 @@ def paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
         return routines(t).outputs(t, *x)
 
     here.arc.outputs = outputs
-    path = Path(h, [here.x[one_stop.position]], [False])
+    room = run.recorder.room
+    path = Path(h, Counted(room, here.x[one_stop.position]), [False])
     steps = int(run.settings.until / h)
     if (steps + 1) * h - run.settings.until <= run.tie(run.settings.until):
         steps += 1
     try:
         failed = step_through(run, here, path, routines, steps)
     finally:  # an interrupted run keeps what it has
+        room.left += len(path.z)  # for the rows that are made of it
         ended = write(run, here, path, steps)
     return ended or failed or Stop("until", run.settings.until, f"reached t = {show(run.settings.until)}")
 

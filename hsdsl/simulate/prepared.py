@@ -18,11 +18,11 @@ from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.finer import finer_settings
-from hsdsl.simulate.recorder import Progress, Recorder
+from hsdsl.simulate.recorder import OutOfRoom, Progress, Recorder, Room
 from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.stops import interrupted
+from hsdsl.simulate.stops import interrupted, memory
 from hsdsl.simulate.timeline import Timeline
 
 
@@ -108,7 +108,9 @@ class Prepared:
         """A run that nothing is recorded of yet."""
         settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
         degree = settings.method.degree if settings.method else 0
-        recorder = Recorder(arithmetic, settings.until, degree, len(program.outputs))
+        outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
+        room = Room.of(settings.memory, width, degree, outputs, arithmetic.digits)
+        recorder = Recorder(arithmetic, settings.until, degree, outputs, room)
         return Run(program, self.kernel, self.timeline, settings, make_control(settings, arithmetic), recorder)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
@@ -125,6 +127,8 @@ class Prepared:
             if not run.recorder.arcs:
                 raise
             stop = interrupted(run.recorder.now)
+        except OutOfRoom:
+            stop = memory(self.settings.memory, run.recorder.now)
         spent["simulate"] = time.perf_counter() - began
         return from_recorder(run, stop, spent, self.again)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -16,6 +17,44 @@ from hsdsl.execution import Arc, Array, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 
 Outputs = Callable[..., State]
+FLOAT, DIGITS, TUPLE = 32, 250, 56  # bytes of a number in a list: a float, one of many digits; and of an empty tuple
+
+
+class OutOfRoom(Exception):
+    """The run keeps as many rows as it may."""
+
+
+@dataclass
+class Room:
+    """How many more rows a run may keep; it says once that there is none."""
+
+    left: float = inf
+
+    def take(self) -> None:
+        """Take a row."""
+        self.left -= 1
+        if -1 <= self.left < 0:
+            raise OutOfRoom
+
+    @staticmethod
+    def of(memory: int, width: int, degree: int, outputs: int, digits: int | None) -> Room:
+        """Make room for the rows that fill so many bytes, in lists and in the arrays made of them."""
+        numbers = 1 + width * (1 + degree)
+        listed = numbers * (FLOAT if digits is None else DIGITS + digits // 2) + TUPLE * (2 + degree)
+        return Room(memory // (listed + 8 * (numbers + 1 + outputs)))
+
+
+class Counted(list[Number]):
+    """A list with an element for each row, which takes room."""
+
+    def __init__(self, room: Room, first: Number) -> None:
+        super().__init__((first,))
+        self._room = room
+
+    def append(self, value: Number) -> None:
+        """Add an element."""
+        self._room.take()
+        super().append(value)
 
 
 class Progress(Protocol):
@@ -68,6 +107,7 @@ class Recorder:
     until: Number
     degree: int  # of the pieces; 0 for straight lines
     output_count: int
+    room: Room = field(default_factory=Room)
     arcs: list[OpenArc] = field(default_factory=list[OpenArc])
     transitions: list[Transition] = field(default_factory=list[Transition])
     departures: list[str] = field(default_factory=list[str])  # where the run left what the theorem is about, and why
@@ -107,10 +147,12 @@ class Recorder:
         x: State,
     ) -> OpenArc:
         """Open an arc at its first row."""
+        self.room.take()
         if self.arcs:
             self.scales |= zip(self.arcs[-1].states, self.arcs[-1].scales, strict=True)
         scales = [self.scales.get(name, self.arithmetic.zero) for name in states]
-        arc = OpenArc(mode, states, kind, len(self.transitions), outputs, [t], [x], [], scales=scales)
+        times = Counted(self.room, t)
+        arc = OpenArc(mode, states, kind, len(self.transitions), outputs, times, [x], [], scales=scales)
         arc.notice(x)
         self.arcs.append(arc)
         return arc

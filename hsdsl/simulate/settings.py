@@ -8,6 +8,7 @@ from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators import Method
+from hsdsl.limits import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Settings:
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
+    ``memory`` is how many bytes of rows a run may keep.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -49,6 +51,7 @@ class Settings:
     one_stop: OneStop | None = None
     method_chosen: str | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False)
+    memory: int = DEFAULT.memory
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

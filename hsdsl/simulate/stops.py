@@ -43,6 +43,13 @@ def limit(most: int, t: Number) -> Stop:
     return Stop("transition_limit", t, f"made max_transitions = {most} transitions by t = {show(t)}")
 
 
+def memory(most: int, t: Number) -> Stop:
+    """As many rows as the run may keep."""
+    full = f"the rows up to t = {show(t)} fill the {most:.3g} bytes that a run may keep (limit 'memory')"
+    ways = f"take longer steps, stream the rows to a file, or allow more with --limit memory={10 * most:.0e}"
+    return Stop("memory_limit", t, f"{full}: {ways}")
+
+
 def reset_not_finite(edge: EdgeProgram, t: Number) -> Stop:
     """A reset without a value."""
     texts = ", ".join(f"{s} = {text}" for s, text in zip(edge.target_states, edge.reset_texts, strict=True))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.errors import UsageError
+from hsdsl.unfinished import part_in
 
 
 @dataclass(frozen=True)
@@ -47,18 +47,10 @@ def beside(path: str | os.PathLike[str]) -> Generator[New]:
     target = Path(os.path.realpath(path))
     try:
         _refuse_special(target, path)
-        part = target.with_name(f".hsdsl-{secrets.token_hex(6)}.part")
-        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-    except OSError as error:
-        raise UsageError(_sentence(path, target, error)) from None
-    try:
-        with os.fdopen(descriptor, "wb") as file:
+        with part_in(target.parent) as (part, descriptor), os.fdopen(descriptor, "wb") as file:
             yield New(file, part, target)
     except OSError as error:
         raise UsageError(_sentence(path, target, error)) from error
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 @contextmanager

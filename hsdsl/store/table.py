@@ -14,6 +14,8 @@ from hsdsl.execution import Array, Execution, Samples
 from hsdsl.execution.samples import optional
 from hsdsl.execution.sampling import evaluate, find, within
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
 
 def at_samples(execution: Execution, samples: Any) -> Samples:
     """Give the rows at sample times, and both rows of each jump, in the order of hybrid time.
@@ -37,7 +39,8 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
 def write_csv(samples: Samples, file: BinaryIO, header: bool = True) -> None:
     """Write CSV (UTF-8): ``time,mode,j``, states, outputs; numbers such that they read back exactly.
 
-    A cell is empty where the mode lacks the state or does not define the output; a state that is not a number
+    A text that a spreadsheet would take for a formula (a mode may be called ``=1+1``) stands behind an apostrophe. A
+    cell is empty where the mode lacks the state or does not define the output; a state that is not a number
     is ``nan``.
     """
     text = io.TextIOWrapper(file, encoding="utf-8", newline="")
@@ -63,7 +66,7 @@ def _writer_of(samples: Samples) -> Callable[[Any], str]:
 def _cells(values: Array, present: Array | None, number: Callable[[Any], str]) -> Iterable[str]:
     listed = values.tolist()
     if values.dtype.kind in "Ui":
-        return map(str, listed)
+        return (f"'{value}" if str(value).startswith(FORMULA) else str(value) for value in listed)
     if present is None or present.all():
         return map(number, listed)
     return [number(x) if there else "" for x, there in zip(listed, present.tolist(), strict=True)]

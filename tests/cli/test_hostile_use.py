@@ -1,11 +1,13 @@
 """Odd surroundings: full disks, closed streams, narrow encodings, no home. No traceback, and nothing lost."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from engines import needs_compiler
 
 MODELS = Path(__file__).parents[2] / "models"
 BALL = MODELS / "thermostat.yaml"
@@ -82,3 +84,14 @@ def test_an_interrupt_while_a_model_is_read_is_said(command, monkeypatch):
     monkeypatch.setattr("hsdsl.model.load", interrupted)
     answer = command("run", BALL)
     assert (answer.code, answer.out) == (130, "")
+
+
+@needs_compiler
+def test_a_full_folder_for_temporary_files_leaves_the_python_engine(tmp_path):
+    """Files of at most a few kilobytes stand for a full file system."""
+    code, out, errors = shell(f"ulimit -f 3; hsdsl run {BALL} --json", tmp_path, TMPDIR=str(tmp_path))
+    assert code == 0 and json.loads(out)["engine"] == "python", errors
+    assert errors.count("\n") == 1 and "the Python engine runs this" in errors
+    code, out, errors = shell(f"ulimit -f 3; hsdsl run {BALL} --engine c", tmp_path, TMPDIR=str(tmp_path))
+    assert code == 2 and out == "" and "engine 'c' cannot run this" in errors
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith("hsdsl-")]

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from cli.conftest import MODELS
+from signals import interruptible
 
 BALL = """
 hsdsl: 1
@@ -238,9 +239,8 @@ def wait_until_it_computes(pid, seconds=3.0):
 def test_interrupt_keeps_what_was_computed(tmp_path):
     out = tmp_path / "run.csv"
     arguments = [MODELS / "oscillator-with-stop-1.yaml", "--step", "1e-6", "--engine", "python", "--out", out, "--json"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hsdsl", "run", *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+    command = [sys.executable, "-m", "hsdsl", "run", *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **interruptible())
     try:
         wait_until_it_computes(process.pid)
         process.send_signal(signal.SIGINT)

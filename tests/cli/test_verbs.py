@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import tomllib
 
 import pytest
 from cli.conftest import MODELS
@@ -41,6 +43,8 @@ def test_doctor(command):
     assert answer.code == 0 and answer.json["engines"] == ["c", "python"][not COMPILER :]
     assert bool(answer.json["compiler"]) == COMPILER
     assert hsdsl.__version__ in command("doctor").out
+    declared = tomllib.loads((MODELS.parent / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert {re.split("[<>=]", text)[0] for text in declared} == set(answer.json["packages"])
 
 
 def test_version(command):

@@ -40,7 +40,7 @@ SCOPE = Scope(
 )
 # all that generated text may consist of, besides numbers and punctuation
 _GENERATED = re.compile(
-    r"def|return|bind|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
+    r"def|return|bind|given|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
     r"|flow|surfaces|magnitudes|outputs|(?:gradient|rate|reset|spread|expression|parameter|minimum|maximum|input)_\d+"
     r"|condition_\d+_\d+|initial|until|step|tolerance|relaxation|max_transitions|sample_times|sample_count"
     r"|[xpabcsvwg]\d+|q_m?\d+_\d+"
@@ -49,7 +49,7 @@ _GENERATED = re.compile(
 _GENERATED_C = re.compile(
     r"Generated|from|a|model|see|h|for|what|the|tables|mean|include|static|extern|const|restrict|int|double|void|return"
     r"|[ptx]|out|bad|hs|hs_\w+|HS_\w+|(?:routine|routines|edges|modes|walls|inputs|[a-z])_?\d+(?:_\d+)?|NAN|INFINITY"
-    r"|(?:series|surface_series|flow_lines|surface_lines|surface_line)_\d+|order|lines|length|size_t|[ck]|for|if|else"
+    r"|(?:series|surface_series|flow_lines|surface_lines|surface_line|jacobian)_\d+|i|place|order|lines|length|size_t|[ck]|for|if|else"
 )
 _HEXADECIMAL = re.compile(r"\b0x[0-9a-f.]+p[-+]\d+")
 _WORD = re.compile(r"[^\W\d]\w*")

@@ -44,7 +44,7 @@ print([name for name in sys.argv[2:] if name in sys.modules])
 """
 LIGHT_COMMAND = """
 import sys
-from hsdsl.cli import app
+from hsdsl.cli.verbs import app
 app(["run", sys.argv[1], "--json"], standalone_mode=False)
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
@@ -247,6 +247,13 @@ def test_what_cannot_be_touched_is_found_all_the_same(monkeypatch: pytest.Monkey
     assert cache.find("words", "k") == path
     path.write_text("wort")
     assert cache.find("words", "k") is None  # damaged, and cannot be removed
+
+
+def test_what_a_killed_process_left_goes_with_the_next_entry(folder: Path) -> None:
+    cache.keep("kind", "key", ".txt", lambda target: open(target, "w").close())
+    (folder / "kind" / ".hsdsl-0123.part").write_text("half")
+    cache.keep("kind", "other", ".txt", lambda target: open(target, "w").close())
+    assert sorted(path.name for path in (folder / "kind").iterdir()) == ["key", "other"]
 
 
 @needs_compiler

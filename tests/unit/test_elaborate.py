@@ -293,10 +293,10 @@ def test_large_models_are_read_quickly():
                     f"      - {{when: x - {k}*v >= {m}, if: v > 0 and w < 3, to: {to}, reset: {{v: -0.9*v}}}}\n"
                 )
     lines.append("initial: {mode: M0_0, x: 0, v: 0, w: 0}\nexperiment: {until: 1}\n")
-    began = time.perf_counter()
+    began = time.process_time()
     made = system("".join(lines))
     assert len(made.modes) == side**2
-    assert time.perf_counter() - began < 20
+    assert time.process_time() - began < 20
 
 
 def test_nobody_reads_more_than_five_hundred_errors():

@@ -133,9 +133,9 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 def test_pieces_that_never_close_are_read_in_no_time():
-    began = time.perf_counter()
+    began = time.process_time()
     root("a: [" + "min(1, " * 20_000 + "2]")
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 def test_a_saved_run_is_no_model():

@@ -9,6 +9,7 @@ import json
 import os
 import re
 import stat
+import subprocess
 import sys
 import zipfile
 from dataclasses import replace
@@ -403,6 +404,48 @@ def test_an_interruption_leaves_nothing_behind(error, tmp_path):
         file.write(b"half")
         raise error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_process_left_is_removed_and_what_another_writes_is_not(tmp_path):
+    left = tmp_path / ".hsdsl-0123456789ab.part"
+    left.write_bytes(b"half")
+    (tmp_path / ".hsdsl-notes.txt").write_text("mine")
+    with replacing(tmp_path / "x") as first:
+        first.write(b"first")
+        assert not left.exists()
+        with replacing(tmp_path / "x") as second:
+            second.write(b"second")
+        assert (tmp_path / "x").read_bytes() == b"second"
+    assert (tmp_path / "x").read_bytes() == b"first"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".hsdsl-notes.txt", "x"]
+
+
+WRITER = """
+import sys
+from hsdsl.store.atomic import replacing
+for _ in range(25):
+    with replacing(sys.argv[1]) as file:
+        file.write(sys.argv[2].encode() * 1000)
+"""
+
+
+def test_processes_may_write_one_file_at_once_and_be_killed(tmp_path):
+    """Eight processes with 25 files each, two of which are killed on the way."""
+    commands = [[sys.executable, "-c", WRITER, str(tmp_path / "x"), str(k)] for k in range(8)]
+    running = [subprocess.Popen(command, stderr=subprocess.PIPE) for command in commands]
+    for process in running[:2]:
+        while process.poll() is None and not list(tmp_path.glob(".hsdsl-*.part")):
+            pass
+        process.kill()
+    for process in running[2:]:
+        assert process.communicate()[1] == b"" and process.returncode == 0
+    for process in running[:2]:
+        process.communicate()
+    with replacing(tmp_path / "y"):
+        pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x", "y"]
+    content = (tmp_path / "x").read_bytes()
+    assert len(content) == 1000 and len(set(content)) == 1
 
 
 def test_a_sidecar_that_cannot_be_written_spoils_the_table_too(tmp_path):

@@ -13,7 +13,7 @@ from textwrap import dedent
 
 from hsdsl.backends.c.printer import function_body
 from hsdsl.backends.c.series import flow_lines, line_count, surface_lines
-from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
+from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _HEAD = """\
@@ -29,6 +29,15 @@ static int {name}(const double *restrict p, double t, const double *restrict x, 
   (void)p, (void)t, (void)x, (void)out;
 {body}
   return bad;
+}}
+"""
+_JACOBIAN = """\
+static int NAME(const double *restrict p, double t, const double *restrict x, double *restrict out) {{
+  static const int place[] = {{{places}}};
+  int i = {count};
+  if ({routine}(p, t, x, out)) return 1;
+  for (int k = {size}; k-- > 0;) out[k] = i > 0 && place[i - 1] == k ? out[--i] : 0.0;
+  return 0;
 }}
 """
 _SERIES = """\
@@ -96,12 +105,21 @@ class _Writer:
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
-            self.routines(mode.jacobian)["jacobian"],
+            self.jacobian(mode.jacobian, len(mode.states) ** 2),
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
         ]
         return f"{{{', '.join(fields)}}}"
+
+    def jacobian(self, jacobian: Jacobian, size: int) -> str:
+        """Write the derivatives of a flow: the routine of those that are not zero, and where they stand among zeros."""
+        routine = self.routines(jacobian.routines)["jacobian"]
+        count = len(jacobian.places)
+        if count == size:
+            return routine
+        places = ", ".join(map(str, jacobian.places)) or "0"
+        return self.shared("jacobian", _JACOBIAN.format(routine=routine, places=places, count=count, size=size))
 
     def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""

@@ -37,7 +37,7 @@ from hsdsl.simulate.verdict.reliability import reliability
 __all__ = ["Looking", "assess"]
 
 MOST_NAMED = 4  # findings of one kind
-INCOMPLETE = ("transition_limit", "not_finite", "step_underflow", "interrupted")
+INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
 LEFT = ("left_domain", "zeno")
 
 

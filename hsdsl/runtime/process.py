@@ -1,0 +1,115 @@
+"""A command run to its end: in a process group and a folder of its own, for a limited time."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from time import monotonic
+from typing import IO
+
+from hsdsl import interrupts
+
+PATIENCE = 5.0  # seconds without a question
+MOST_SAID = 1 << 16  # bytes that are kept of what a command says
+_running: dict[subprocess.Popen[bytes], Path] = {}
+
+
+@dataclass(frozen=True)
+class Done:
+    """The end of a command: its exit code, None where it was ended after its time, and what it said on stderr."""
+
+    code: int | None
+    said: str
+
+
+@contextmanager
+def workshop() -> Generator[Path]:
+    """Make a folder that vanishes with all that was made in it."""
+    with tempfile.TemporaryDirectory(prefix="hsdsl-", ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
+
+
+def run(command: Sequence[str], folder: Path, seconds: float, responds: Callable[[], bool]) -> Done:
+    """Run a command whose temporary files go to ``folder``; it reads nothing.
+
+    After :data:`PATIENCE` it goes on only if ``responds``. All that it started is ended with it where it is ended.
+
+    Raises
+    ------
+    OSError
+        It cannot be started.
+    """
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(folder)},
+        start_new_session=True,
+    )
+    _running[process] = folder
+    said: list[bytes] = []
+    listener = Thread(target=_listen, args=(process.stderr, said), daemon=True)
+    listener.start()
+    try:
+        code = _wait(process, listener, seconds, responds)
+    finally:
+        _end(process)
+        del _running[process]
+    listener.join(1.0)  # what it left running may hold the stream open
+    return Done(code, b"".join(said).decode(errors="replace"))
+
+
+def _wait(
+    process: subprocess.Popen[bytes], listener: Thread, seconds: float, responds: Callable[[], bool]
+) -> int | None:
+    """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
+    first = min(seconds, PATIENCE)
+    for patience in (first, seconds - first):
+        end = monotonic() + patience
+        listener.join(patience)
+        with suppress(subprocess.TimeoutExpired):
+            return process.wait(max(0.0, end - monotonic()))
+        if seconds <= first or not responds():
+            break
+    return None
+
+
+def _listen(stream: IO[bytes], said: list[bytes]) -> None:
+    """Keep the beginning of a stream, and take the rest, so that nobody waits to write it."""
+    with suppress(OSError, ValueError), stream:
+        said.append(stream.read(MOST_SAID))
+        while stream.read(MOST_SAID):
+            pass
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a command that has not ended, with its process group: its number cannot be another's as long as it runs."""
+    if process.poll() is None:
+        with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+        process.wait()
+
+
+@atexit.register
+def end_all() -> None:
+    """End what other threads have running when this process ends."""
+    for process, folder in list(_running.items()):
+        with suppress(OSError):
+            _end(process)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+interrupts.before_leaving.append(end_all)

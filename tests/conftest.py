@@ -1,0 +1,37 @@
+"""What every test finds: Ctrl-C as in a terminal, and an end to the memory that a process may take."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOM = 2 << 30  # bytes for a process of tests, and for each that it starts
+
+
+def pytest_sessionstart() -> None:
+    """Let a test that would fill the memory fail, rather than the machine."""
+    if sys.platform == "linux":
+        import resource
+
+        np.linalg.inv(np.eye(2))  # with what the libraries take for each core
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        _, most = resource.getrlimit(resource.RLIMIT_AS)
+        wanted = taken + ROOM
+        resource.setrlimit(resource.RLIMIT_AS, (wanted if most < 0 else min(wanted, most), most))
+
+
+@pytest.fixture(autouse=True)
+def control_c() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt, also in the background of a shell and after a command that ran here."""
+    hook, ours = sys.unraisablehook, threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler) if ours else None
+    yield
+    sys.unraisablehook = hook
+    if ours:
+        signal.signal(signal.SIGINT, before)

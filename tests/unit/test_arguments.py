@@ -1,0 +1,90 @@
+"""Arguments that are none: refused in a sentence, not by an exception from below."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.errors import UsageError
+from hsdsl.names import INVISIBLE
+from hsdsl.plot import plot
+from hsdsl.store import save
+
+MODELS = Path(__file__).parents[2] / "models"
+BALL = MODELS / "bouncing-ball.yaml"
+NUMBERS = [float("nan"), float("inf"), 1.5, "2", True, 0, -1, None, [1]]
+
+
+@pytest.mark.parametrize("every", NUMBERS)
+def test_every(every, tmp_path):
+    with pytest.raises(UsageError, match="every must be"):
+        hsdsl.load(BALL).stream(tmp_path / "x.csv", every=every)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("threads", [number for number in NUMBERS if number is not None])
+def test_threads(threads):
+    with pytest.raises(UsageError, match="threads must be"):
+        hsdsl.load(BALL).ensemble(threads=threads)
+
+
+@pytest.mark.parametrize("times", [number for number in NUMBERS if number not in (0, True)] + [True])
+def test_transition_times(times):
+    with pytest.raises(UsageError, match="transition_times must be"):
+        hsdsl.load(BALL).ensemble(transition_times=times)
+
+
+def test_whole_numbers_of_numpy_are_whole_numbers():
+    many = hsdsl.load(BALL).ensemble(threads=np.int64(1), transition_times=np.int32(2))
+    assert many.transition_times.shape == (2,)
+
+
+def test_masked_elements_are_no_values():
+    heights = np.ma.masked_array([1.0, 2.0, 3.0], mask=[False, True, False])
+    with pytest.raises(UsageError, match="masked"):
+        hsdsl.load(BALL).ensemble(initial={"h": heights})
+    whole = hsdsl.load(BALL).ensemble(initial={"h": np.ma.masked_array([1.0, 2.0], mask=False)}, until=0.1)
+    assert whole.shape == (2,)
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+x", "-x", "@x", "=cmd|'/c'!A1"])
+def test_no_cell_is_a_formula(name, tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        f'hsdsl: 1\nmodes: {{"{name}": {{flow: {{x: -1}}}}}}\ninitial: {{mode: "{name}", x: -1}}\n'
+        "experiment: {until: 1}\n"
+    )
+    save(hsdsl.load(path).simulate(), tmp_path / "run.csv")
+    cells = [line.split(",") for line in (tmp_path / "run.csv").read_text().splitlines()[1:]]
+    assert {row[1] for row in cells} == {"'" + name} and {row[3][0] for row in cells} == {"-"}
+
+
+@pytest.mark.parametrize("sign", ["\u061c", "\u00ad", "\u200f", "\u202e"])
+def test_signs_without_width_are_invisible(sign):
+    assert INVISIBLE.search(f"a{sign}b")
+
+
+def test_pictures_are_the_same_from_any_thread(tmp_path):
+    run = hsdsl.load(BALL).simulate(engine="python")
+    threads = [threading.Thread(target=plot, args=(run, tmp_path / f"{k}.svg")) for k in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({(tmp_path / f"{k}.svg").read_bytes() for k in range(6)}) == 1
+
+
+@pytest.mark.parametrize("named", ["nonsense", "agg", "module://no.such.module", ""])
+def test_any_backend_of_matplotlib_may_be_named(named, tmp_path):
+    command = [sys.executable, "-m", "hsdsl", "run", str(BALL), "-q", "--engine", "python", "--plot", "x.svg"]
+    environment = {**os.environ, "MPLBACKEND": named}
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr
+    assert (tmp_path / "x.svg").stat().st_size > 1000
