@@ -8,7 +8,7 @@ E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 19
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -50,7 +50,7 @@ class Convergence:
         self.rate = self.left = arithmetic.zero + 1
         self.aged = False
 
-    def to_tolerance(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
+    def to_tolerance(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until what is left is a small share of the tolerance.
 
         Raises
@@ -85,7 +85,7 @@ class Convergence:
         self.rate, self.left, self.aged = one, one, True
         raise NoConvergence("an iteration that does not settle")
 
-    def to_roundoff(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
+    def to_roundoff(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until the next correction would be below the last digit, or they are all noise.
 
         Raises
@@ -112,7 +112,7 @@ class Convergence:
         return z
 
 
-def _scaled(largest: Vector, x: State, scales: Vector, z: Increments) -> Number:
+def _scaled(largest: Vector, x: State, scales: Sequence[Number], z: Increments) -> Number:
     """The largest change relative to the scales, or to where a state is now.
 
     A state that has been zero so far counts only where all are: it follows the others, an iteration later.

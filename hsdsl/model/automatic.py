@@ -126,12 +126,15 @@ def stiffness(
 
 
 class _Look:
-    """A mode's flow and Jacobian as arrays, with the inputs of the start, and a way from there: where it is, and when."""
+    """A mode's flow and Jacobian as arrays, with the inputs of the start, and a point on the way from there."""
+
+    x: Array
 
     def __init__(self, kernel: Kernel, timeline: Timeline, mode: int, x: Array) -> None:
         data = timeline.at(0.0).data
         self._flow, self._jacobian = kernel.bind(mode, data).flow, kernel.jacobian(mode, data)
-        self.t, self.x, self._scales = 0.0, x, np.abs(x)
+        self.t, self.x = 0.0, x
+        self._scales: Array = np.abs(x)
 
     def flow(self, t: float, x: Array) -> Array:
         return np.array(self._flow(t, *x.tolist()), float)
@@ -147,8 +150,8 @@ class _Look:
     def step(self, h: float) -> None:
         """Make a step (ROS2; Verwer, Spee, Blom and Hundsdorfer 1999, doi:10.1137/S1064827597326651)."""
         matrix = np.eye(len(self.x)) - (1 - np.sqrt(0.5)) * h * self.jacobian()
-        first = np.linalg.solve(matrix, self.flow(self.t, self.x))
-        second = np.linalg.solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
+        first: Array = np.linalg.solve(matrix, self.flow(self.t, self.x))
+        second: Array = np.linalg.solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
         self.x = self.x + 1.5 * h * first + 0.5 * h * second
         self.t += h
         self._scales = np.maximum(self._scales, np.abs(self.x))
