@@ -149,9 +149,9 @@ class _Look:
 
     def step(self, h: float) -> None:
         """Make a step (ROS2; Verwer, Spee, Blom and Hundsdorfer 1999, doi:10.1137/S1064827597326651)."""
-        matrix = np.eye(len(self.x)) - (1 - np.sqrt(0.5)) * h * self.jacobian()
-        first: Array = np.linalg.solve(matrix, self.flow(self.t, self.x))
-        second: Array = np.linalg.solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
+        matrix: Array = np.eye(len(self.x)) - (1 - 0.5**0.5) * h * self.jacobian()
+        first: Array = _solve(matrix, self.flow(self.t, self.x))
+        second: Array = _solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
         self.x = self.x + 1.5 * h * first + 0.5 * h * second
         self.t += h
         self._scales = np.maximum(self._scales, np.abs(self.x))
@@ -162,3 +162,7 @@ class _Look:
         bend = np.abs(self.flow(self.t + ahead, self.x + ahead * f) - f) / ahead
         bent, sizes = bend > 0, np.maximum(self._scales, np.abs(f) / decay)
         return float(np.sqrt(0.02 * np.min(sizes[bent] / bend[bent]))) if np.any(bent) else inf
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    return np.array(np.linalg.solve(matrix, right), float)

@@ -151,8 +151,8 @@ class Experiment(Document):
     )
     relaxation: OptionalExpression = Field(
         None,
-        description="The paper's epsilon: depth of the strips, in the model's own units and in time. Left out, 1e-6, or "
-        "1e-6 of a run that is shorter than 1.",
+        description="The paper's epsilon: depth of the strips, in the model's own units and in time. Left out, 1e-6, "
+        "or 1e-6 of a run that is shorter than 1.",
         examples=["1e-6"],
     )
     samples: Samples | None = Field(
