@@ -11,6 +11,7 @@ import os
 import sys
 
 from hsdsl import interrupts
+from hsdsl.cli import streams
 
 WRONG_USAGE = 2
 

@@ -34,7 +34,7 @@ OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".h
 @click.option("--scheme", metavar="S", help="relaxed, located or paoli-schatzman.")
 @click.option("--method", metavar="M", help="A method's name, such as dopri5 or taylor, or auto.")
 @click.option("--step", metavar="H", help="Fixed step size; excludes --tolerance.")
-@click.option("--tolerance", metavar="TOL", help="Bound on the local error relative to 1 + |x|; adaptive steps.")
+@click.option("--tolerance", metavar="TOL", help="Bound on the local error, relative to the states' scales.")
 @click.option("--relaxation", metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
 @click.option("--engine", metavar="ENGINE", default="auto", help="auto, c or python.")
 @click.option(

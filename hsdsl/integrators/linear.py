@@ -1,7 +1,8 @@
 """Systems of linear equations for any number type: dense LU with partial pivoting, for the few states of a mode.
 
 A pivot is the largest number of its column relative to the scale of its row's unknown, so that it does not depend on
-the units of the unknowns. Complex numbers are pairs of real ones, so that every number type has them, and every engine the same.
+the units of the unknowns. Complex numbers are pairs of real ones, so that every number type has them, and every engine
+the same.
 """
 
 from __future__ import annotations

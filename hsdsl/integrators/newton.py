@@ -8,7 +8,7 @@ E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 19
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -50,7 +50,7 @@ class Convergence:
         self.rate = self.left = arithmetic.zero + 1
         self.aged = False
 
-    def to_tolerance(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
+    def to_tolerance(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until what is left is a small share of the tolerance.
 
         Raises
@@ -63,9 +63,10 @@ class Convergence:
         noise = NOISE * unit / tolerance
         enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
         left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
+        late = _followers(scales)
         for count, (largest, z) in enumerate(iterations, 1):
             size = _scaled(largest, x, scales, z) / tolerance
-            if before is not None:
+            if before is not None and count > 1 + late:
                 rate = size / before
                 if rate >= DIVERGING:
                     if size <= noise:
@@ -77,15 +78,16 @@ class Convergence:
             if size == 0 or ahead <= enough:
                 self.left = left
                 return z
-            for _ in range(count, MOST if before is not None else count):
+            told = before is not None and count > 1 + late
+            for _ in range(count, MOST if told else count):
                 ahead = ahead * self.rate
-            if count == MOST or (before is not None and ahead > enough and size > noise):
+            if count == MOST or (told and ahead > enough and size > noise):
                 break
             before = size
         self.rate, self.left, self.aged = one, one, True
         raise NoConvergence("an iteration that does not settle")
 
-    def to_roundoff(self, x: State, scales: Vector, iterations: Iterator[Iteration]) -> Increments:
+    def to_roundoff(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until the next correction would be below the last digit, or they are all noise.
 
         Raises
@@ -95,14 +97,15 @@ class Convergence:
         """
         unit, before, z = self._arithmetic.unit, None, None
         allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
-        for largest, z in islice(iterations, 16 + 2 * self._arithmetic.bits):
+        late = _followers(scales)
+        for count, (largest, z) in enumerate(islice(iterations, 16 + 2 * self._arithmetic.bits), 1):
             size = _scaled(largest, x, scales, z)
             rate = SLOW if not before else size / before
             reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
             if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
                 self.rate, self.aged = rate, rate > RENEWED
                 return z
-            if before and rate >= SLOW:
+            if before and rate >= SLOW and count > 1 + late:
                 if size <= allowed:
                     return z
                 self.rate, self.aged = self._arithmetic.zero + 1, True
@@ -112,14 +115,16 @@ class Convergence:
         return z
 
 
-def _scaled(largest: Vector, x: State, scales: Vector, z: Increments) -> Number:
-    """The largest change relative to the scales, or to where a state is now.
-
-    A state that has been zero so far counts only where all are: it follows the others, an iteration later.
-    """
-    size, known = largest[0] * 0, any(s > 0 for s in scales)
-    for d, a, s, end in zip(largest, x, scales, z[2], strict=True):
-        if d > 0 and (s > 0 or not known):
-            reach = max(s, abs(a + end))
+def _scaled(largest: Vector, x: State, scales: Sequence[Number], z: Increments) -> Number:
+    """The largest change relative to the scales; of a state that has been zero so far, to where it is now."""
+    size = largest[0] * 0
+    for i, (d, s) in enumerate(zip(largest, scales, strict=True)):
+        if d > 0:
+            reach = s if s > 0 else max(abs(x[i] + k[i]) for k in z)
             size = max(size, d / reach if reach > 0 else reach + 1)
     return size
+
+
+def _followers(scales: Sequence[Number]) -> int:
+    """How many states have been zero so far: each may follow another one, an iteration later."""
+    return sum(not s > 0 for s in scales)

@@ -131,7 +131,7 @@ def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, a
         before = largest
     for i, s in enumerate(scales):
         if not s > 0:
-            for h in _from_zero([c[i] for c in stages], tolerance, arithmetic):
+            for h in _from_zero(tuple(c[i] for c in stages), tolerance, arithmetic):
                 least = h if least is None else min(h, least)
     return least
 

@@ -126,12 +126,15 @@ def stiffness(
 
 
 class _Look:
-    """A mode's flow and Jacobian as arrays, with the inputs of the start, and a way from there: where it is, and when."""
+    """A mode's flow and Jacobian as arrays, with the inputs of the start, and a point on the way from there."""
+
+    x: Array
 
     def __init__(self, kernel: Kernel, timeline: Timeline, mode: int, x: Array) -> None:
         data = timeline.at(0.0).data
         self._flow, self._jacobian = kernel.bind(mode, data).flow, kernel.jacobian(mode, data)
-        self.t, self.x, self._scales = 0.0, x, np.abs(x)
+        self.t, self.x = 0.0, x
+        self._scales: Array = np.abs(x)
 
     def flow(self, t: float, x: Array) -> Array:
         return np.array(self._flow(t, *x.tolist()), float)
@@ -146,9 +149,9 @@ class _Look:
 
     def step(self, h: float) -> None:
         """Make a step (ROS2; Verwer, Spee, Blom and Hundsdorfer 1999, doi:10.1137/S1064827597326651)."""
-        matrix = np.eye(len(self.x)) - (1 - np.sqrt(0.5)) * h * self.jacobian()
-        first = np.linalg.solve(matrix, self.flow(self.t, self.x))
-        second = np.linalg.solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
+        matrix: Array = np.eye(len(self.x)) - (1 - 0.5**0.5) * h * self.jacobian()
+        first: Array = _solve(matrix, self.flow(self.t, self.x))
+        second: Array = _solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)
         self.x = self.x + 1.5 * h * first + 0.5 * h * second
         self.t += h
         self._scales = np.maximum(self._scales, np.abs(self.x))
@@ -159,3 +162,7 @@ class _Look:
         bend = np.abs(self.flow(self.t + ahead, self.x + ahead * f) - f) / ahead
         bent, sizes = bend > 0, np.maximum(self._scales, np.abs(f) / decay)
         return float(np.sqrt(0.02 * np.min(sizes[bent] / bend[bent]))) if np.any(bent) else inf
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    return np.array(np.linalg.solve(matrix, right), float)

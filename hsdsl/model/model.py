@@ -139,7 +139,8 @@ class Model:
         scheme, method : str, optional
             A name of :data:`hsdsl.simulate.SCHEMES`; a name of :data:`hsdsl.integrators.METHODS`, or ``auto``.
         step, tolerance : number or str, optional
-            Fixed step, or bound on the local error relative to 1 + |x|; they exclude each other.
+            Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
+            other.
         relaxation : number or str, optional
             The paper's epsilon: a depth in the model's own units, and a time.
         samples : int, str or sequence, optional

@@ -151,12 +151,14 @@ class Experiment(Document):
     )
     tolerance: OptionalExpression = Field(
         None,
-        description="The bound on the local error, relative to 1 + |x|, of an adaptive method. Excludes `step`.",
+        description="The bound on the local error of an adaptive method, relative to the largest size each state has "
+        "had. Excludes `step`.",
         examples=["1e-9"],
     )
     relaxation: OptionalExpression = Field(
         None,
-        description="The paper's epsilon: depth of the strips, in the model's own units and in time.",
+        description="The paper's epsilon: depth of the strips, in the model's own units and in time. Left out, 1e-6, "
+        "or 1e-6 of a run that is shorter than 1.",
         examples=["1e-6"],
     )
     samples: Samples | None = Field(

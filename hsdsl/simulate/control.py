@@ -1,9 +1,10 @@
 """The step size: fixed, or from the embedded error estimate by one documented formula.
 
 With e the estimate, z the step's end and s the scales of the states (the largest size that each has had), the error
-ratio is max_i |e_i| / (tolerance max(s_i, |z_i|)). A step is accepted when it is at most 1. The next step is h times 0.9 ratio**(-1/order), kept between 0.2 and 5 (and not
-above 1 after a rejection), order being the power of h that the estimate falls with. A step whose equations could not
-be solved is halved. Trials halved to stay in the relaxed domain do not feed the formula.
+ratio is max_i |e_i| / (tolerance max(s_i, |z_i|)). A step is accepted when it is at most 1. The next step is h times
+0.9 ratio**(-1/order), kept between 0.2 and 5 (and not above 1 after a rejection), order being the power of h that the
+estimate falls with. A step whose equations could not be solved is halved. Trials halved to stay in the relaxed domain
+do not feed the formula.
 
 Where surfaces of a mode vary too fast along a step it is halved as well, and this length is kept: the next step in the
 mode, also of another stretch of flow, begins with it, or with twice the last one that they allowed.
@@ -14,8 +15,8 @@ stretch of flow begins with a step in which no state moves by more than toleranc
 than the least step: the largest one times the tolerance, or times 1e-8 (half the digits of a number) if that is more.
 
 A state that has been zero so far has no scale. It is held against its own value at the step's end. Where it begins as
-a power of time that is above the method's order, no step is short enough for that: over the least step a
-state that has been no more than the tolerance times what it is then does not count.
+a power of time that is above the method's order, no step is short enough for that: over the least step a state that has
+been no more than the tolerance times what it is then does not count.
 """
 
 from __future__ import annotations

@@ -31,7 +31,8 @@ class OneStop:
 class Settings:
     """Settings of one run, resolved and checked.
 
-    Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to 1 + |x|) is given.
+    Exactly one of ``step`` (fixed) and ``tolerance`` (adaptive: local error relative to the largest
+    size that each state has had) is given.
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.

@@ -8,8 +8,8 @@ that, times the likely number of transitions, is above a hundredth of that time.
 ## Why it is bad
 
 Every transition of a relaxed run is late by about the relaxation, divided by the speed with which its guard is
-crossed, and the delays add up. Where modes last microseconds, the default of 1e-6 is not small: it is compared with
-times in the model's own unit of time.
+crossed, and the delays add up. Where modes last microseconds in a run of seconds, the default of 1e-6 is not small: it
+is compared with times in the model's own unit of time.
 
 ## Example
 

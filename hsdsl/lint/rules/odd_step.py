@@ -7,7 +7,7 @@ Finds a `step` that is longer than a tenth of the run, a `tolerance` above 0.01 
 ## Why it is bad
 
 A handful of steps shows nothing of a flow, nor does a tolerance of several percent. Below 1e-15 the round-off of
-float64 is larger than what is asked for, and steps are refused without end.
+float64 is larger than what is asked for; below 2.2e-16 a run is refused.
 
 ## Example
 

@@ -11,20 +11,28 @@
 #define NEWTON_NOISE 1024
 #define NEWTON_SHARE 1e-2
 
-/* The largest change relative to the scales, or to where a state is now. A state that has been zero so far counts only
-   where all are: it follows the others, an iteration later. */
+/* The largest change relative to the scales; of a state that has been zero so far, to where it is now. */
 HS_INLINE double scaled(const hs_run *run, int n) {
   const hs_radau *const radau = &run->radau;
   double size = 0.0;
-  int known = 0;
-  for (int s = 0; s < n; s++) known |= radau->scales[s] > 0;
   for (int s = 0; s < n; s++) {
-    const double change = radau->largest[s], scale = radau->scales[s];
-    if (!(change > 0 && (scale > 0 || !known))) continue;
-    const double reach = hs_max(scale, fabs(run->x[s] + radau->z[2][s]));
+    const double change = radau->largest[s];
+    double reach = radau->scales[s];
+    if (!(change > 0)) continue;
+    for (int i = 0; i < 3 && !(radau->scales[s] > 0); i++) {
+      const double at = fabs(run->x[s] + radau->z[i][s]);
+      reach = i ? hs_max(reach, at) : at;
+    }
     size = hs_max(size, reach > 0 ? change / reach : reach + 1);
   }
   return size;
+}
+
+/* How many states have been zero so far: each may follow another one, an iteration later. */
+HS_INLINE int followers(const hs_run *run, int n) {
+  int count = 0;
+  for (int s = 0; s < n; s++) count += !(run->radau.scales[s] > 0);
+  return count;
 }
 
 static int unsettled(hs_convergence *convergence) {
@@ -39,11 +47,13 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
   const double tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
   const double enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
   double left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
+  const int late = followers(run, n);
   for (int count = 1;; count++) {
+    const int told = count > 1 + late;
     const int status = iterate(run, n, t, h);
     if (status) return status;
     const double size = scaled(run, n) / tolerance;
-    if (count > 1) {
+    if (told) {
       const double rate = size / before;
       if (rate >= DIVERGING) {
         if (size <= noise) return 0;
@@ -58,9 +68,9 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
       convergence->left = left;
       return 0;
     }
-    if (count > 1)
+    if (told)
       for (int i = count; i < MOST_ITERATIONS; i++) ahead = ahead * convergence->rate;
-    if (count == MOST_ITERATIONS || (count > 1 && ahead > enough && size > noise)) break;
+    if (count == MOST_ITERATIONS || (told && ahead > enough && size > noise)) break;
     before = size;
   }
   convergence->left = 1.0;
@@ -83,7 +93,8 @@ HS_INLINE int to_roundoff(hs_run *run, int n, double t, double h) {
   hs_convergence *const convergence = &run->radau.convergence;
   const double allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
   double before = 0.0;
-  for (int count = 0; count < MOST_TO_ROUNDOFF; count++) {
+  const int late = followers(run, n);
+  for (int count = 1; count <= MOST_TO_ROUNDOFF; count++) {
     const int status = iterate(run, n, t, h);
     if (status) return status;
     const double size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
@@ -92,7 +103,7 @@ HS_INLINE int to_roundoff(hs_run *run, int n, double t, double h) {
       convergence->aged = rate > RENEWED;
       return 0;
     }
-    if (before != 0 && rate >= SLOW_RATE) return size <= allowed ? 0 : unsettled(convergence);
+    if (before != 0 && rate >= SLOW_RATE && count > 1 + late) return size <= allowed ? 0 : unsettled(convergence);
     before = size;
   }
   return 0;
