@@ -17,6 +17,11 @@ from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, pos
 from hsdsl.lint.analysis.tape import too_large
 from hsdsl.lint.written import Written
 
+_SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
+_CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
+    sp.Add, sp.Mul, sp.Symbol, sp.Number, sp.NumberSymbol, sp.Abs, sp.Min, sp.Max, functions.absolute,
+    functions.minimum, functions.maximum, *(functions.FUNCTIONS[name][0] for name in _SMOOTH),
+)  # fmt: skip
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
@@ -60,6 +65,39 @@ def _jump(part: Any) -> list[Clause]:
     if isinstance(part, sp.atan2):
         return [(zero(part.args[0]), negative(part.args[1]))]
     return [(zero(part.args[0]),)]
+
+
+def discontinuities(expr: Any) -> list[Clause] | None:
+    """Where an expression may jump or pass a pole, as alternatives; None where that is not known."""
+    found: list[Clause] = []
+    for part in parts(expr):
+        if isinstance(part, (functions.floor, sp.floor)):
+            found.append((zero(sp.sin(sp.pi * part.args[0])),))
+        elif isinstance(part, (functions.sign, sp.sign)):
+            found.append((zero(part.args[0]),))
+        elif isinstance(part, sp.atan2):
+            found.append((zero(part.args[0]), at_most_zero(part.args[1])))
+        elif not isinstance(part, _CONTINUOUS) and not part.is_Pow:
+            return None
+    found += [(zero(divisor),) for divisor in divisors(expr)]
+    return None if too_large([expr], MOST_PARTS) else found
+
+
+def breaks(expr: Any) -> list[Clause] | None:
+    """Where an expression without kinks may not have derivatives of every order, as alternatives."""
+    found = discontinuities(expr)
+    for part in parts(expr):
+        if found is None:
+            break
+        if part.is_Pow and not (part.exp.is_Integer or part.base.is_number):
+            found.append((zero(part.base),))
+        elif isinstance(part, sp.log):
+            found.append((zero(part.args[0]),))
+        elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
+            found += [(zero(1 - part.args[0]),), (zero(1 + part.args[0]),)]
+        elif isinstance(part, sp.acosh):
+            found.append((zero(part.args[0] - 1),))
+    return found
 
 
 def kinks(expr: Any) -> Iterator[Part]:

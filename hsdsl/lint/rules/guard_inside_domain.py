@@ -37,8 +37,8 @@ modes:
 
 ## How it is decided
 
-A point of the surface is looked for, in the domain and with the flow not pointing back, where no transition with the
-same surface has an `if` that holds: symbolically, or by search.
+A point of the surface is looked for, in the domain and with the flow going out, where no transition with the same
+surface has an `if` that holds: symbolically, or by search.
 
 ## How to fix it
 
