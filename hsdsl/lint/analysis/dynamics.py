@@ -21,10 +21,11 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.ladder import MOST_PARTS, Ladder
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
-from hsdsl.lint.analysis.tape import at_point, enclosure, too_large
+from hsdsl.lint.analysis.tape import at_point, enclosure, parts_of, too_large
 from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
+MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
 T = TypeVar("T")
 _LARGEST = Fraction(10) ** 100  # of values that are looked for: beyond, products overflow
@@ -82,7 +83,7 @@ class Dynamics:
 
     def along(self, expr: Any, flow: Mapping[Any, Any]) -> Any | None:
         """The derivative of an expression along a flow; None where that is not known."""
-        if too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
+        if parts_of(expr) > MOST_DERIVED or too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
             return None
         present = sorted(expr.free_symbols & flow.keys(), key=lambda s: s.name)
         parts = [self.slope(expr, s) * flow[s] for s in present]

@@ -11,16 +11,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
+from hsdsl.lint.analysis.ladder import MOST_PARTS
 from hsdsl.lint.analysis.pieces import Piece, pieces
 from hsdsl.lint.analysis.singular import breaks
+from hsdsl.lint.analysis.tape import Tape, too_large
 from hsdsl.system import TIME, Edge, Mode
 
 DEEPEST = 6  # derivatives along the flow that are looked at
 NEAR = 1e-8
+_STEP = 2.0**-13  # of a difference quotient, relative to a name's size
 _SMALL = 1e-6  # of how far a name is searched: nothing that is computed with it is more exact than NEAR of that
 
 
@@ -48,14 +52,15 @@ class Local:
 
     def sign(self, expr: Any) -> int:
         """-1, 0 or 1; 0 where round-off and the search's own error may be all there is."""
-        value = self.dynamics.value(expr, self.point)
-        if value != value:
+        names = sorted(expr.free_symbols, key=str)
+        tape = self.dynamics.remembered(("terms", expr), lambda: Tape([expr, *sp.Add.make_args(expr)], names))
+        here = np.array([float(self.point[s]) for s in names])
+        steps = _STEP * np.diag([self.size(s) for s in names])
+        values = tape.at(np.vstack([here, here + steps]) if names else np.zeros((1, 0)))
+        value, terms, slopes = values[0, 0], values[1:, 0], (values[0, 1:] - values[0, 0]) / _STEP
+        if not np.isfinite(value):
             raise Unsure
-        if value == 0:
-            return 0
-        terms = sum(abs(self.dynamics.value(term, self.point)) for term in sp.Add.make_args(expr))
-        slopes = (abs(self.dynamics.value(expr.diff(s), self.point)) * self.size(s) for s in expr.free_symbols)
-        size = max(terms, sum(slope for slope in slopes if slope == slope))
+        size = max(np.abs(terms).sum(), np.nansum(np.abs(slopes)))
         return 0 if abs(value) <= NEAR * size else 1 if value > 0 else -1
 
     def size(self, name: Any) -> float:
@@ -77,7 +82,7 @@ class Local:
         expr = piece.residual
         for order in range(1, DEEPEST + 1):
             expr = self.dynamics.along(expr, piece.flow)
-            if expr is None:
+            if expr is None or too_large([expr], MOST_PARTS):
                 raise Unsure
             if sign := self.sign(expr):
                 return order, sign

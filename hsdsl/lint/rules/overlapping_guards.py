@@ -88,13 +88,14 @@ def _look(subject: Subject, part: ModePart, first: EdgePart, second: EdgePart, f
     answer = next((answer for answer in answers if answer.somewhere), None)
     if answer is None:
         return
-    proof = commute(dynamics, first.edge, second.edge, overlaps)
+    different = matters(Local(dynamics, mode, answer.point), first.edge, second.edge)
+    proof = None if different else commute(dynamics, first.edge, second.edge, overlaps)
     decided = answer.decided or "sampled"
     if proof is not None:
         then = f"they commute{within(proof.searched)}: either order leads to the same state"
         decided = "interval" if proof.decided == "interval" and decided == "symbolic" else decided
     else:
-        then = _unproved(matters(Local(dynamics, mode, answer.point), first.edge, second.edge))
+        then = _unproved(different)
     residuals = [dynamics.residual(edge.edge.surface) for edge in (first, second)]
     where = at(dynamics, mode, answer, residuals)
     message = f"the guards of '{first.edge.name}' and '{second.edge.name}' overlap, {where}; {then}"
