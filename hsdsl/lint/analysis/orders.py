@@ -7,7 +7,7 @@ expressions from all points of the overlap at once, which can prove that it does
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -16,8 +16,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.instants import chain, same
 from hsdsl.lint.analysis.local import Local, Unsure, ranked
-from hsdsl.lint.analysis.pieces import influencing
-from hsdsl.lint.analysis.pieces import KINKED
+from hsdsl.lint.analysis.pieces import KINKED, influencing
 from hsdsl.lint.analysis.proof import Proof, strict
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, at_most_zero, positive, zero
 from hsdsl.lint.analysis.singular import breaks
@@ -33,12 +32,17 @@ def together(dynamics: Dynamics, first: Edge, second: Edge) -> tuple[Clause, ...
     return tuple(tuple(dict.fromkeys((*a, *b))) for a, b in product(one, other))
 
 
+def speeds(dynamics: Dynamics, first: Edge, second: Edge) -> Clause:
+    """That the flow goes out of both surfaces with a rate above 0, where that is not so everywhere."""
+    mode = dynamics.modes[first.source]
+    rates = (dynamics.rate(mode, dynamics.residual(edge.surface)) for edge in (first, second))
+    return tuple(positive(rate) for rate in rates if rate is not None and not rate.is_number)
+
+
 def meeting(dynamics: Dynamics, first: Edge, second: Edge, overlap: Clause) -> Answer:
     """A point of an overlap where the flow goes out through both guards, and through none that goes before both."""
     mode = dynamics.modes[first.source]
-    residuals = [dynamics.residual(edge.surface) for edge in (first, second)]
-    rates = [dynamics.rate(mode, residual) for residual in residuals]
-    out = tuple(positive(rate) for rate in rates if rate is not None and not rate.is_zero)
+    out = speeds(dynamics, first, second)
     others = [e.surface for e in mode.edges if e.condition is None and e not in (first, second)]
     inside = strict(at_most_zero(dynamics.residual(surface)) for surface in (*others, *mode.walls))
     for more in dict.fromkeys(((*out, *inside), out, ())):
@@ -82,7 +86,7 @@ def matters(here: Local, first: Edge, second: Edge) -> bool | None:
     return not any(same(a, b) for a in one for b in other)
 
 
-def commute(dynamics: Dynamics, first: Edge, second: Edge, overlaps: tuple[Clause, ...]) -> Proof | None:
+def commute(dynamics: Dynamics, first: Edge, second: Edge, overlaps: Sequence[Clause]) -> Proof | None:
     """The proof that both orders lead to one mode with the same states at one instant from all points of overlaps."""
     proof = Proof(dynamics, dynamics.modes[first.source])
     for overlap in overlaps:

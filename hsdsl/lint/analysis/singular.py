@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -67,7 +68,8 @@ def _jump(part: Any) -> list[Clause]:
     return [(zero(part.args[0]),)]
 
 
-def discontinuities(expr: Any) -> list[Clause] | None:
+@lru_cache(maxsize=5_000)
+def discontinuities(expr: Any) -> tuple[Clause, ...] | None:
     """Where an expression may jump or pass a pole, as alternatives; None where that is not known."""
     found: list[Clause] = []
     for part in parts(expr):
@@ -80,15 +82,17 @@ def discontinuities(expr: Any) -> list[Clause] | None:
         elif not isinstance(part, _CONTINUOUS) and not part.is_Pow:
             return None
     found += [(zero(divisor),) for divisor in divisors(expr)]
-    return None if too_large([expr], MOST_PARTS) else found
+    return None if too_large([expr], MOST_PARTS) else tuple(found)
 
 
-def breaks(expr: Any) -> list[Clause] | None:
+@lru_cache(maxsize=5_000)
+def breaks(expr: Any) -> tuple[Clause, ...] | None:
     """Where an expression without kinks may not have derivatives of every order, as alternatives."""
-    found = discontinuities(expr)
+    jumping = discontinuities(expr)
+    if jumping is None:
+        return None
+    found = list(jumping)
     for part in parts(expr):
-        if found is None:
-            break
         if part.is_Pow and not (part.exp.is_Integer or part.base.is_number):
             found.append((zero(part.base),))
         elif isinstance(part, sp.log):
@@ -97,7 +101,7 @@ def breaks(expr: Any) -> list[Clause] | None:
             found += [(zero(1 - part.args[0]),), (zero(1 + part.args[0]),)]
         elif isinstance(part, sp.acosh):
             found.append((zero(part.args[0] - 1),))
-    return found
+    return tuple(found)
 
 
 def kinks(expr: Any) -> Iterator[Part]:

@@ -49,7 +49,8 @@ initial: {mode: table, x: 0, y: 0}
 A point on both guards is looked for, symbolically or by search. From there both orders are followed with numbers,
 through the transitions that a run makes at that instant: where they end in different states, the order matters.
 
-That transitions commute is proved for all points of the overlap: both orders are followed through the transitions
+That transitions commute is proved for all points of the overlap from which the flow goes out of both surfaces at a
+speed (L_f r > 0): both orders are followed through the transitions
 that are sure to be next at that instant, at most three, and the states they lead to are compared symbolically. Where a
 part of that is proved by interval arithmetic, the message states the bounds.
 
@@ -65,34 +66,46 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from hsdsl.lint.analysis.local import Local
-from hsdsl.lint.analysis.orders import commute, matters, meeting, together
+from hsdsl.lint.analysis.orders import commute, matters, meeting, speeds, together
 from hsdsl.lint.analysis.repeats import Repeats
 from hsdsl.lint.analysis.words import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
+MOST_PAIRS = 100  # that are followed: each takes a hundred times as long as to see whether two guards overlap
+
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find guards that overlap."""
     found = Repeats("pair")
+    left = MOST_PAIRS
     for part in subject.modes:
         for first, second in combinations(part.edges, 2):
+            overlaps = together(subject.dynamics, first.edge, second.edge)
+            if not any(subject.dynamics.ask(part.mode, overlap).somewhere for overlap in overlaps):
+                continue
+            if not left:
+                message = f"more than {MOST_PAIRS} pairs of guards of this model overlap: from here on none is followed"
+                yield from (*found, Finding(second.document.when.place.span, message, severity="note"))
+                return
+            left -= 1
             _look(subject, part, first, second, found)
     yield from found
 
 
 def _look(subject: Subject, part: ModePart, first: EdgePart, second: EdgePart, found: Repeats) -> None:
     dynamics, mode = subject.dynamics, part.mode
-    overlaps = together(dynamics, first.edge, second.edge)
+    overlaps, out = together(dynamics, first.edge, second.edge), speeds(dynamics, first.edge, second.edge)
     answers = (meeting(dynamics, first.edge, second.edge, overlap) for overlap in overlaps)
     answer = next((answer for answer in answers if answer.somewhere), None)
     if answer is None:
         return
     different = matters(Local(dynamics, mode, answer.point), first.edge, second.edge)
-    proof = None if different else commute(dynamics, first.edge, second.edge, overlaps)
+    proof = None if different else commute(dynamics, first.edge, second.edge, [(*o, *out) for o in overlaps])
     decided = answer.decided or "sampled"
     if proof is not None:
-        then = f"they commute{within(proof.searched)}: either order leads to the same state"
+        where = f"{' where L_f r > 0 on both' if out else ''}{within(proof.searched)}"
+        then = f"they commute{where}: either order leads to the same state"
         decided = "interval" if proof.decided == "interval" and decided == "symbolic" else decided
     else:
         then = _unproved(different)

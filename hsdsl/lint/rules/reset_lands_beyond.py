@@ -37,8 +37,8 @@ modes:
 ## How it is decided
 
 The surfaces of the next mode are put behind the reset, and a point of the guard is looked for where one of them is
-positive: symbolically, or by search. That it is positive everywhere is proved symbolically, or by intervals within bounds that the message states. What a
-run does at the point is followed with numbers.
+positive: symbolically, or by search. What a run does there is followed with numbers. That it is positive everywhere
+is proved symbolically, or by intervals within bounds that the message states.
 
 ## How to fix it
 

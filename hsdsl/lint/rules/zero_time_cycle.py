@@ -39,8 +39,8 @@ initial: {mode: a, x: 0}
 
 Points of guards are looked for, symbolically or by search, from which the reset lands beyond or on a guard with the
 flow pointing out. From each of them the transitions are followed with numbers, in the order in which a run makes them;
-states that agree to eight digits count as one. Where round-off or a kink decides what comes next, nothing is said. Two flows that push against one
-surface have [a rule of their own](#hs509-sliding).
+states that agree to eight digits count as one. Where round-off or a kink decides what comes next, nothing is said. Two
+flows that push against one surface have [a rule of their own](#hs509-sliding).
 
 ## How to fix it
 
