@@ -7,7 +7,7 @@ expressions from all points of the overlap at once, which can prove that it does
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -105,7 +105,7 @@ class Arrival:
     """A mode, and its states as expressions of those before."""
 
     mode: Mode
-    moves: Mapping[Any, Any]
+    moves: dict[Any, Any]
 
     def carried(self, expr: Any) -> Any:
         """An expression of its states, in those before."""
@@ -123,7 +123,7 @@ class _Overlap:
         """What an edge leads to from there."""
         return self._after(edge, {})
 
-    def _after(self, edge: Edge, moves: Mapping[Any, Any]) -> Arrival:
+    def _after(self, edge: Edge, moves: dict[Any, Any]) -> Arrival:
         dynamics, done = self.proof.dynamics, {}
         values = (replaced(dynamics.placed(value), moves, done) for value in edge.reset)
         states = zip(map(symbol, edge.target_states), values, strict=True)

@@ -43,13 +43,16 @@ def _passed(
         for speed in dict.fromkeys((out, ())):
             clauses = [(zero(residual), *inside, *speed, *clause) for clause in conditions]
             answer = dynamics.ask_any(mode, clauses, *more)
-            if answer.somewhere and _goes_out(Local(dynamics, mode, answer.point), residual):
+            if answer.somewhere and _goes_out(Local(dynamics, mode, answer.point), edge):
                 return answer
     return UNKNOWN
 
 
-def _goes_out(here: Local, residual: object) -> bool:
+def _goes_out(here: Local, edge: Edge) -> bool:
+    """Whether the flow goes out of the surface of an edge, and into all else that the point lies on."""
+    domain = here.dynamics.domain(here.mode, without=edge)
     try:
-        return here.first(residual)[1] > 0
+        inside = all(here.sign(c.expr) < 0 or here.first(c.expr)[1] < 0 for c in domain)
+        return inside and here.first(here.dynamics.residual(edge.surface))[1] > 0
     except Unsure:
         return False

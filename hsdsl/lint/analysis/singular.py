@@ -109,7 +109,8 @@ def kinks(expr: Any) -> Iterator[Part]:
     for part in parts(expr):
         if isinstance(part, (functions.absolute, functions.minimum, functions.maximum)):
             inside = part.args[0] if len(part.args) == 1 else part.args[0] - part.args[1]
-            yield Part(part, _name(part), tuple((zero(inside), w) for w in _weights(expr, part)))
+            steep = positive(sum(inside.diff(s) ** 2 for s in inside.free_symbols))
+            yield Part(part, _name(part), tuple((zero(inside), steep, w) for w in _weights(expr, part)))
 
 
 def _weights(expr: Any, part: Any) -> list[Constraint]:
@@ -155,9 +156,14 @@ def steep(expr: Any) -> Iterator[Part]:
     for part in parts(expr):
         if part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1 and not part.base.is_number:
             said = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
-            yield Part(part.base, said, ((zero(part.base),),))
+            yield _steep(expr, part, part.base, said, (part.base,))
         elif isinstance(part, (sp.asin, sp.acos)):
             inside = part.args[0]
-            yield Part(inside, f"`{_name(part)}`", ((zero(1 - inside),), (zero(1 + inside),)))
+            yield _steep(expr, part, inside, f"`{_name(part)}`", (1 - inside, 1 + inside))
         elif isinstance(part, sp.acosh):
-            yield Part(part.args[0], "`acosh`", ((zero(part.args[0] - 1),),))
+            yield _steep(expr, part, part.args[0], "`acosh`", (part.args[0] - 1,))
+
+
+def _steep(expr: Any, part: Any, inside: Any, said: str, ends: tuple[Any, ...]) -> Part:
+    """Where an argument is at an end, unless what the function is multiplied with vanishes there."""
+    return Part(inside, said, tuple((zero(end), w) for end in ends for w in _weights(expr, part)))
