@@ -52,6 +52,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.instants import Cycle, cycle
 from hsdsl.lint.analysis.landing import landings, surfaces_of
 from hsdsl.lint.analysis.local import Local
@@ -78,7 +79,8 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 
 def _finding(subject: Subject, part: ModePart, edge: EdgePart, answer: Answer, found: Cycle) -> Finding:
-    where = at(subject.dynamics, part.mode, answer, [subject.dynamics.residual(edge.edge.surface)])
+    about = [*map(symbol, part.mode.states), subject.dynamics.residual(edge.edge.surface)]
+    where = at(subject.dynamics, part.mode, answer, about)
     names = ", ".join(f"'{name}'" for name in found.edges)
     follow = "follow each other" if len(found.edges) > 1 else "follows itself"
     message = f"once '{edge.edge.name}' has fired {where}, {names} {follow} at one instant without end"
