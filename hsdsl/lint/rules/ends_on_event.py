@@ -74,9 +74,9 @@ def _timed(subject: Subject, until: Number) -> Iterator[str]:
     for part in subject.modes:
         for edge in part.mode.edges:
             symbols = edge.surface.residual.free_symbols
-            if TIME in symbols and symbols <= set(point) and side(edge.surface, point) == ON:
-                if leaves(part.mode, edge.surface, point) is not False:  # rising, as far as is known
-                    yield edge.name
+            reached = TIME in symbols and symbols <= set(point) and side(edge.surface, point) == ON
+            if reached and leaves(part.mode, edge.surface, point) is not False:  # rising, as far as is known
+                yield edge.name
 
 
 def _reached(subject: Subject, until: Number) -> Iterator[str]:

@@ -68,7 +68,8 @@ def check(subject: Subject) -> Iterator[Finding]:
             if not answer.somewhere or residual in told:
                 continue
             told.add(residual)
-            about = [residual, dynamics.placed(edge.edge.condition), dynamics.rate(part.mode, residual)]
+            inside = [constraint.expr for constraint in dynamics.domain(part.mode, without=edge.edge)]
+            about = [residual, dynamics.placed(edge.edge.condition), dynamics.rate(part.mode, residual), *inside]
             where = at(dynamics, part.mode, answer, about)
             message = (
                 f"the guard of '{edge.edge.name}' lies inside its domain: {where} the flow passes its surface,"

@@ -80,9 +80,9 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, found: Repeats) -> N
         proof, guard = Proof(dynamics, part.mode), dynamics.guard(edge.edge)
         always = guard is not None and proof.never(guard, at_most_zero(carried))
         residual = dynamics.residual(edge.edge.surface)
-        where = at(
-            dynamics, part.mode, answer, [residual, carried, None if always else dynamics.rate(part.mode, residual)]
-        )
+        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in surfaces_of(target))
+        about = [residual, carried, *([] if always else [dynamics.rate(part.mode, residual), *others])]
+        where = at(dynamics, part.mode, answer, about)
         beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
         lands = f"lands{within(proof.searched)}" if always else "can land"
         then = _then(Local(dynamics, part.mode, answer.point), edge)
