@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from hsdsl import schema
+from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.elaborate import Reading
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
@@ -148,6 +149,17 @@ class Subject:
         """A number of `experiment`; None where the file says nothing."""
         value = getattr(self.system.experiment, name)
         return None if value is None else evaluate(value, self.numbers)
+
+    @property
+    def relaxed(self) -> bool:
+        """Whether runs of this file take the relaxed scheme, where nobody asks for another."""
+        return (self.system.experiment.scheme or DEFAULTS["scheme"]) == "relaxed"
+
+    @property
+    def relaxation(self) -> Number:
+        """The relaxation of this file's runs; unless it is given, at most as large a part of the run as of 1."""
+        given = self.setting("relaxation")
+        return least_relaxation(rational(DEFAULTS["relaxation"]), self.setting("until")) if given is None else given
 
     def read(self, scalar: Scalar) -> Number:
         """The number that an expression of parameters stands for in this file."""

@@ -42,6 +42,16 @@ def test_refused(text):
         read(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "better"),
+    [("m/s^2", "m/s**2"), ("kg m/s²", "kg*m/s**2"), ("N·m", "N*m"), ("s⁻¹", "s**-1"), ("metrs m", None), ("m/", None)],
+)
+def test_units_written_as_elsewhere_are_answered(text, better):
+    with pytest.raises(UnknownUnit) as raised:
+        read(text)
+    assert raised.value.better == better
+
+
 def test_said_as_people_write_it():
     for text in ("m", "m/s", "kg*m/s**2", "1/s", "m**(1/2)", "1/(m*s)", "mV/ms", "1/ms", "degree", "10*mm"):
         assert str(read(text)) == text

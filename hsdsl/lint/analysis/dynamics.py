@@ -21,10 +21,11 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.ladder import MOST_PARTS, Ladder
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
-from hsdsl.lint.analysis.tape import at_point, enclosure, too_large
+from hsdsl.lint.analysis.tape import at_point, enclosure, parts_of, too_large
 from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
+MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
 T = TypeVar("T")
 _LARGEST = Fraction(10) ** 100  # of values that are looked for: beyond, products overflow
@@ -76,9 +77,14 @@ class Dynamics:
         return self._rates[key]
 
     def _rate(self, mode: Mode, expr: Any) -> Any | None:
-        if expr is None or too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
+        if expr is None:
             return None
-        flow = self.flow(mode)
+        return self.along(expr, self.flow(mode))
+
+    def along(self, expr: Any, flow: Mapping[Any, Any]) -> Any | None:
+        """The derivative of an expression along a flow; None where that is not known."""
+        if parts_of(expr) > MOST_DERIVED or too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
+            return None
         present = sorted(expr.free_symbols & flow.keys(), key=lambda s: s.name)
         parts = [self.slope(expr, s) * flow[s] for s in present]
         return sp.Add(self.slope(expr, TIME), *parts) if TIME in expr.free_symbols else sp.Add(*parts)
@@ -265,6 +271,11 @@ class Dynamics:
         values = [v if isinstance(v, Fraction) else _middle(self.placed(v)) for v in given.values]
         low, high = min(values), max(values)
         return Range(low, high, (float(low), float(high)), float(values[0]))
+
+    @cached_property
+    def inputs(self) -> frozenset[Any]:
+        """The sampled inputs."""
+        return frozenset(symbol(given.name) for given in self.system.inputs)
 
     @cached_property
     def _moving(self) -> frozenset[Any]:

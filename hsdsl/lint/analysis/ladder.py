@@ -212,8 +212,13 @@ def _box(names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]) ->
 def _searched(
     names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]
 ) -> tuple[tuple[Any, float, float], ...]:
-    low, high = _box(names, reduced, ranges)
-    return tuple((s, float(a), float(b)) for s, a, b in zip(names, low, high, strict=True) if None in reduced.bounds[s])
+    """How far was looked in names that nothing bounds: an end that the constraints themselves give is none."""
+    found: list[tuple[Any, float, float]] = []
+    for symbol, low, high in zip(names, *_box(names, reduced, ranges), strict=True):
+        first, last = reduced.bounds[symbol]
+        if first is None or last is None:
+            found.append((symbol, float(low if first is None else -np.inf), float(high if last is None else np.inf)))
+    return tuple(found)
 
 
 def _polynomial(p: Polynomial) -> bool:

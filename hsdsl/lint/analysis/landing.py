@@ -46,7 +46,12 @@ class Landing:
 
 
 def surfaces_of(mode: Mode, conditional: bool = False) -> Iterator[tuple[Surface, Edge | None]]:
-    """The surfaces that bound a mode, with their edges; with ``conditional`` those of edges with an `if` too."""
+    """The surfaces that bound a mode, with their edges; with ``conditional`` those of edges with an `if` too.
+
+    None of a final mode, which a run does not flow in.
+    """
+    if mode.final:
+        return
     for edge in mode.edges:
         if conditional or edge.condition is None:
             yield edge.surface, edge

@@ -1,105 +1,196 @@
 # pyright: basic
-"""Guards that are reached together, and whether the order of their transitions matters."""
+"""Guards that are reached together, and whether the order of their transitions matters.
+
+Both orders are followed twice: with numbers from one point, which can show that the order matters there; and with
+expressions from all points of the overlap at once, which can prove that it does not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative
+from hsdsl.lint.analysis.instants import chain, same
+from hsdsl.lint.analysis.local import Local, Unsure, ranked
+from hsdsl.lint.analysis.pieces import KINKED, influencing
+from hsdsl.lint.analysis.proof import Proof, strict
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, at_most_zero, positive, zero
+from hsdsl.lint.analysis.singular import breaks
 from hsdsl.lower.straight import replaced
-from hsdsl.system import Edge, Mode
+from hsdsl.system import Edge, Mode, Surface
 
 DEEPEST = 3  # transitions at one instant that are followed
-_NEAR = 1e-6
+
+
+def together(dynamics: Dynamics, first: Edge, second: Edge) -> tuple[Clause, ...]:
+    """Where two guards of a mode overlap, as alternatives."""
+    one, other = dynamics.guard(first) or (), dynamics.guard(second) or ()
+    return tuple(tuple(dict.fromkeys((*a, *b))) for a, b in product(one, other))
+
+
+def speeds(dynamics: Dynamics, first: Edge, second: Edge) -> Clause:
+    """That the flow goes out of both surfaces with a rate above 0, where that is not so everywhere."""
+    mode = dynamics.modes[first.source]
+    rates = (dynamics.rate(mode, dynamics.residual(edge.surface)) for edge in (first, second))
+    return tuple(positive(rate) for rate in rates if rate is not None and not rate.is_number)
+
+
+def meeting(dynamics: Dynamics, first: Edge, second: Edge, overlap: Clause) -> Answer:
+    """A point of an overlap where the flow goes out through both guards, and through none that goes before both."""
+    mode = dynamics.modes[first.source]
+    out = speeds(dynamics, first, second)
+    others = [e.surface for e in mode.edges if e.condition is None and e not in (first, second)]
+    inside = strict(at_most_zero(dynamics.residual(surface)) for surface in (*others, *mode.walls))
+    for more in dict.fromkeys(((*out, *inside), out, ())):
+        answer = dynamics.ask(mode, (*overlap, *more))
+        if answer.somewhere and _meets(Local(dynamics, mode, answer.point), first, second):
+            return answer
+    return UNKNOWN
+
+
+def _meets(here: Local, first: Edge, second: Edge) -> bool:
+    """Whether one of two edges goes first at a point; also where a kink leaves that open."""
+    for edge in ranked(here.mode.edges):
+        try:
+            on = here.sign(here.dynamics.residual(edge.surface)) == 0
+            goes = on and (edge.condition is None or here.holds(edge)) and _leaves(here, edge)
+        except Unsure:
+            goes = edge in (first, second)
+        if goes and edge not in (first, second):
+            return False
+        if goes:
+            break
+    return all(_leaves(here, edge) for edge in (first, second))
+
+
+def _leaves(here: Local, edge: Edge) -> bool:
+    try:
+        return here.first(here.dynamics.residual(edge.surface))[1] > 0
+    except Unsure:
+        return True
+
+
+def matters(here: Local, first: Edge, second: Edge) -> bool | None:
+    """Whether the two orders lead from a point to different ones, followed with numbers; None where that is not known.
+
+    They end where nothing more happens at that instant. Two that pass one point have no difference from there on.
+    """
+    try:
+        one, other = ([reached for _, reached in chain(here, edge)] for edge in (first, second))
+    except Unsure:
+        return None
+    return not any(same(a, b) for a in one for b in other)
+
+
+def commute(dynamics: Dynamics, first: Edge, second: Edge, overlaps: Sequence[Clause]) -> Proof | None:
+    """The proof that both orders lead to one mode with the same states at one instant from all points of overlaps."""
+    proof = Proof(dynamics, dynamics.modes[first.source])
+    for overlap in overlaps:
+        here = _Overlap(proof, overlap)
+        one, other = ([here.start(edge)] for edge in (first, second))
+        while not any(here.same(a, b) for a in one for b in other):
+            new = [list(here.following(arrivals[-1])) for arrivals in (one, other)]
+            if not any(new) or len(one) > DEEPEST:
+                return None
+            one, other = one + new[0], other + new[1]
+    return proof
 
 
 @dataclass(frozen=True)
 class Arrival:
     """A mode, and its states as expressions of those before."""
 
-    mode: str
-    states: tuple[str, ...]
-    values: tuple[Any, ...]
+    mode: Mode
+    moves: dict[Any, Any]
 
-    def moves(self) -> dict[Any, Any]:
-        """The values by symbol, where they are not the symbol itself."""
-        pairs = zip(map(symbol, self.states), self.values, strict=True)
-        return {s: value for s, value in pairs if s != value}
-
-
-def together(dynamics: Dynamics, first: Edge, second: Edge) -> list[Clause] | None:
-    """Where two guards of a mode overlap, as alternatives."""
-    one, other = dynamics.guard(first), dynamics.guard(second)
-    if one is None or other is None:
-        return None
-    return [tuple(dict.fromkeys((*a, *b))) for a in one for b in other]
-
-
-def commute(dynamics: Dynamics, first: Edge, second: Edge, overlap: Clause, point: Mapping[Any, float]) -> bool:
-    """Whether both orders lead to one mode with the same states, all at one instant, from every point of an overlap.
-
-    ``point`` is one of the overlap's points: what does not happen there need not be looked at further.
-    """
-    here = _Overlap(dynamics, dynamics.modes[first.source], overlap, point)
-    one, other = ([here.arrival(edge, {})] for edge in (first, second))
-    new = [one, other]
-    for _ in range(DEEPEST):
-        if any(here.same(a, b) for a in one for b in other):
-            return True
-        new = [[after for arrival in arrivals for after in here.following(arrival)] for arrivals in new]
-        one, other = one + new[0], other + new[1]
-    return False
+    def carried(self, expr: Any) -> Any:
+        """An expression of its states, in those before."""
+        return replaced(expr, self.moves, {})
 
 
 @dataclass(frozen=True)
 class _Overlap:
-    """Points on two guards at once."""
+    """All points on two guards at once."""
 
-    dynamics: Dynamics
-    mode: Mode
+    proof: Proof
     clause: Clause
-    point: Mapping[Any, float]
 
-    def arrival(self, edge: Edge, moves: dict[Any, Any]) -> Arrival:
-        """What an edge leads to."""
-        done: dict[Any, Any] = {}
-        values = tuple(replaced(self.dynamics.placed(value), moves, done) for value in edge.reset)
-        return Arrival(edge.target, edge.target_states, values)
+    def start(self, edge: Edge) -> Arrival:
+        """What an edge leads to from there."""
+        return self._after(edge, {})
 
-    def following(self, here: Arrival) -> Iterator[Arrival]:
-        """What is sure to follow at the same instant."""
-        moves = here.moves()
-        for edge in self.dynamics.modes[here.mode].edges:
-            if self._fires(here, edge, moves):
-                yield self.arrival(edge, moves)
+    def _after(self, edge: Edge, moves: dict[Any, Any]) -> Arrival:
+        dynamics, done = self.proof.dynamics, {}
+        values = (replaced(dynamics.placed(value), moves, done) for value in edge.reset)
+        states = zip(map(symbol, edge.target_states), values, strict=True)
+        return Arrival(dynamics.modes[edge.target], {s: value for s, value in states if s != value})
 
     def same(self, one: Arrival, other: Arrival) -> bool:
-        """Whether two arrivals are one."""
-        if one.mode != other.mode or one.states != other.states:
-            return False
-        differences = (a - b for a, b in zip(one.values, other.values, strict=True) if a != b)
-        return all(self.dynamics.vanishes(self.mode, d, self.clause) is not None for d in differences)
+        """Whether two arrivals are known to be one."""
+        pairs = ((one.carried(s), other.carried(s)) for s in map(symbol, one.mode.states))
+        return one.mode is other.mode and all(a == b or self._vanishes(a - b) for a, b in pairs)
 
-    def _fires(self, here: Arrival, edge: Edge, moves: dict[Any, Any]) -> bool:
-        """Whether an edge fires at once wherever the overlap is left from."""
-        dynamics = self.dynamics
-        residual = dynamics.residual(edge.surface)
-        carried = replaced(residual, moves, {})
-        if not dynamics.value(carried, self.point) > -_NEAR:
-            return False
-        refused = dynamics.condition(edge, holds=False)
-        for clause in [()] if refused is None else refused:
-            moved = tuple(c.along(replaced(c.expr, moves, {})) for c in clause)
-            if not dynamics.ask(self.mode, (*self.clause, *moved)).never:
-                return False
-        if dynamics.vanishes(self.mode, carried, self.clause) is not None:
-            rate = dynamics.rate(dynamics.modes[here.mode], residual)
-            return rate is not None and self._never(negative(replaced(rate, moves, {})))
-        return edge.condition is None and self._never(at_most_zero(carried))
+    def _vanishes(self, expr: Any) -> bool:
+        return self.proof.dynamics.vanishes(self.proof.mode, expr, self.clause) == "symbolic"
 
-    def _never(self, constraint: Constraint) -> bool:
-        return self.dynamics.contradicts(self.mode, self.clause, constraint)
+    def _never(self, *more: Any) -> bool:
+        return self.proof.never([self.clause], *more)
+
+    def following(self, here: Arrival) -> Iterator[Arrival]:
+        """What is sure to be made next at the same instant (M4, M5, M6): nothing where that is not sure."""
+        for edge in ranked(here.mode.edges) if not here.mode.final else ():
+            if edge.condition is None and self._known(here, edge.surface, beyond=True):
+                yield self._after(edge, here.moves)
+                return
+            if edge.condition is None and not self._never(positive(self._residual(here, edge.surface))):
+                return
+        if not all(self._stays(here, wall) for wall in here.mode.walls):
+            return
+        for edge in ranked(here.mode.edges) if not here.mode.final else ():
+            if self._known(here, edge.surface, beyond=False) and self._holds(here, edge):
+                yield self._after(edge, here.moves)
+                return
+            if not self._stays(here, edge.surface):
+                return
+
+    def _residual(self, here: Arrival, surface: Surface) -> Any:
+        return here.carried(self.proof.dynamics.residual(surface))
+
+    def _rate(self, here: Arrival, surface: Surface) -> Any | None:
+        """The rate after arrival; None where surface and flow are not known to be smooth."""
+        dynamics = self.proof.dynamics
+        residual = dynamics.residual(surface)
+        smooth = (residual, *influencing(residual, dynamics.flow(here.mode)).values())
+        broken = [breaks(expr) for expr in smooth]
+        if None in broken or any(expr.has(*KINKED) for expr in smooth):
+            return None
+        moved = (tuple(c.along(here.carried(c.expr)) for c in clause) for clauses in broken for clause in clauses or ())
+        rate = dynamics.rate(here.mode, residual) if all(self._never(*clause) for clause in moved) else None
+        return None if rate is None else here.carried(rate)
+
+    def _known(self, here: Arrival, surface: Surface, beyond: bool) -> bool:
+        """Whether all arrivals are beyond a surface; else, whether all are on it and the flow goes out."""
+        residual = self._residual(here, surface)
+        if beyond:
+            return self._never(at_most_zero(residual))
+        rate = self._rate(here, surface) if self._vanishes(residual) else None
+        return rate is not None and self._never(at_most_zero(rate))
+
+    def _stays(self, here: Arrival, surface: Surface) -> bool:
+        """Whether no arrival is beyond a surface, or on it where the flow does not lead inside."""
+        residual = self._residual(here, surface)
+        if not self._never(positive(residual)):
+            return False
+        if self._never(zero(residual)):
+            return True
+        rate = self._rate(here, surface)
+        return rate is not None and self._never(zero(residual), at_most_zero(-rate))
+
+    def _holds(self, here: Arrival, edge: Edge) -> bool:
+        refused = self.proof.dynamics.condition(edge, holds=False)
+        moved = [tuple(c.along(here.carried(c.expr)) for c in clause) for clause in refused or ()]
+        return refused is not None and all(self._never(*clause) for clause in moved)

@@ -67,7 +67,7 @@ class Answer:
     point : mapping of symbols to numbers
         Such a point.
     searched : tuple of (symbol, low, high)
-        Of `never`: the names that nothing bounds, and how far was looked.
+        Of `never`: the names that nothing bounds, and how far was looked; infinite where that is no limit.
     """
 
     verdict: Literal["never", "somewhere", "unknown"]

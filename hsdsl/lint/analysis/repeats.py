@@ -13,9 +13,11 @@ class Repeats:
     """Keeps the first finding of each kind, and counts the others.
 
     A large model repeats itself: what is said of one guard among a thousand like it is said once, with their number.
+    ``alike`` says what the others share, where the whole finding is not known of them.
     """
 
     noun: str
+    alike: str = "like it"
     _found: dict[Hashable, tuple[Finding, int]] = field(default_factory=dict[Hashable, tuple[Finding, int]])
 
     def again(self, kind: Hashable) -> bool:
@@ -33,5 +35,5 @@ class Repeats:
 
     def __iter__(self) -> Iterator[Finding]:
         for finding, count in self._found.values():
-            more = f"; {count:,} more {self.noun}{'s' * (count > 1)} like it" if count else ""
+            more = f"; {count:,} more {self.noun}{'s' * (count > 1)} {self.alike}" if count else ""
             yield replace(finding, message=finding.message + more)

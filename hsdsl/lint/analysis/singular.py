@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -17,6 +18,11 @@ from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, pos
 from hsdsl.lint.analysis.tape import too_large
 from hsdsl.lint.written import Written
 
+_SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
+_CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
+    sp.Add, sp.Mul, sp.Symbol, sp.Number, sp.NumberSymbol, sp.Abs, sp.Min, sp.Max, functions.absolute,
+    functions.minimum, functions.maximum, *(functions.FUNCTIONS[name][0] for name in _SMOOTH),
+)  # fmt: skip
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
@@ -62,12 +68,49 @@ def _jump(part: Any) -> list[Clause]:
     return [(zero(part.args[0]),)]
 
 
+@lru_cache(maxsize=5_000)
+def discontinuities(expr: Any) -> tuple[Clause, ...] | None:
+    """Where an expression may jump or pass a pole, as alternatives; None where that is not known."""
+    found: list[Clause] = []
+    for part in parts(expr):
+        if isinstance(part, (functions.floor, sp.floor)):
+            found.append((zero(sp.sin(sp.pi * part.args[0])),))
+        elif isinstance(part, (functions.sign, sp.sign)):
+            found.append((zero(part.args[0]),))
+        elif isinstance(part, sp.atan2):
+            found.append((zero(part.args[0]), at_most_zero(part.args[1])))
+        elif not isinstance(part, _CONTINUOUS) and not part.is_Pow:
+            return None
+    found += [(zero(divisor),) for divisor in divisors(expr)]
+    return None if too_large([expr], MOST_PARTS) else tuple(found)
+
+
+@lru_cache(maxsize=5_000)
+def breaks(expr: Any) -> tuple[Clause, ...] | None:
+    """Where an expression without kinks may not have derivatives of every order, as alternatives."""
+    jumping = discontinuities(expr)
+    if jumping is None:
+        return None
+    found = list(jumping)
+    for part in parts(expr):
+        if part.is_Pow and not (part.exp.is_Integer or part.base.is_number):
+            found.append((zero(part.base),))
+        elif isinstance(part, sp.log):
+            found.append((zero(part.args[0]),))
+        elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
+            found += [(zero(1 - part.args[0]),), (zero(1 + part.args[0]),)]
+        elif isinstance(part, sp.acosh):
+            found.append((zero(part.args[0] - 1),))
+    return tuple(found)
+
+
 def kinks(expr: Any) -> Iterator[Part]:
     """Where abs, min and max have a kink, unless what they are multiplied with vanishes there."""
     for part in parts(expr):
         if isinstance(part, (functions.absolute, functions.minimum, functions.maximum)):
             inside = part.args[0] if len(part.args) == 1 else part.args[0] - part.args[1]
-            yield Part(part, _name(part), tuple((zero(inside), w) for w in _weights(expr, part)))
+            steep = positive(sum(inside.diff(s) ** 2 for s in inside.free_symbols))
+            yield Part(part, _name(part), tuple((zero(inside), steep, w) for w in _weights(expr, part)))
 
 
 def _weights(expr: Any, part: Any) -> list[Constraint]:
@@ -113,9 +156,14 @@ def steep(expr: Any) -> Iterator[Part]:
     for part in parts(expr):
         if part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1 and not part.base.is_number:
             said = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
-            yield Part(part.base, said, ((zero(part.base),),))
+            yield _steep(expr, part, part.base, said, (part.base,))
         elif isinstance(part, (sp.asin, sp.acos)):
             inside = part.args[0]
-            yield Part(inside, f"`{_name(part)}`", ((zero(1 - inside),), (zero(1 + inside),)))
+            yield _steep(expr, part, inside, f"`{_name(part)}`", (1 - inside, 1 + inside))
         elif isinstance(part, sp.acosh):
-            yield Part(part.args[0], "`acosh`", ((zero(part.args[0] - 1),),))
+            yield _steep(expr, part, part.args[0], "`acosh`", (part.args[0] - 1,))
+
+
+def _steep(expr: Any, part: Any, inside: Any, said: str, ends: tuple[Any, ...]) -> Part:
+    """Where an argument is at an end, unless what the function is multiplied with vanishes there."""
+    return Part(inside, said, tuple((zero(end), w) for end in ends for w in _weights(expr, part)))

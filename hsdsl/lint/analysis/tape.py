@@ -181,7 +181,7 @@ def _double(value: Fraction) -> float:
 def too_large(expressions: Iterable[Any], most: int) -> bool:
     """Whether expressions have more than ``most`` different parts."""
     expressions = list(expressions)
-    if sum(map(_parts, expressions)) <= most:
+    if sum(map(parts_of, expressions)) <= most:
         return False
     seen: set[Any] = set()
     waiting = list(expressions)
@@ -196,7 +196,7 @@ def too_large(expressions: Iterable[Any], most: int) -> bool:
 
 
 @lru_cache(maxsize=20_000)
-def _parts(expr: Any) -> int:
+def parts_of(expr: Any) -> int:
     """At least as many as an expression has different parts, counted as a tree; at most :data:`_MANY`."""
     found, waiting = 0, [expr]
     while waiting and found < _MANY:

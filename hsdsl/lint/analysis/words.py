@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -31,12 +32,15 @@ def number(value: float) -> str:
     return f"{value:.6g}"
 
 
-def searched(answer: Answer) -> str:
-    """How far was looked, for a claim that there is nothing: empty where it holds without bounds."""
-    if not answer.searched:
-        return ""
-    limits = ", ".join(
-        f"|{s.name}| <= {number(high)}" if low == -high else f"{number(low)} <= {s.name} <= {number(high)}"
-        for s, low, high in answer.searched
-    )
-    return f" (looked for with {limits})"
+def within(searched: Iterable[tuple[Any, float, float]]) -> str:
+    """Say within which bounds something is known, as `` within |x| <= 10``; empty where it holds without bounds."""
+    limits = ", ".join(_limits(s.name, low, high) for s, low, high in searched)
+    return f" within {limits}" if limits else ""
+
+
+def _limits(name: str, low: float, high: float) -> str:
+    if low == -high:
+        return f"|{name}| <= {number(high)}"
+    if math.isinf(low):
+        return f"{name} <= {number(high)}"
+    return f"{name} >= {number(low)}" if math.isinf(high) else f"{number(low)} <= {name} <= {number(high)}"

@@ -22,7 +22,7 @@ modes:
   off:
     flow: {i: -100, c: 1}
     transitions: [{when: c >= period, to: on, reset: {c: 0}}]
-experiment: {until: 1e-3}
+experiment: {until: 1e-3, scheme: relaxed, relaxation: 1e-6}
 ```
 
 ## Use instead
@@ -36,7 +36,7 @@ modes:
   off:
     flow: {i: -100, c: 1}
     transitions: [{when: c >= period, to: on, reset: {c: 0}}]
-experiment: {until: 1e-3, relaxation: 1e-11}
+experiment: {until: 1e-3, scheme: relaxed, relaxation: 1e-11}
 ```
 
 ## How it is decided
@@ -55,10 +55,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.lint.dwell import pace
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.numbers import rational
 from hsdsl.lint.subject import Subject
 
 _ONE, _ALL = 1000, 100  # how much smaller the delay of one transition, and of all, should be than the time between two
@@ -67,11 +65,9 @@ _ONE, _ALL = 1000, 100  # how much smaller the delay of one transition, and of a
 def check(subject: Subject) -> Iterator[Finding]:
     """Find relaxations that are large beside the times of the scene."""
     experiment = subject.document.experiment
-    if subject.system.experiment.scheme not in (None, "relaxed"):
+    if not subject.relaxed:
         return
-    relaxation = subject.setting("relaxation")
-    if relaxation is None:
-        relaxation = least_relaxation(rational(DEFAULTS["relaxation"]), subject.setting("until"))
+    relaxation = subject.relaxation
     found = pace(subject)
     if found is None or (relaxation >= found.shortest and found.known):  # that is large-relaxation's
         return

@@ -36,8 +36,8 @@ modes:
 ## How it is decided
 
 Two points are looked for, symbolically or by search: one on the surface where the flow passes and no `if` of that
-surface holds, and one beyond it where a comparison of the `if` turns true along the flow. The message has the second
-one. Whether a run gets from the one to the other is not looked at.
+surface holds, and one beyond it, inside all other guards and walls, where a comparison of the `if` turns true along
+the flow. The message has the second one. Whether a run gets from the one to the other is not looked at.
 
 ## How to fix it
 
@@ -49,6 +49,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.passing import passes_by
+from hsdsl.lint.analysis.proof import strict
 from hsdsl.lint.analysis.question import Answer, Constraint, negative, positive, zero
 from hsdsl.lint.analysis.words import at
 from hsdsl.lint.finding import Finding
@@ -75,7 +76,7 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 def _turns_true(subject: Subject, part: ModePart, edge: EdgePart) -> Answer | None:
     dynamics, mode = subject.dynamics, part.mode
-    beyond = (positive(dynamics.residual(edge.edge.surface)), *dynamics.domain(mode, without=edge.edge))
+    beyond = (positive(dynamics.residual(edge.edge.surface)), *strict(dynamics.domain(mode, without=edge.edge)))
     for clause in dynamics.condition(edge.edge) or ():
         for comparison in clause:
             rate = dynamics.rate(mode, comparison.expr)

@@ -2,13 +2,14 @@
 
 ## What it does
 
-Finds guards and walls r = 0 on which the gradient of r vanishes: a warning where r does not change its sign, as the
-square of something, a note where it is one point of the surface, as where two lines cross.
+Finds guards and walls r = 0 on which the gradient of r vanishes: a warning where r is nowhere positive, as the negative
+of a square, or nowhere negative; a note where it is a point of the surface, as where two lines cross.
 
 ## Why it is bad
 
 How deep a state is beyond a surface is measured as r/|grad r|, which says nothing where the gradient vanishes: the
-relaxed scheme halves its steps to no end. A function that does not change its sign is never crossed at all.
+relaxed scheme halves its steps to no end. Where r is nowhere positive, the surface is never crossed at all; where it is
+nowhere negative, every state is on it or beyond it, and a transition without `if` fires on entry.
 
 ## Example
 
@@ -30,8 +31,9 @@ modes:
 
 ## How it is decided
 
-A point of the surface where all derivatives vanish is looked for, symbolically or by search, and one where r is
-positive and one where it is negative.
+A point of the surface where all derivatives vanish is looked for, symbolically or by search; points where r has a kink
+or jumps are left alone. That r has no positive or no negative value is proved: symbolically, or by interval arithmetic
+within bounds that the message states.
 
 ## How to fix it
 
@@ -42,8 +44,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import negative, positive, zero
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.words import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import ModePart, Subject
 from hsdsl.source import Scalar
@@ -68,15 +72,31 @@ def _look(subject: Subject, part: ModePart, surface: Surface, scalar: Scalar) ->
     answer = dynamics.ask(mode, (zero(residual), *(zero(slope) for slope in slopes if slope != 0)))
     if not answer.somewhere:
         return
-    passes = all(dynamics.ask(mode, (side(residual),)).somewhere for side in (positive, negative))
     where = at(dynamics, mode, answer, [residual])
-    if passes:
+    for side, said in ((positive, _uncrossed), (negative, _beyond)):
+        proof = Proof(dynamics, mode)
+        if not dynamics.ask(mode, (side(residual),)).somewhere and proof.never([(side(residual),)]):
+            message = f"{said(surface.text, within(proof.searched))}, and 0 {where}"
+            hint = "compare what passes through zero, not its square"
+            yield Finding(scalar.place.span, message, hint, proof.decided, severity="warning")
+            return
+    if _smooth(Local(dynamics, mode, answer.point), residual):
         message = f"the gradient of the surface '{surface.text}' vanishes on it {where}"
-    else:
-        message = (
-            f"the surface '{surface.text}' is never crossed: r does not change its sign, and its gradient vanishes "
-            f"{where}"
-        )
-    hint = None if passes else "compare what passes through zero, not its square"
-    severity = "note" if passes else "warning"
-    yield Finding(scalar.place.span, message, hint, answer.decided or "sampled", severity=severity)
+        yield Finding(scalar.place.span, message, None, answer.decided or "sampled", severity="note")
+
+
+def _uncrossed(text: str, limits: str) -> str:
+    return f"the surface '{text}' is {'not' if limits else 'never'} crossed{limits}: r is nowhere positive there"
+
+
+def _beyond(text: str, limits: str) -> str:
+    return f"every state{limits} is on or beyond the surface '{text}': r is nowhere negative there"
+
+
+def _smooth(here: Local, residual: object) -> bool:
+    """Whether the function has a gradient at a point."""
+    try:
+        here.piece(residual, {})
+    except Unsure:
+        return False
+    return True

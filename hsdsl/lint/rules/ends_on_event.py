@@ -50,8 +50,8 @@ import sympy as sp
 from hsdsl.expression import numeric
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.numbers import Number, evaluate
-from hsdsl.lint.start import ON, side
+from hsdsl.lint.numbers import Number, evaluate, holds
+from hsdsl.lint.start import ON, leaves, side
 from hsdsl.lint.subject import ModePart, Subject
 from hsdsl.source import Scalar
 from hsdsl.system import TIME
@@ -74,7 +74,8 @@ def _timed(subject: Subject, until: Number) -> Iterator[str]:
     for part in subject.modes:
         for edge in part.mode.edges:
             symbols = edge.surface.residual.free_symbols
-            if TIME in symbols and symbols <= set(point) and side(edge.surface, point) == ON:
+            reached = TIME in symbols and symbols <= set(point) and side(edge.surface, point) == ON
+            if reached and leaves(part.mode, edge.surface, point) is not False:  # rising, as far as is known
                 yield edge.name
 
 
@@ -87,9 +88,12 @@ def _reached(subject: Subject, until: Number) -> Iterator[str]:
         if not rate.free_symbols <= constant:
             return
         end[symbol(name)] = evaluate(symbol(name) + rate * TIME, {**subject.start, TIME: until})
-    sides = {edge.name: side(edge.surface, end) for edge in part.mode.edges if _affine(part, edge.surface.residual)}
-    if len(sides) == len(part.mode.edges) and all(where is not None and where <= ON for where in sides.values()):
-        yield from (name for name, where in sides.items() if where == ON)
+    surfaces = [edge.surface for edge in part.mode.edges]
+    sides = [side(surface, end) for surface in (*surfaces, *part.mode.walls) if _affine(part, surface.residual)]
+    known = len(sides) == len(surfaces) + len(part.mode.walls)
+    if known and all(where is not None and where <= ON for where in sides):
+        pairs = zip(part.mode.edges, sides, strict=False)
+        yield from (edge.name for edge, where in pairs if where == ON and holds(edge.condition, end))
 
 
 def _affine(part: ModePart, residual: sp.Expr) -> bool:

@@ -37,8 +37,8 @@ modes:
 
 ## How it is decided
 
-A point of the surface is looked for, in the domain and with the flow not pointing back, where no transition with the
-same surface has an `if` that holds: symbolically, or by search.
+A point of the surface is looked for, in the domain and with the flow going out, where no transition with the same
+surface has an `if` that holds: symbolically, or by search.
 
 ## How to fix it
 
@@ -68,7 +68,9 @@ def check(subject: Subject) -> Iterator[Finding]:
             if not answer.somewhere or residual in told:
                 continue
             told.add(residual)
-            where = at(dynamics, part.mode, answer, [residual, dynamics.placed(edge.edge.condition)])
+            inside = [constraint.expr for constraint in dynamics.domain(part.mode, without=edge.edge)]
+            about = [residual, dynamics.placed(edge.edge.condition), dynamics.rate(part.mode, residual), *inside]
+            where = at(dynamics, part.mode, answer, about)
             message = (
                 f"the guard of '{edge.edge.name}' lies inside its domain: {where} the flow passes its surface,"
                 " and nothing fires"

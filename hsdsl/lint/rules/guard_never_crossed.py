@@ -3,8 +3,8 @@
 ## What it does
 
 Finds transitions that cannot fire by the flow: their surface does not meet the domain where `if` holds, or the flow
-points back into the domain (or along the surface) wherever it does. Surfaces that a state can be beyond when it enters
-the mode are left out, as their transitions fire then.
+points back into the domain or runs along the surface wherever it does. Surfaces that a state can be beyond when it
+enters the mode are left out, as their transitions fire then.
 
 ## Why it is bad
 
@@ -36,8 +36,15 @@ initial: {mode: falling, h: 1, v: 0}
 
 ## How it is decided
 
-Symbolically where the surface and the domain are linear; else by interval arithmetic over the domain, and the message
-says how far was looked in names that nothing bounds. Where neither proves it, nothing is said.
+The first derivative of the surface function r along the flow that is not 0 decides whether a state on the surface goes
+out. That it is negative everywhere on the surface, or that r falls or stays wherever it is positive, is proved:
+symbolically where that is possible, and then it holds everywhere; else by interval arithmetic. The message states the
+bounds within which it is proved, and the end of the run where time plays a part. Kinks (`abs`, `min`, `max`, `sign`)
+are looked at from each side. Where `floor`, `sign` or a divisor can make r jump, and where nothing is proved, nothing
+is said.
+
+It is proved of exact flows, with the parameters of the file. Along a surface that attracts, a computed run may cross
+by its error.
 
 ## How to fix it
 
@@ -48,45 +55,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.analysis.crossing import uncrossed
 from hsdsl.lint.analysis.landing import entered_beyond
-from hsdsl.lint.analysis.question import Answer, positive, zero
-from hsdsl.lint.analysis.words import searched
+from hsdsl.lint.analysis.words import within
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.subject import EdgePart, ModePart, Subject
+from hsdsl.lint.subject import Subject
 
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find guards that no flow crosses."""
     for part in subject.modes:
         for edge in part.edges:
-            found = _never(subject, part, edge)
+            found = uncrossed(subject.dynamics, edge.edge)
             if found is None or entered_beyond(subject.dynamics, edge.edge):
                 continue
-            answer, why = found
-            message = f"the flow never crosses the guard of '{edge.edge.name}': {why}{searched(answer)}"
+            where = within(found.searched)
+            crosses = (
+                f"does not cross the guard of '{edge.edge.name}'{where}"
+                if where
+                else (f"never crosses the guard of '{edge.edge.name}'")
+            )
             hint = "turn the inequality round, correct its level, or remove the transition"
-            yield Finding(edge.document.when.place.span, message, hint, answer.decided or "symbolic")
-
-
-def _never(subject: Subject, part: ModePart, edge: EdgePart) -> tuple[Answer, str] | None:
-    dynamics, mode = subject.dynamics, part.mode
-    surface = dynamics.guard(edge.edge, pointing_out=False)
-    residual = dynamics.residual(edge.edge.surface)
-    rate = dynamics.rate(mode, residual)
-    if rate is None or surface is None:
-        return None
-    outward = dynamics.ask_any(mode, surface, positive(rate), prove=True)
-    if not outward.never:
-        return None
-    touching = dynamics.ask_any(mode, surface, prove=True)
-    if touching.never:
-        where = "where `if` holds" if edge.edge.condition is not None else "of the mode"
-        return touching, f"its surface does not meet the domain {where}"
-    bend = dynamics.rate(mode, rate)
-    if bend is None:
-        return None
-    tangent = dynamics.ask_any(mode, surface, zero(rate), positive(bend), prove=True)
-    if not tangent.never:
-        return None
-    weakest = tangent if tangent.decided == "interval" else outward
-    return weakest, "wherever its surface meets the domain, the flow points back inside or along it"
+            yield Finding(edge.document.when.place.span, f"the flow {crosses}: {found.why}", hint, found.decided)

@@ -35,8 +35,9 @@ experiment: {until: 10}
 
 ## How it is decided
 
-The rate of the surface function, L_f r, is computed symbolically. Where it contains time or an input, two points of
-the surface are looked for, one with each sign.
+The rate of the surface function, L_f r, is computed symbolically. Where it contains time or an input, one state of the
+surface is looked for, and two times (and values of the inputs) at which the rate has either sign there: symbolically,
+or by search.
 
 ## How to fix it
 
@@ -48,9 +49,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.question import negative, positive
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.twice import twice
+from hsdsl.lint.analysis.words import at, number
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 from hsdsl.system import TIME
@@ -59,20 +60,23 @@ from hsdsl.system import TIME
 def check(subject: Subject) -> Iterator[Finding]:
     """Find guards whose direction changes with time."""
     dynamics = subject.dynamics
-    moving = {TIME, *(symbol(given.name) for given in subject.system.inputs)}
+    moving = {TIME, *dynamics.inputs}
     for part in subject.modes:
         for edge in part.edges:
             residual = dynamics.residual(edge.edge.surface)
             rate = dynamics.rate(part.mode, residual)
             if rate is None or not rate.free_symbols & moving:
                 continue
-            surface = dynamics.guard(edge.edge, pointing_out=False)
-            inward = dynamics.ask_any(part.mode, surface, negative(rate))
-            if not inward.somewhere or not dynamics.ask_any(part.mode, surface, positive(rate)).somewhere:
+            surface = dynamics.guard(edge.edge, pointing_out=False) or []
+            answer, later = twice(dynamics, part.mode, surface, negative(rate), positive(rate))
+            if not answer.somewhere:
                 continue
-            where = at(dynamics, part.mode, inward, [residual, rate])
+            about = [residual, rate]
+            where = at(dynamics, part.mode, answer, about)
+            changed = {s for expr in about for s in expr.free_symbols & moving}
+            then = ", ".join(f"{s.name} = {number(later[s])}" for s in later if s in changed)
             message = (
                 f"whether the flow leaves through the guard of '{edge.edge.name}' depends on time: "
-                f"{where} it points back into the domain"
+                f"{where} it points back into the domain, and out of it with {then}"
             )
-            yield Finding(edge.document.when.place.span, message, None, inward.decided or "sampled")
+            yield Finding(edge.document.when.place.span, message, None, answer.decided or "sampled")

@@ -2,8 +2,8 @@
 
 ## What it does
 
-Finds a `relaxation` of at least the `step`, of at least a tenth of the run, or of at least the shortest time between
-two transitions that the `reference` knows.
+Finds a `relaxation` of a relaxed run of at least the `step`, of at least a tenth of the run, or of at least the
+shortest time between two transitions that the `reference` knows.
 
 ## Why it is bad
 
@@ -17,7 +17,7 @@ modes:
   m:
     flow: {x: 1}
     transitions: [{when: x >= 1, to: m, reset: {x: 0}}]
-experiment: {until: 5, method: midpoint, step: 1e-3, relaxation: 0.01}
+experiment: {until: 5, scheme: relaxed, method: midpoint, step: 1e-3, relaxation: 0.01}
 ```
 
 ## Use instead
@@ -27,7 +27,7 @@ modes:
   m:
     flow: {x: 1}
     transitions: [{when: x >= 1, to: m, reset: {x: 0}}]
-experiment: {until: 5, method: midpoint, step: 1e-3, relaxation: 1e-5}
+experiment: {until: 5, scheme: relaxed, method: midpoint, step: 1e-3, relaxation: 1e-5}
 ```
 
 ## How it is decided
@@ -45,10 +45,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.expression import numeric
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.numbers import Number, rational
+from hsdsl.lint.numbers import Number
 from hsdsl.lint.subject import Subject
 from hsdsl.source import Scalar
 
@@ -59,12 +58,9 @@ _TIE = 1e-9
 def check(subject: Subject) -> Iterator[Finding]:
     """Find relaxations that are too large."""
     experiment = subject.document.experiment
-    given, relaxation = experiment.relaxation, subject.setting("relaxation")
-    place = (given or experiment.until).place
-    if relaxation is None:
-        relaxation = least_relaxation(rational(DEFAULTS["relaxation"]), subject.setting("until"))
-    if not any(mode.edges for mode in subject.system.modes):
+    if not subject.relaxed or not any(mode.edges for mode in subject.system.modes):
         return
+    place, relaxation = (experiment.relaxation or experiment.until).place, subject.relaxation
     step, until, dwell = subject.setting("step"), subject.setting("until"), _shortest_dwell(subject)
     if step is not None and relaxation >= step:
         yield Finding(place.span, "the relaxation is not smaller than the step", _HINT)

@@ -59,7 +59,7 @@ from hsdsl.lint.subject import Subject
 def check(subject: Subject) -> Iterator[Finding]:
     """Find infinite slopes."""
     dynamics = subject.dynamics
-    found = Repeats("expression")
+    found = Repeats("expression", "with this argument")
     for part in subject.modes:
         states = list(map(symbol, part.mode.states))
         for expression in evaluated(subject, part, ("flow",)):

@@ -55,7 +55,7 @@ from hsdsl.lint.subject import Subject
 def check(subject: Subject) -> Iterator[Finding]:
     """Find arguments without a real value."""
     dynamics = subject.dynamics
-    found = Repeats("expression")
+    found = Repeats("expression", "with this argument")
     for part in subject.modes:
         for expression in evaluated(subject, part, ("flow", "when", "domain", "reset")):
             for argument in without_value(expression.expr):

@@ -37,7 +37,8 @@ modes:
 ## How it is decided
 
 The surfaces of the next mode are put behind the reset, and a point of the guard is looked for where one of them is
-positive: symbolically, or by search. That it is positive everywhere is proved symbolically or by intervals.
+positive: symbolically, or by search. What a run does there is followed with numbers. That it is positive everywhere
+is proved symbolically, or by intervals within bounds that the message states.
 
 ## How to fix it
 
@@ -50,9 +51,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.landing import surfaces_of
+from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.passing import fires
+from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import at_most_zero, positive
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at, searched
+from hsdsl.lint.analysis.words import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -68,19 +72,31 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 def _look(subject: Subject, part: ModePart, edge: EdgePart, found: Repeats) -> None:
     dynamics, target = subject.dynamics, subject.dynamics.modes[edge.edge.target]
-    guard = dynamics.guard(edge.edge)
     for surface, after in surfaces_of(target):
         carried = dynamics.carried(dynamics.residual(surface), edge.edge)
-        answer = dynamics.ask_any(part.mode, guard, positive(carried))
+        answer = fires(dynamics, edge.edge, positive(carried))
         if not answer.somewhere:
             continue
-        always = dynamics.ask_any(part.mode, guard, at_most_zero(carried), prove=True)
-        where = at(dynamics, part.mode, answer, [dynamics.residual(edge.edge.surface), carried])
+        proof, guard = Proof(dynamics, part.mode), dynamics.guard(edge.edge)
+        always = guard is not None and proof.never(guard, at_most_zero(carried))
+        residual = dynamics.residual(edge.edge.surface)
+        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in surfaces_of(target))
+        about = [residual, carried, *([] if always else [dynamics.rate(part.mode, residual), *others])]
+        where = at(dynamics, part.mode, answer, about)
         beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
-        then = "which fires at once" if after else "where the run stops"
-        lands = f"the reset of '{edge.edge.name}' {'lands' if always.never else 'can land'} beyond {beyond}, {then}"
-        message = f"{lands}: {where}{searched(always) if always.never else ''}"
-        decided = (always if always.never else answer).decided or "sampled"
-        severity = "warning" if always.never else "note"
+        lands = f"lands{within(proof.searched)}" if always else "can land"
+        then = _then(Local(dynamics, part.mode, answer.point), edge)
+        message = f"the reset of '{edge.edge.name}' {lands} beyond {beyond}: {where}{then}"
+        decided = proof.decided if always else answer.decided or "sampled"
+        severity = "warning" if always else "note"
         kind = (carried, edge.edge.surface.residual)
         found.add(kind, Finding(edge.document.to.place.span, message, None, decided, severity=severity))
+
+
+def _then(here: Local, edge: EdgePart) -> str:
+    """Say what a run does there."""
+    try:
+        following = here.after(edge.edge).next()
+    except Unsure:
+        return ""
+    return f", where '{following.name}' fires at once" if following else ", where the run stops"

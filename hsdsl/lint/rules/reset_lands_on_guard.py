@@ -44,7 +44,7 @@ initial: {mode: fly, h: 1, v: 0}
 
 The next mode's surface function and its rate are put behind the reset. That the first vanishes on the whole guard is
 decided symbolically, or at sampled points; a point where the second has the wrong sign is looked for symbolically, or
-by search.
+by search, and the first derivative that is not 0 there is looked at with numbers, up to order 6.
 
 ## How to fix it
 
@@ -56,6 +56,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.landing import Landing, landings
+from hsdsl.lint.analysis.local import Local, Unsure
 from hsdsl.lint.analysis.question import at_most_zero, positive, zero
 from hsdsl.lint.analysis.repeats import Repeats
 from hsdsl.lint.analysis.words import at
@@ -65,7 +66,7 @@ from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find resets that land on surfaces and do not lead away from them."""
-    found = Repeats("reset")
+    found = Repeats("reset", "with these rates")
     for part in subject.modes:
         for edge in part.edges:
             for landing in landings(subject.dynamics, edge.edge):
@@ -80,22 +81,30 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, landing: Landing, fo
     kind = (landing.rate, landing.edge is None, dynamics.rate(part.mode, dynamics.residual(edge.edge.surface)))
     if found.again(kind):
         return
-    answer = dynamics.ask_any(part.mode, landing.guard, positive(landing.rate))
     name = edge.edge.name
     own = landing.edge is not None and landing.edge.name == name and landing.edge.source == edge.edge.source
+    answer, order = dynamics.ask_any(part.mode, landing.guard, positive(landing.rate)), 1
+    then = "the flow can cross it at once" if landing.edge else "the flow can leave the domain there"
+    if not answer.somewhere and own and landing.bend is not None:
+        answer = dynamics.ask_any(part.mode, landing.guard, zero(landing.rate), at_most_zero(-landing.bend))
+        then, order = "the flow does not lead away from it (Zeno is possible)", 2
+    if not answer.somewhere or not _stays(Local(dynamics, part.mode, answer.point), edge, landing, order):
+        return
     on = f"the guard of '{landing.edge.name}'" if landing.edge else f"the wall '{landing.surface.text}'"
     on = "its own guard" if own else on
-    then = ""
-    if answer.somewhere:
-        then = "the flow can cross it at once" if landing.edge else "the flow can leave the domain there"
-    elif own and landing.bend is not None:
-        answer = dynamics.ask_any(part.mode, landing.guard, zero(landing.rate), at_most_zero(-landing.bend))
-        then = "the flow does not lead away from it (Zeno is possible)"
-    if not answer.somewhere:
-        return
-    where = at(
-        dynamics, part.mode, answer, [dynamics.residual(edge.edge.surface), landing.rate, landing.bend if own else None]
-    )
-    message = f"the reset of '{name}' lands on {on}, and {where} {then}"
+    on = on if landing.decided == "symbolic" else f"{on} at every point that was tried"
+    about = [dynamics.residual(edge.edge.surface), landing.rate, landing.bend if own else None]
+    message = f"the reset of '{name}' lands on {on}, and {at(dynamics, part.mode, answer, about)} {then}"
     decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
     found.add(kind, Finding(edge.document.to.place.span, message, None, decided))
+
+
+def _stays(here: Local, edge: EdgePart, landing: Landing, order: int) -> bool:
+    """Whether the flow goes out of the surface after landing, or from the second order on does not go in."""
+    try:
+        reached = here.after(edge.edge)
+        residual = reached.dynamics.residual(landing.surface)
+        first, sign = reached.first(residual)
+        return reached.sign(residual) == 0 and (sign > 0 if first < order or order == 1 else sign >= 0)
+    except Unsure:
+        return False

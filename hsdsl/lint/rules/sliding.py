@@ -40,8 +40,9 @@ initial: {mode: left, x: -1}
 
 ## How it is decided
 
-That the second surface is met on landing, and that its reset leads back to the same state, is decided symbolically or
-at sampled points. A point where both flows push against the surface is looked for symbolically, or by search.
+A point where both flows push against the surface is looked for symbolically, or by search, among pairs whose second
+surface is met on landing and whose second reset leads back. Both transitions are then followed with numbers from that
+point: the second must be the one that a run makes next, and lead back to it.
 
 ## How to fix it
 
@@ -52,18 +53,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.analysis.instants import same
 from hsdsl.lint.analysis.landing import landings
+from hsdsl.lint.analysis.local import Local, Unsure
 from hsdsl.lint.analysis.question import positive
 from hsdsl.lint.analysis.repeats import Repeats
 from hsdsl.lint.analysis.words import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
+from hsdsl.system import Edge
 
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find pairs of surfaces that attract."""
     dynamics = subject.dynamics
-    found = Repeats("pair")
+    found = Repeats("pair", "with these rates")
     told: set[tuple[str, str, str, str]] = set()
     for part in subject.modes:
         for edge in part.edges:
@@ -78,14 +82,23 @@ def check(subject: Subject) -> Iterator[Finding]:
                 ):
                     continue
                 answer = dynamics.ask_any(part.mode, landing.guard, positive(rate), positive(landing.rate))
-                if not answer.somewhere:
+                if not answer.somewhere or not _returns(Local(dynamics, part.mode, answer.point), edge.edge, back):
                     continue
                 told.add((edge.edge.source, edge.edge.name, back.source, back.name))
                 where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
                 names = f"'{edge.edge.name}' and '{back.name}'"
                 message = f"{names} push against one surface from both sides (sliding): {where}"
                 hint = "give the two surfaces a distance, or add a mode that moves along the surface"
-                decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
+                decided = "sampled" if answer.decided == "sampled" else "symbolic"
                 finding = Finding(edge.document.when.place.span, message, hint, decided)
                 found.add((rate, landing.rate), finding)
     yield from found
+
+
+def _returns(here: Local, edge: Edge, back: Edge) -> bool:
+    """Whether the second transition is the one that follows the first, and leads back to where that was made."""
+    try:
+        reached = here.after(edge)
+        return reached.next() is back and same(reached.after(back), here)
+    except Unsure:
+        return False

@@ -33,7 +33,7 @@ initial: {mode: fall, h: 0, v: 1}
 ## How it is decided
 
 By the first derivative of the surface function along the flow that is not 0, up to the fourth, at the initial state
-and the time 0, with the parameters of the file.
+and the time 0, with the parameters of the file. At a kink or a jump nothing is said.
 
 ## How to fix it
 
@@ -44,21 +44,39 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.analysis.local import Local, Unsure, ranked
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import holds
-from hsdsl.lint.start import ON, leaves, side
+from hsdsl.lint.start import BEYOND, ON, leaves, side
 from hsdsl.lint.subject import Subject
+from hsdsl.system import Mode, Surface
 
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find starts on a guard with outward flow."""
     part, start = subject.mode(subject.system.initial.mode), subject.start
     place = subject.document.initial.mode.place
-    for wall in part.mode.walls:
-        if side(wall, start) == ON and leaves(part.mode, wall, start):
-            message = f"the run starts on the wall `{wall.text}` with the flow pointing out, and stops at once"
-            yield Finding(place.span, message, "start inside")
-    for edge in part.mode.edges:
-        if side(edge.surface, start) == ON and holds(edge.condition, start) and leaves(part.mode, edge.surface, start):
+    beyond = (e for e in part.mode.edges if e.condition is None and side(e.surface, start) == BEYOND)
+    if part.mode.final or any(beyond):
+        return  # the run ends, or another transition fires at once
+    for edge in ranked(part.mode.edges):
+        if holds(edge.condition, start) and _leaves(subject, part.mode, edge.surface):
             message = f"the run starts on the guard of '{edge.name}' with the flow pointing out, so it fires at once"
             yield Finding(place.span, message, "start inside, or with the flow pointing in")
+            return
+    for wall in part.mode.walls:
+        if _leaves(subject, part.mode, wall):
+            message = f"the run starts on the wall `{wall.text}` with the flow pointing out, and stops at once"
+            yield Finding(place.span, message, "start inside")
+
+
+def _leaves(subject: Subject, mode: Mode, surface: Surface) -> bool:
+    """Whether the run starts on a surface, where neither has a kink, and the flow goes out."""
+    if side(surface, subject.start) != ON or not leaves(mode, surface, subject.start):
+        return False
+    dynamics = subject.dynamics
+    try:
+        Local(dynamics, mode, dynamics.starting_point).piece(dynamics.residual(surface), dynamics.flow(mode))
+    except Unsure:
+        return False
+    return True

@@ -43,6 +43,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.analysis.local import ranked
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.start import BEYOND, side
 from hsdsl.lint.subject import Subject
@@ -51,12 +52,15 @@ from hsdsl.lint.subject import Subject
 def check(subject: Subject) -> Iterator[Finding]:
     """Find initial states outside their domain."""
     part = subject.mode(subject.system.initial.mode)
-    place = subject.document.initial.mode.place
+    place, hint = subject.document.initial.mode.place, "start inside, or turn the inequality round"
+    if part.mode.final:
+        return
+    edges = [edge for edge in part.mode.edges if edge.condition is None and side(edge.surface, subject.start) == BEYOND]
+    first = ranked(edges)[0] if edges else None
     for wall in part.mode.walls:
         if side(wall, subject.start) == BEYOND:
-            message = f"the run starts beyond the wall `{wall.text}` and stops at once"
-            yield Finding(place.span, message, "start inside, or turn the inequality round")
-    for edge in part.mode.edges:
-        if edge.condition is None and side(edge.surface, subject.start) == BEYOND:
-            message = f"the run starts beyond the guard `{edge.surface.text}`, so '{edge.name}' fires at once"
-            yield Finding(place.span, message, "start inside, or turn the inequality round")
+            then = f"'{first.name}' fires at once" if first else "stops at once"
+            yield Finding(place.span, f"the run starts beyond the wall `{wall.text}` and {then}", hint)
+    for edge in edges:
+        message = f"the run starts beyond the guard `{edge.surface.text}`, so '{first and first.name}' fires at once"
+        yield Finding(place.span, message, hint)

@@ -31,7 +31,7 @@ The names are those of the package `pint`, with their prefixes, plurals and abbr
 
 ## How to fix it
 
-Correct the name, or write the unit with `*`, `/` and `**`.
+Correct the name, or write the unit with `*`, `/` and `**`: `m/s**2`, not `m/s^2`.
 """
 
 from __future__ import annotations
@@ -49,6 +49,12 @@ def check(subject: Subject) -> Iterator[Finding]:
     for misread in subject.units.misread:
         scalar = misread.scalar
         message = f"'{shown(misread.names[0] if misread.names else scalar.value)}' is not a unit"
-        best = closest(misread.names[0], names_like(misread.names[0])) if misread.names else None
-        hint = f"did you mean '{best}'?" if best else "write units as m, kg*m/s**2, 1/s or rad"
+        best = closest(misread.names[0], names_like(misread.names[0])) if misread.names else misread.better
+        hint = (
+            f"write '{best}'"
+            if misread.better
+            else f"did you mean '{best}'?"
+            if best
+            else "write units as m, kg*m/s**2, 1/s or rad"
+        )
         yield Finding(scalar.place.span, message, hint)

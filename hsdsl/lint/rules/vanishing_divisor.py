@@ -59,7 +59,7 @@ from hsdsl.lint.subject import ModePart, Subject
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Find divisors that vanish."""
-    found = Repeats("expression")
+    found = Repeats("expression", "with this divisor")
     for part in subject.modes:
         for expression in evaluated(subject, part, ("flow", "when", "domain", "reset")):
             for divisor in divisors(expression.expr):

@@ -26,10 +26,11 @@ class Checked:
 
 @dataclass(frozen=True)
 class Misread:
-    """A text that is no unit, with the names in it that nobody knows."""
+    """A text that is no unit, with the names in it that nobody knows, and how it is written here, if that is known."""
 
     scalar: Scalar
     names: tuple[str, ...]
+    better: str | None
 
 
 class Units:
@@ -65,7 +66,7 @@ class Units:
             try:
                 known[name] = read(scalar.value)
             except UnknownUnit as error:
-                wrong.append(Misread(scalar, error.names))
+                wrong.append(Misread(scalar, error.names, error.better))
         if "t" not in self._texts and any(n == "[time]" for unit in known.values() for n, _ in unit.powers):
             known["t"] = read("s")
         return known, tuple(wrong)

@@ -6,6 +6,7 @@ A temperature in degC counts as one in kelvin: differences are what equations ar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -98,6 +99,8 @@ def _order(item: tuple[str, Fraction]) -> tuple[bool, str]:
 
 
 ONE = Unit()
+_RAISED = {ord(sign): f"**{digit}" for digit, sign in zip("123456789", "¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
+_RAISED |= {ord("⁻"): "**-"}
 _BASE = {
     "[length]": "m",
     "[mass]": "kg",
@@ -116,9 +119,10 @@ def _plain(power: Fraction) -> str:
 class UnknownUnit(Exception):
     """A text that is no unit; carries the names in it that nobody knows."""
 
-    def __init__(self, names: tuple[str, ...] = ()) -> None:
+    def __init__(self, names: tuple[str, ...] = (), better: str | None = None) -> None:
         super().__init__(", ".join(names))
         self.names = names
+        self.better = better  # how it is written here, where that is known
 
 
 def read(text: str) -> Unit:
@@ -134,8 +138,25 @@ def read(text: str) -> Unit:
     try:
         tree = parse(text)
     except ExpressionError:
-        raise UnknownUnit from None
+        raise UnknownUnit(better=_better(text)) from None
     return _of(tree)
+
+
+def _better(text: str) -> str | None:
+    """A unit written as elsewhere (``m/s^2``, ``N·m``, ``kg m/s²``) as it is written here; None where it is none."""
+    plain = (
+        text.translate(_RAISED)
+        .replace("**-**", "**-")
+        .replace("^", "**")
+        .replace("·", "*")
+        .replace("⋅", "*")
+        .replace("µ", "u")
+    )
+    plain = re.sub(r"(?<=[\w)])\s+(?=[A-Za-z(])", "*", plain.strip())
+    try:
+        return plain if plain != text and _of(parse(plain)) else None
+    except (ExpressionError, UnknownUnit):
+        return None
 
 
 def _of(tree: Tree) -> Unit:

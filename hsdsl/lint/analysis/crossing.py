@@ -1,0 +1,101 @@
+# pyright: basic
+"""Proofs that no flow carries a state through a guard.
+
+Along a run let the surface function r rise above 0 from a time s on. Where r is continuous, r = 0 at s, in the domain
+and with a condition that holds or is at its end. Then, on some piece without kinks:
+
+- the first derivative of r along the flow that is not 0 at s is positive, where derivatives are continuous there;
+- and r' > 0 at times as near to s as one likes where r > 0.
+
+One of the two is shown to be impossible on every piece. A derivative of order 2 or more says nothing at the end of a
+piece, where the run may go to another one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.errors import Decided
+from hsdsl.lint.analysis.dynamics import Clause, Dynamics
+from hsdsl.lint.analysis.pieces import Piece, pieces
+from hsdsl.lint.analysis.proof import Proof, closed
+from hsdsl.lint.analysis.question import positive, zero
+from hsdsl.lint.analysis.singular import breaks, discontinuities
+from hsdsl.system import Edge
+
+DEEPEST = 6  # derivatives along the flow that are looked at
+
+
+@dataclass(frozen=True)
+class Uncrossed:
+    """A guard that no flow crosses: why, how that is known, and within which bounds of names."""
+
+    why: str
+    decided: Decided
+    searched: tuple[tuple[Any, float, float], ...]
+
+
+def uncrossed(dynamics: Dynamics, edge: Edge) -> Uncrossed | None:
+    """Say why no flow crosses the guard of an edge; None where that is not known."""
+    mode, residual = dynamics.modes[edge.source], dynamics.residual(edge.surface)
+    conditions, broken = dynamics.condition(edge), discontinuities(residual)
+    if conditions is None or broken is None or residual.free_symbols & dynamics.inputs:
+        return None
+    domain = dynamics.domain(mode, without=edge)
+    inside = [(*domain, *closed(clause)) for clause in conditions]
+    proof = Proof(dynamics, mode)
+    if not all(proof.never(inside, *clause) for clause in broken):
+        return None
+    if proof.never(inside, zero(residual)):
+        where = "where `if` holds" if edge.condition is not None else "of the mode"
+        return Uncrossed(f"its surface does not meet the domain {where}", proof.decided, proof.searched)
+    cut = pieces(residual, dynamics.flow(mode))
+    found = [_Part(proof, piece, domain, inside).outcome() for piece in cut] if cut else [None]
+    if None in found:
+        return None
+    along = " or runs along it" if "along" in found else ""
+    why = f"wherever its surface meets the domain, the flow points back inside{along}"
+    return Uncrossed(why, proof.decided, proof.searched)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The surface of an edge on one piece."""
+
+    proof: Proof
+    piece: Piece
+    domain: Clause
+    inside: list[Clause]
+
+    def outcome(self) -> str | None:
+        """Say what the flow does wherever the surface is met: ``inward`` or ``along``; None where it may go out."""
+        dynamics, piece = self.proof.dynamics, self.piece
+        surface = [(zero(piece.residual), *clause, *piece.closed) for clause in self.inside]
+        for expr in (piece.residual, *piece.flow.values()):
+            broken = breaks(expr)
+            if broken is None or not all(self.proof.never(surface, *clause) for clause in broken):
+                return None
+        expr, first = piece.residual, None
+        for _ in range(DEEPEST):
+            expr = dynamics.along(expr, piece.flow)
+            if expr is None or not self.proof.never(surface, positive(expr)):
+                return None
+            surface = [(*clause, zero(expr)) for clause in surface]
+            if self.proof.never(surface):
+                return "inward"
+            first = expr if first is None else first
+            if expr.is_zero or not self._within(surface):
+                break
+        return "along" if self._attracts(surface, first) else None
+
+    def _within(self, surface: list[Clause]) -> bool:
+        """Whether the piece goes on around every point of the surface where r' = 0."""
+        return all(self.proof.never(surface, zero(side)) for side in (*self.piece.sides, *self.piece.zeros))
+
+    def _attracts(self, surface: list[Clause], first: Any) -> bool:
+        """Whether r falls, or stays, wherever it is positive, and nothing else ends the domain where r' = 0."""
+        if not all(self.proof.never(surface, zero(other.expr)) for other in self.domain):
+            return False
+        beyond = (*self.domain, *self.piece.closed, positive(self.piece.residual), positive(first))
+        return self.proof.never([beyond])
