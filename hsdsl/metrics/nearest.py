@@ -11,7 +11,7 @@ import numpy as np
 from hsdsl.metrics.enclosures import Array
 from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Space
-from hsdsl.metrics.sides import to_side
+from hsdsl.metrics.sides import to_entry
 
 HALVINGS = 12
 FARTHEST = 1e6  # no bound beyond this is looked for
@@ -22,7 +22,7 @@ def to_passages(space: Space, mode: int, x: Array) -> Array:
     nearest = np.full(len(x), np.inf)
     for passage in space.passages:
         if passage.source == mode:
-            nearest = np.minimum(nearest, to_side(passage, passage.enter, x))
+            nearest = np.minimum(nearest, to_entry(passage, x))
     for gate in space.curved_gates:
         if gate.source == mode:
             nearest = np.minimum(nearest, to_zeros(gate.surface, x))

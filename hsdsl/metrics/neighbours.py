@@ -20,7 +20,7 @@ from hsdsl.metrics.local import improve, onto
 from hsdsl.metrics.many import Pairs
 from hsdsl.metrics.nearest import to_passages
 from hsdsl.metrics.routes import Route
-from hsdsl.metrics.search import HOPS, End, search
+from hsdsl.metrics.search import End, most_hops, search
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
@@ -51,6 +51,7 @@ class Neighbours:
     space: Space
     relaxation: float | None
     budget: Budget
+    hops: int | None = None
     known: dict[tuple[int, int], list[Known]] = field(default_factory=dict[tuple[int, int], list[Known]])
 
     def bound(self, pairs: Pairs, enough: float) -> None:
@@ -164,9 +165,10 @@ class _Batch:
         """Search as for a single pair."""
         pairs, owner = self.pairs, self.owner
         starts, ends = [End(pairs.source, pairs.p[k])], [End(pairs.target, pairs.q[k])]
-        outer = search(owner.space, starts, ends, pairs.toll, HOPS, np.inf, owner.budget)
+        hops = most_hops(owner.space, pairs.source, pairs.target, owner.hops)
+        outer = search(owner.space, starts, ends, pairs.toll, hops, np.inf, owner.budget)
         enough = max(enough, float(pairs.lower[k]) * (1 + CLOSED))
-        found = beyond_affine(owner.space, starts, ends, pairs.toll, HOPS, np.inf, outer, owner.budget, enough)
+        found = beyond_affine(owner.space, starts, ends, pairs.toll, hops, np.inf, outer, owner.budget, enough)
         pairs.lower[k] = max(pairs.lower[k], min(found.lower, found.upper))
         pairs.upper[k] = min(pairs.upper[k], found.upper)
         self.done[k] = True
