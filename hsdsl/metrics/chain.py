@@ -51,9 +51,17 @@ class Shape:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     @cached_property
+    def _factors(self) -> tuple[Array, Array, Array]:
+        """Its singular vectors and values."""
+        left, values, right = np.linalg.svd(self.stacked, full_matrices=False)
+        return left, values, right
+
+    @cached_property
     def back(self) -> Array:
         """Its pseudo-inverse."""
-        return np.asarray(np.linalg.pinv(self.stacked), dtype=float)
+        left, values, right = self._factors
+        kept = values > max(self.stacked.shape) * 2 * UNIT * values.max(initial=0.0)
+        return (right[kept].T / values[kept]) @ left[:, kept].T
 
     @cached_property
     def spread(self) -> float:
@@ -70,7 +78,7 @@ class Shape:
         """How much the legs together change at least; 0 where rounding leaves that open."""
         if self.size == 0:
             return 0.0
-        values = np.linalg.svd(self.stacked, compute_uv=False)
+        values = self._factors[1]
         least = float(values[-1]) if len(values) == self.size else 0.0
         return max(0.0, least - self.operations * UNIT * float(np.linalg.norm(self.stacked)))
 

@@ -21,8 +21,8 @@ GAP = 1e-10  # relative
 ROUNDS = 3
 
 
-def solve(problem: Problem) -> tuple[float, float, Array]:
-    """Minimise a problem.
+def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[float, float, Array]:
+    """Minimise a problem, in at most so many rounds.
 
     Returns
     -------
@@ -38,15 +38,15 @@ def solve(problem: Problem) -> tuple[float, float, Array]:
     if shape.size < 2:
         lower, upper, s = on_line(shape, [o[None, :] for o in problem.offsets], numbers)
         return float(lower[0]), float(upper[0]), s[0]
-    return _refined(problem, numbers)
+    return _refined(problem, numbers, rounds)
 
 
-def _refined(problem: Problem, numbers: Array) -> tuple[float, float, Array]:
+def _refined(problem: Problem, numbers: Array, rounds: int) -> tuple[float, float, Array]:
     shape, offsets = problem.shape, [o[None, :] for o in problem.offsets]
     center: Array = -shape.back @ np.concatenate(problem.offsets)
     unit = max(problem.length(center), float(charge(shape, numbers, norm(center[None]))[0]), 1e-300)
     lower, upper, best = 0.0, np.inf, center
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         found = _around(problem, center, unit)
         if found is None:
             break
@@ -102,7 +102,11 @@ def _cone(shape: Shape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
         rows.append(block)
         cones.append(clarabel.SecondOrderConeT(1 + len(matrix)))
     objective = np.concatenate([np.zeros(size), np.ones(legs)])
-    return sparse.csc_matrix((size + legs, size + legs)), sparse.csc_matrix(np.vstack(rows)), objective, cones
+    dense = np.vstack(rows).T
+    columns, places = dense.nonzero()
+    ends = np.searchsorted(columns, np.arange(size + legs + 1))
+    matrix = sparse.csc_matrix((dense[columns, places], places, ends), shape=dense.shape[::-1])
+    return sparse.csc_matrix((size + legs, size + legs)), matrix, objective, cones
 
 
 @cache

@@ -14,14 +14,16 @@ from typing import Any
 import numpy as np
 
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.chain import Chain, Problem, Shape, chain_of
+from hsdsl.metrics.chain import Problem, Shape, chain_of
 from hsdsl.metrics.cones import solve
 from hsdsl.metrics.follow import may_follow
 from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.serial import one_thread
 from hsdsl.metrics.sides import to_entry, to_exit
 
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
 ROUNDING = 4 * 2.0**-53  # of a sum of bounds, for each of them
+NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
 HOPS = 8  # more than the fewest that lead from one mode to the other
 
 
@@ -81,9 +83,10 @@ def search(
         The time for it.
     """
     found = Found(upper=limit, lower=limit)
-    for end in ends:
-        for start in starts:
-            _Search(space, start, end, relaxation, hops, found, budget).run()
+    with one_thread():
+        for end in ends:
+            for start in starts:
+                _Search(space, start, end, relaxation, hops, found, budget).run()
     return found
 
 
@@ -105,6 +108,7 @@ class _Search:
         if self.start.bound is None and self._left_out(to_any_passage(self.space, self.start) + self.fixed):
             return
         self.rest = remaining(self.space, self.end, self.relaxation, self.budget)
+        self._straight_there()
         self._go_on((), self.fixed)
         while self.heap:
             bound, _, sequence = heapq.heappop(self.heap)
@@ -115,6 +119,19 @@ class _Search:
                 break
             self._finish(sequence)
             self._go_on(sequence, bound)
+
+    def _straight_there(self) -> None:
+        """Try the sequence that the bounds between passages make look shortest, so that some path is known early."""
+        inner, sequence = gaps(self.space, self.budget), tuple[int, ...]()
+        while len(sequence) < self.hops:
+            far = np.zeros(len(self.rest)) if not sequence else inner[sequence[-1]]
+            open_ = [i for i in self._following(sequence) if i not in sequence and self.rest[i] < np.inf]
+            if not open_:
+                return
+            sequence = (*sequence, min(open_, key=lambda i: float(far[i] + self.rest[i])))
+            if self.space.passages[sequence[-1]].target == self.end.mode:
+                self._finish(sequence)
+                return
 
     def _left_out(self, bound: float) -> bool:
         """Whether no path that is at least so long is worth a look; the lower end remembers it."""
@@ -195,11 +212,17 @@ class _Search:
         if rest == np.inf:
             return np.inf
         chain = chain_of(self.space, sequence)
-        simple = solve(chain.problem(self.start.x, None))[0] + rest + toll
+        simple = self._least(chain.problem(self.start.x, None), rest + toll)
         if simple >= self.found.upper * (1 - TOLERANCE) or self.space.kept is None:
             return simple
         goal = self.end.x[list(self.space.kept[self.end.mode])]
-        return max(simple, solve(chain.problem(self.start.x, goal, kept=True))[0] + toll)
+        return max(simple, self._least(chain.problem(self.start.x, goal, kept=True), toll))
+
+    def _least(self, problem: Problem, more: float) -> float:
+        """A lower bound, closer where that may decide."""
+        bound = solve(problem, 1)[0] + more
+        near = self.found.upper * (1 - NEAR) < bound < self.found.upper * (1 - TOLERANCE)
+        return max(bound, solve(problem)[0] + more) if near else bound
 
 
 def straight(p: Array, q: Array) -> Problem:
@@ -250,12 +273,16 @@ def gaps(space: Space, budget: Budget) -> Array:
         found = np.full((count, count), np.inf)
         for f in space.passages:
             for g in space.passages:
-                if f.target == g.source:
-                    found[f.index, g.index] = 0.0 if budget.spent() else _gap(chain_of(space, (f.index, g.index)))
+                if f.target == g.source and np.isinf(found[f.index, g.index]):
+                    # The same two sides face each other the other way round: passage i backwards is i with the last bit
+                    # changed.
+                    gap = 0.0 if budget.spent() else _gap(space, f.index, g.index)
+                    found[f.index, g.index] = found[g.index ^ 1, f.index ^ 1] = gap
         if not budget.ran_out:
             space.cache["gaps"] = found
     return found
 
 
-def _gap(chain: Chain) -> float:
-    return solve(chain.problem(None, None))[0]
+def _gap(space: Space, f: int, g: int) -> float:
+    """0 where a passage is taken back at once."""
+    return 0.0 if f == g ^ 1 else solve(chain_of(space, (f, g)).problem(None, None), 1)[0]
