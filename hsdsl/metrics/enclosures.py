@@ -101,10 +101,10 @@ def _sine(value: Any, quarter: float = 0.0) -> Range:
     x = as_range(value)
     ends = [np.sin(v) if quarter == 0 else np.cos(v) for v in (x.low, x.high)]
     low, high = np.minimum(*ends), np.maximum(*ends)
-    turns = [v / (2 * np.pi) - (1 - quarter) / 4 for v in (x.low, x.high)]  # a crest at every whole number
-    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
-    crest = np.floor(turns[1] + slack) > np.floor(turns[0] - slack)
-    trough = np.floor(turns[1] + 0.5 + slack) > np.floor(turns[0] + 0.5 - slack)
+    turns = x / (_PI + _PI) - (1 - quarter) / 4  # a crest at every whole number
+    halves = turns + 0.5
+    crest = np.floor(turns.high) > np.ceil(turns.low) - 1
+    trough = np.floor(halves.high) > np.ceil(halves.low) - 1
     found = _outwards(np.where(trough, -1.0, low), np.where(crest, 1.0, high), STEPS)
     lost = ~(np.isfinite(x.low) & np.isfinite(x.high))
     return Range(np.where(lost, -1.0, np.maximum(found.low, -1.0)), np.where(lost, 1.0, np.minimum(found.high, 1.0)))
@@ -112,9 +112,8 @@ def _sine(value: Any, quarter: float = 0.0) -> Range:
 
 def _tangent(value: Any) -> Range:
     x = as_range(value)
-    turns = [v / np.pi - 0.5 for v in (x.low, x.high)]
-    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
-    pole = np.floor(turns[1] + slack) != np.floor(turns[0] - slack)
+    turns = x / _PI - 0.5
+    pole = ~(np.floor(turns.high) < np.ceil(turns.low))
     return _unless(pole, _outwards(np.tan(x.low), np.tan(x.high), STEPS))
 
 
@@ -125,7 +124,7 @@ def _absolute(value: Any) -> Range:
 
 
 def _arc_cosine(value: Any) -> Range:
-    return _outwards(np.pi / 2, np.pi / 2) - _ARC_SINE(value)
+    return _PI / 2.0 - _ARC_SINE(value)
 
 
 def _cosh(value: Any) -> Range:
@@ -139,7 +138,7 @@ def _angle(y: Any, x: Any) -> Range:
     jumps = (x.low <= 0) & (y.low <= 0) & (y.high >= 0)
     corners = np.broadcast_arrays(*(np.arctan2(b, a) for a in (x.low, x.high) for b in (y.low, y.high)))
     found = _outwards(np.minimum.reduce(corners), np.maximum.reduce(corners), STEPS)
-    return Range(np.where(jumps, -np.pi, found.low), np.where(jumps, np.pi, found.high))
+    return Range(np.where(jumps, -_PI.high, found.low), np.where(jumps, _PI.high, found.high))
 
 
 def _power(base: Any, exponent: Any) -> Range:
@@ -181,6 +180,7 @@ def _step(function: Callable[[Any], Any]) -> Callable[[Any], Range]:
     return lambda value: Range(function(as_range(value).low), function(as_range(value).high))
 
 
+_PI = _outwards(np.pi, np.pi)
 _ARC_SINE = _rising(np.arcsin, -1.0, 1.0)
 
 ENCLOSED = Arithmetic(
@@ -212,7 +212,7 @@ ENCLOSED = Arithmetic(
         "sign": _step(np.sign),
         "floor": _step(np.floor),
         "heaviside": _step(lambda x: 0.5 * (1.0 + np.sign(x))),
-        "pi": _outwards(np.pi, np.pi),
+        "pi": _PI,
         "e": _outwards(np.e, np.e),
         "nan": Range(-np.inf, np.inf),
     },

@@ -162,7 +162,7 @@ def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Way
     rest = ways.rest(sequence[-1], active)
     bound = _shortest(pairs, chain, active, None)[0] + toll + rest
     if space.kept is not None:
-        goals = pairs.q[active][:, list(space.kept[pairs.target])]
+        goals: Array = pairs.q[active][:, list(space.kept[pairs.target])]
         bound = np.maximum(bound, _shortest(pairs, chain, active, goals, kept=True)[0] + toll)
     return bound * (1 - ROUNDING)
 
@@ -180,7 +180,7 @@ def _shortest(
 ) -> tuple[Array, Array]:
     """Bounds on the shortest ways from p through a chain, to goals if there are any."""
     zero = np.zeros(len(pairs.space.domains[pairs.source].coordinates))
-    problem = chain.problem(zero, None if goals is None else np.zeros(goals.shape[1]), kept)
+    problem = chain.problem(zero, None if goals is None else 0.0 * goals[0], kept)
     offsets = [np.tile(o, (len(active), 1)) for o in problem.offsets]
     starts = pairs.p[active]
     offsets[0] = offsets[0] - starts
