@@ -107,16 +107,17 @@ def search_many(pairs: Pairs, hops: int, budget: Budget) -> None:
                 pairs.leave(floor[candidates], candidates)
                 continue
             active = _promising(pairs, sequence, candidates, floor, ways)
-            if active.size and len(sequence) <= hops and space.passages[sequence[-1]].target == pairs.target:
+            if len(sequence) > hops:
+                if active.size:
+                    pairs.cut(_through(pairs, sequence, active, ways), active, hops)
+                continue
+            if active.size and space.passages[sequence[-1]].target == pairs.target:
                 _finish(pairs, sequence, active)
             longer = [(*sequence, g) for g in followers(space, sequence[-1])]
             active = pairs.open(floor[active], active) if longer else active[:0]
-            if not active.size:
-                continue
-            bounds = _through(pairs, sequence, active, ways)
-            if len(sequence) > hops:
-                pairs.cut(bounds, active, hops)
-            elif (active := pairs.open(bounds, active)).size:
+            if active.size:
+                active = pairs.open(_through(pairs, sequence, active, ways), active)
+            if active.size:
                 following += [(one, active) for one in longer]
         layer = following
 
