@@ -15,12 +15,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from hsdsl.metrics.geometry import Passage, Space
+import numpy as np
+
+from hsdsl.metrics.geometry import Array, Passage, Space
 from hsdsl.metrics.rational import Vector, dot, maximise, never_negative, plus
 
 # A way may grow by this share where a pair is left out: far below rounding, and above what numbers that are not
 # rational were rounded to.
 SLACK = Fraction(1, 10**40)
+
+SEEN = 1e-6  # relative: what is longer by so much is so in floats too
 
 Side = tuple[Vector, tuple[Vector, ...]]
 
@@ -46,7 +50,21 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
 def _worth_returning(f: Passage, g: Passage) -> bool:
     if f.source != g.target:
         return True
+    if _seen_longer(_floats(f.enter, g.leave), _floats(f.leave, g.enter)):
+        return True
     return not _never_longer(_difference(f.exact[0], g.exact[1]), _difference(f.exact[1], g.exact[0]))
+
+
+def _floats(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+    return np.column_stack([one[0] - other[0], one[1], -other[1]])
+
+
+def _seen_longer(short: Array, long: Array) -> bool:
+    """Whether ``|short @ u| > |long @ u|`` for some u by far more than rounding; most pairs need no closer look."""
+    excess = long.T @ long - short.T @ short
+    return bool(
+        np.linalg.eigvalsh(excess)[0] < -SEEN * max(np.abs(long).max(initial=0), np.abs(short).max(initial=0)) ** 2
+    )
 
 
 def _difference(one: Side, other: Side) -> list[Vector]:

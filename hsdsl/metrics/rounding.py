@@ -100,6 +100,8 @@ def proved_below(shape: Shape, offsets: list[Array], numbers: Array, s: Array, v
     value = np.einsum("bi,bi->b", flat, legs)
     value -= np.einsum("bj,bj->b", weights, shape.levels - s @ shape.normals.T)
     longest_path, far = lengths(shape, offsets, s), norm(s)
+    if np.all(value <= charge(shape, numbers, far)):  # nothing is left of it, wherever the unknowns may be
+        return np.zeros(len(value))
     near = _reach(shape, numbers, longest_path, far)
     heavy = weights.sum(axis=1)
     residual = norm(flat @ shape.stacked + weights @ shape.normals)

@@ -105,11 +105,12 @@ class _Search:
     def run(self) -> None:
         """Best first until nothing open can be shorter."""
         self._finish(())
-        if self.start.bound is None and self._left_out(to_any_passage(self.space, self.start) + self.fixed):
+        least = max(self.fixed, least_with_passages(self.space, self.start, self.end) + self.fixed)
+        if self._left_out(least):
             return
         self.rest = remaining(self.space, self.end, self.relaxation, self.budget)
         self._straight_there()
-        self._go_on((), self.fixed)
+        self._go_on((), least)
         while self.heap:
             bound, _, sequence = heapq.heappop(self.heap)
             if self._left_out(bound):
@@ -231,10 +232,14 @@ def straight(p: Array, q: Array) -> Problem:
     return Problem(Shape((nothing,), np.zeros((0, 0)), np.zeros(0)), (q - p,), 0.0)
 
 
-def to_any_passage(space: Space, start: End) -> float:
-    """A lower bound on the way from a point to the nearest passage; infinite without any."""
-    x = start.x[None]
-    return min((float(to_entry(p, x)[0]) for p in space.passages if p.source == start.mode), default=np.inf)
+def least_with_passages(space: Space, start: End, end: End) -> float:
+    """A lower bound on ways with passages: to the nearest one and from one; infinite without any."""
+    x, y = start.x[None], end.x[None]
+    first = [float(to_entry(p, x)[0]) for p in space.passages if p.source == start.mode]
+    last = [float(to_exit(p, y)[0]) for p in space.passages if p.target == end.mode]
+    if not first or not last:
+        return np.inf
+    return (min(first) if start.bound is None else 0.0) + (min(last) if end.bound is None else 0.0)
 
 
 def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:

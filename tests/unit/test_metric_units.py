@@ -8,6 +8,9 @@ from affine_scenes import UNITS, BruteForce, path_fault, random_point, random_sc
 
 import hsdsl
 from hsdsl.errors import UsageError
+from hsdsl.metrics import search
+from hsdsl.metrics.budget import Budget
+from hsdsl.metrics.cones import solve
 from hsdsl.metrics.interval import EndsCross, Interval, weakest
 from hsdsl.metrics.points import Place, distance, distances
 from hsdsl.metrics.space import make_space
@@ -203,3 +206,35 @@ def test_many_pairs_at_once_have_no_false_end_under_any_cap(tmp_path):
                 lower, upper, status = distances(space, f"m{i}", p, f"m{j}", q, hops=hops)
                 assert lower[0] <= expected * (1 + 1e-9) + 1e-12
                 assert hops is not None or upper[0] <= expected * (1 + 1e-6) + 1e-12 or status != "certified"
+
+
+class Looks(Budget):
+    """Time that is over after so many looks at it."""
+
+    def __init__(self, looks):
+        super().__init__()
+        self.looks = looks
+
+    def spent(self):
+        self.looks -= 1
+        self.ran_out = self.ran_out or self.looks < 0
+        return self.ran_out
+
+
+@pytest.mark.parametrize("looks", [0, 1, 10, 40])
+def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path, monkeypatch, looks):
+    solved = []
+    monkeypatch.setattr(search, "solve", lambda *asked: solved.append(1) or solve(*asked))
+    for seed in range(4):
+        rng = np.random.default_rng(300 + seed)
+        scene = random_scene(rng, dimensions=(2,), edges=6)
+        p, q = random_point(rng, scene), random_point(rng, scene)
+        space = space_of(tmp_path, text_of(scene))
+        expected = BruteForce(scene).distance(p, q)
+        solved.clear()
+        found = distance(space, *(Place(f"m{m}", tuple(map(float, x))) for m, x in (p, q)), budget=Looks(looks))
+        assert found.interval.lower <= expected * (1 + 1e-9) + 1e-12
+        assert len(solved) <= 4 * looks + 4
+        if 0 < found.interval.upper < np.inf:
+            ends = ((m, tuple(map(float, x))) for m, x in (p, q))
+            assert path_fault(scene, *ends, found.path, found.interval.upper) is None
