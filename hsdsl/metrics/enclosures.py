@@ -19,6 +19,7 @@ from hsdsl.arithmetic import Arithmetic
 
 Array = NDArray[np.float64]
 
+ANGLE = 8 * 2.0**-53  # more than rounding makes of a number of turns, beside that number and 1
 STEPS = 4  # units in the last place by which NumPy's functions may be wrong
 
 
@@ -101,19 +102,27 @@ def _sine(value: Any, quarter: float = 0.0) -> Range:
     x = as_range(value)
     ends = [np.sin(v) if quarter == 0 else np.cos(v) for v in (x.low, x.high)]
     low, high = np.minimum(*ends), np.maximum(*ends)
-    turns = x / (_PI + _PI) - (1 - quarter) / 4  # a crest at every whole number
-    halves = turns + 0.5
-    crest = np.floor(turns.high) > np.ceil(turns.low) - 1
-    trough = np.floor(halves.high) > np.ceil(halves.low) - 1
+    turns = _turns(x, 1 / (2 * np.pi), (1 - quarter) / 4)  # a crest at every whole number
+    crest, trough = _holds_whole(*turns), _holds_whole(*(turn + 0.5 for turn in turns))
     found = _outwards(np.where(trough, -1.0, low), np.where(crest, 1.0, high), STEPS)
     lost = ~(np.isfinite(x.low) & np.isfinite(x.high))
     return Range(np.where(lost, -1.0, np.maximum(found.low, -1.0)), np.where(lost, 1.0, np.minimum(found.high, 1.0)))
 
 
+def _turns(x: Range, each: float, less: float) -> tuple[Any, Any]:
+    """How many turns an angle is, rounded outwards: the float ``each`` is off by less than two units, and so on."""
+    low, high = x.low * each - less, x.high * each - less
+    return low - ANGLE * (1 + np.abs(low)), high + ANGLE * (1 + np.abs(high))
+
+
+def _holds_whole(low: Any, high: Any) -> Any:
+    """Whether there is a whole number between, or may be."""
+    return ~(np.floor(high) < np.ceil(low))
+
+
 def _tangent(value: Any) -> Range:
     x = as_range(value)
-    turns = x / _PI - 0.5
-    pole = ~(np.floor(turns.high) < np.ceil(turns.low))
+    pole = _holds_whole(*_turns(x, 1 / np.pi, 0.5))
     return _unless(pole, _outwards(np.tan(x.low), np.tan(x.high), STEPS))
 
 

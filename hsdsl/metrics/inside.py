@@ -28,7 +28,7 @@ def straight_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
     """
     verdict = np.full(len(a), CERTAIN)
     for formula in space.domains[mode].curved:
-        tolerance = np.maximum(_tolerance(formula, a), _tolerance(formula, b))
+        tolerance = _tolerance(formula, np.vstack([a, b])).reshape(2, len(a)).max(axis=0)
         verdict = np.minimum(verdict, _below(formula, a, b, tolerance))
     return verdict
 

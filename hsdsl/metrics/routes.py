@@ -180,12 +180,11 @@ class Route:
 
     def excess(self, unknowns: Array) -> float:
         """How far the guard points are, to first order, from where surfaces and inequalities let them be."""
-        off = np.concatenate([np.abs(self.surfaces(unknowns)), np.maximum(-self.room(unknowns), 0.0)])
-        if not off.size or not off.max() > 0:
-            return 0.0 if np.all(np.isfinite(off)) else np.inf
-        slopes = np.linalg.norm(np.vstack([self.surface_slopes(unknowns), self.room_slopes(unknowns)]), axis=1)
-        with np.errstate(all="ignore"):
-            return float(np.max(np.where(off > 0, off / slopes, 0.0)))
+        on, in_ = np.abs(self.surfaces(unknowns)), np.maximum(-self.room(unknowns), 0.0)
+        if not (np.all(np.isfinite(on)) and np.all(np.isfinite(in_))):
+            return np.inf
+        parts = [(on, self.surface_slopes), (in_, self.room_slopes)]
+        return max(_farthest(off, slopes(unknowns)) if off.any() else 0.0 for off, slopes in parts)
 
     def size(self, unknowns: Array) -> float:
         """The largest coordinate of its ends and guard points."""
@@ -216,6 +215,12 @@ def beyond(space: Space, mode: int, a: Array, b: Array) -> float:
     """How far a straight piece is seen to leave its domain."""
     at = [a + share * (b - a) for share in SHARES]
     return max((f(x) for f in space.domains[mode].curved for x in at), default=0.0)
+
+
+def _farthest(off: Array, slopes: Array) -> float:
+    """The way to where functions that are ``off`` are not, along their steepest slopes."""
+    with np.errstate(all="ignore"):
+        return float(np.max(np.where(off > 0, off / np.linalg.norm(slopes, axis=1), 0.0)))
 
 
 def _placed(block: Array, first: int, width: int) -> Array:
