@@ -19,6 +19,7 @@ from hsdsl.arithmetic import Arithmetic
 
 Array = NDArray[np.float64]
 
+ANGLE = 8 * 2.0**-53  # more than rounding makes of a number of turns, beside that number and 1
 STEPS = 4  # units in the last place by which NumPy's functions may be wrong
 
 
@@ -101,20 +102,27 @@ def _sine(value: Any, quarter: float = 0.0) -> Range:
     x = as_range(value)
     ends = [np.sin(v) if quarter == 0 else np.cos(v) for v in (x.low, x.high)]
     low, high = np.minimum(*ends), np.maximum(*ends)
-    turns = [v / (2 * np.pi) - (1 - quarter) / 4 for v in (x.low, x.high)]  # a crest at every whole number
-    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
-    crest = np.floor(turns[1] + slack) > np.floor(turns[0] - slack)
-    trough = np.floor(turns[1] + 0.5 + slack) > np.floor(turns[0] + 0.5 - slack)
+    turns = _turns(x, 1 / (2 * np.pi), (1 - quarter) / 4)  # a crest at every whole number
+    crest, trough = _holds_whole(*turns), _holds_whole(*(turn + 0.5 for turn in turns))
     found = _outwards(np.where(trough, -1.0, low), np.where(crest, 1.0, high), STEPS)
     lost = ~(np.isfinite(x.low) & np.isfinite(x.high))
     return Range(np.where(lost, -1.0, np.maximum(found.low, -1.0)), np.where(lost, 1.0, np.minimum(found.high, 1.0)))
 
 
+def _turns(x: Range, each: float, less: float) -> tuple[Any, Any]:
+    """How many turns an angle is, rounded outwards: the float ``each`` is off by less than two units, and so on."""
+    low, high = x.low * each - less, x.high * each - less
+    return low - ANGLE * (1 + np.abs(low)), high + ANGLE * (1 + np.abs(high))
+
+
+def _holds_whole(low: Any, high: Any) -> Any:
+    """Whether there is a whole number between, or may be."""
+    return ~(np.floor(high) < np.ceil(low))
+
+
 def _tangent(value: Any) -> Range:
     x = as_range(value)
-    turns = [v / np.pi - 0.5 for v in (x.low, x.high)]
-    slack = 1e-9 * (1 + np.maximum(np.abs(turns[0]), np.abs(turns[1])))
-    pole = np.floor(turns[1] + slack) != np.floor(turns[0] - slack)
+    pole = _holds_whole(*_turns(x, 1 / np.pi, 0.5))
     return _unless(pole, _outwards(np.tan(x.low), np.tan(x.high), STEPS))
 
 
@@ -125,7 +133,7 @@ def _absolute(value: Any) -> Range:
 
 
 def _arc_cosine(value: Any) -> Range:
-    return _outwards(np.pi / 2, np.pi / 2) - _ARC_SINE(value)
+    return _PI / 2.0 - _ARC_SINE(value)
 
 
 def _cosh(value: Any) -> Range:
@@ -139,7 +147,7 @@ def _angle(y: Any, x: Any) -> Range:
     jumps = (x.low <= 0) & (y.low <= 0) & (y.high >= 0)
     corners = np.broadcast_arrays(*(np.arctan2(b, a) for a in (x.low, x.high) for b in (y.low, y.high)))
     found = _outwards(np.minimum.reduce(corners), np.maximum.reduce(corners), STEPS)
-    return Range(np.where(jumps, -np.pi, found.low), np.where(jumps, np.pi, found.high))
+    return Range(np.where(jumps, -_PI.high, found.low), np.where(jumps, _PI.high, found.high))
 
 
 def _power(base: Any, exponent: Any) -> Range:
@@ -181,6 +189,7 @@ def _step(function: Callable[[Any], Any]) -> Callable[[Any], Range]:
     return lambda value: Range(function(as_range(value).low), function(as_range(value).high))
 
 
+_PI = _outwards(np.pi, np.pi)
 _ARC_SINE = _rising(np.arcsin, -1.0, 1.0)
 
 ENCLOSED = Arithmetic(
@@ -212,7 +221,7 @@ ENCLOSED = Arithmetic(
         "sign": _step(np.sign),
         "floor": _step(np.floor),
         "heaviside": _step(lambda x: 0.5 * (1.0 + np.sign(x))),
-        "pi": _outwards(np.pi, np.pi),
+        "pi": _PI,
         "e": _outwards(np.e, np.e),
         "nan": Range(-np.inf, np.inf),
     },

@@ -41,6 +41,12 @@ from hsdsl.errors import UsageError
     help="Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg.",
 )
 @click.option(
+    "--hops",
+    type=int,
+    metavar="N",
+    help="The most passages of a path; else eight more than the fewest that connect the modes.",
+)
+@click.option(
     "--seconds",
     metavar="S",
     default=60.0,
@@ -58,13 +64,14 @@ def distance(
     overrides: tuple[str, ...],
     coordinates: str | None,
     plot: Path | None,
+    hops: int | None,
     seconds: float,
     json: bool,
 ) -> None:
     """Measure how far apart two states, or two runs, are in the hybrid metric."""
     with errors_reported(json):
         parameters = _parameters(overrides)
-        options = {"relaxation": relaxation, "parameters": parameters, "seconds": seconds}
+        options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
         if second is not None:
             if start is not None or end is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
@@ -110,7 +117,7 @@ def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, option
         }
         for piece in found.path
     ]  # fmt: skip
-    bounds = {"lower": found.interval.lower, "upper": found.interval.upper}
+    bounds = {"lower": found.interval.lower, "upper": found.interval.upper, "status": found.status}
     print(dumps({**bounds, "metric": name, "certified": found.certified, "path": pieces}))
 
 

@@ -31,7 +31,7 @@ def of_runs(
 ) -> None:
     """Measure between two runs; a model file stands for the run of its own experiment.
 
-    ``options`` are ``relaxation``, ``parameters`` and ``seconds``.
+    ``options`` are ``relaxation``, ``parameters``, ``hops`` and ``seconds``.
     """
     from hsdsl.model.between_runs import distance
     from hsdsl.report import dumps

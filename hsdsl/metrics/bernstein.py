@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.metrics.rounding import UNIT
+
 Array = npt.NDArray[Any]
 
 
@@ -60,11 +62,25 @@ def degree_raised(coefficients: Array, degree: int) -> Array:
 
 
 def largest_norm(coefficients: Array) -> Array:
-    """Bound the Euclidean norm of each polynomial (by powers) on [0, 1] from above, shape (n,)."""
-    return np.sqrt(np.max(np.sum(bernstein(coefficients) ** 2, axis=2), axis=1))
+    """Bound the Euclidean norm of each polynomial (by powers) on [0, 1] from above, shape (n,); rounded outwards."""
+    norms = np.sqrt(np.max(np.sum(bernstein(coefficients) ** 2, axis=2), axis=1))
+    return norms + _rounding(coefficients)
 
 
 def length(coefficients: Array) -> Array:
-    """Bound the length of each curve on [0, 1] from above by that of its control polygon, shape (n,)."""
-    steps = np.diff(bernstein(coefficients), axis=1)
-    return np.sum(np.sqrt(np.sum(steps**2, axis=2)), axis=1)
+    """Bound the length of each curve on [0, 1] from above by that of its control polygon; rounded outwards."""
+    moving = coefficients.copy()
+    moving[:, 0] = 0.0  # where it begins does not count, nor does that number's rounding
+    steps = np.diff(bernstein(moving), axis=1)
+    return np.sum(np.sqrt(np.sum(steps**2, axis=2)), axis=1) + 2 * coefficients.shape[1] * _rounding(moving)
+
+
+def sizes(coefficients: Array) -> Array:
+    """Add up the norms of each polynomial's coefficients, shape (n,)."""
+    return np.sqrt(np.einsum("nkw,nkw->nk", coefficients, coefficients)).sum(axis=1)
+
+
+def _rounding(coefficients: Array) -> Array:
+    """Bound what rounding does to any of a polynomial's Bernstein coefficients and its norm."""
+    _, count, width = coefficients.shape
+    return (2 * count + width + 8) * UNIT * sizes(coefficients)

@@ -6,96 +6,110 @@ last answer, in units of its value, until the gap is small or stops shrinking.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.chain import Problem
+from hsdsl.metrics.chain import Problem, Shape
 from hsdsl.metrics.geometry import Array
-from hsdsl.metrics.line import interval_of, minimise_on_line
+from hsdsl.metrics.line import on_line
+from hsdsl.metrics.rounding import brought_inside, charge, norm, proved_above, proved_below
 
 GAP = 1e-10  # relative
 ROUNDS = 3
 
 
-def solve(problem: Problem) -> tuple[float, float, Array]:
-    """Minimise a problem.
+def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[float, float, Array]:
+    """Minimise a problem, in at most so many rounds.
 
     Returns
     -------
     lower, upper : float
-        Between which the minimum lies, up to round-off.
+        Between which the minimum lies; see :mod:`hsdsl.metrics.rounding`.
     s : (N,) array
         Where ``upper`` is attained.
     """
-    if not problem.matrices:
-        return 0.0, 0.0, np.zeros(problem.size)
-    if problem.size == 0:
-        value = problem.length(np.zeros(0))
-        return value, value, np.zeros(0)
-    if problem.size == 1:
-        low, high = interval_of(problem.normals, problem.levels)
-        matrices = [m[:, 0] for m in problem.matrices]
-        lower, upper, s = minimise_on_line(matrices, [o[None, :] for o in problem.offsets], low, high)
-        return float(lower[0]), float(upper[0]), s
-    return _refined(problem)
+    shape = problem.shape
+    if not shape.matrices:
+        return 0.0, 0.0, np.zeros(shape.size)
+    numbers = np.array([problem.numbers])
+    if shape.size < 2:
+        lower, upper, s = on_line(shape, [o[None, :] for o in problem.offsets], numbers)
+        return float(lower[0]), float(upper[0]), s[0]
+    return _refined(problem, numbers, rounds)
 
 
-def _refined(problem: Problem) -> tuple[float, float, Array]:
-    stacked, offsets = np.vstack(problem.matrices), np.concatenate(problem.offsets)
-    center = cast(Array, np.linalg.lstsq(stacked, -offsets, rcond=None)[0])
-    unit = max(problem.length(center), 1e-300)
+def _refined(problem: Problem, numbers: Array, rounds: int) -> tuple[float, float, Array]:
+    shape, offsets = problem.shape, [o[None, :] for o in problem.offsets]
+    center: Array = -shape.back @ np.concatenate(problem.offsets)
+    unit = max(problem.length(center), float(charge(shape, numbers, norm(center[None]))[0]), 1e-300)
     lower, upper, best = 0.0, np.inf, center
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         found = _around(problem, center, unit)
         if found is None:
             break
-        below, s = found
-        s = _inside(problem, s)
-        value = problem.length(s)
-        lower = max(lower, below)
+        proposal, vectors, weights = (x[None] for x in found)
+        s, inside = brought_inside(shape, proposal)
+        value = float(proved_above(shape, offsets, numbers, s, inside)[0])
+        lower = max(lower, float(proved_below(shape, offsets, numbers, s, vectors, weights)[0]))
         if value < upper:
-            upper, best = value, s
-        scale = 1e-15 * (float(np.abs(offsets).max(initial=0)) + upper)
-        if upper - lower <= max(GAP * upper, scale):
+            upper, best = value, s[0]
+        rounding = 2 * float(charge(shape, numbers, norm(best[None]))[0])
+        if upper - lower <= max(GAP * upper, rounding):
             break
-        center, unit = best, max(upper, scale)
-    return min(lower, upper), upper, best
+        center, unit = best, max(upper, rounding) if upper < np.inf else unit
+    return lower, upper, best
 
 
-def _around(problem: Problem, center: Array, unit: float) -> tuple[float, Array] | None:
-    """Solve for ``s = center + unit * sigma``; returns a lower bound and a proposal."""
+def _around(problem: Problem, center: Array, unit: float) -> tuple[Array, Array, Array] | None:
+    """Solve for ``s = center + unit * sigma``; returns proposals: unknowns, the legs' vectors, and weights."""
     clarabel: Any = import_module("clarabel")  # heavy, so not before it is needed
-    sparse: Any = import_module("scipy.sparse")
-
-    size, legs = problem.size, len(problem.matrices)
-    offsets = [(m @ center + o) / unit for m, o in zip(problem.matrices, problem.offsets, strict=True)]
-    levels = (problem.levels - problem.normals @ center) / unit
-    rows, right, cones = [np.hstack([problem.normals, np.zeros((len(levels), legs))])], [levels], list[Any]()
-    if len(levels):
-        cones.append(clarabel.NonnegativeConeT(len(levels)))
-    for i, (matrix, offset) in enumerate(zip(problem.matrices, offsets, strict=True)):
-        block = np.zeros((1 + len(offset), size + legs))
-        block[0, size + i] = -1.0
-        block[1:, :size] = -matrix
-        rows.append(block)
-        right += [np.zeros(1), offset]
-        cones.append(clarabel.SecondOrderConeT(1 + len(offset)))
-    cost = np.concatenate([np.zeros(size), np.ones(legs)])
-    matrix = sparse.csc_matrix(np.vstack(rows))
-    solver: Any = clarabel.DefaultSolver(
-        sparse.csc_matrix((size + legs, size + legs)), cost, matrix, np.concatenate(right), cones, _settings(clarabel)
-    )
-    answer: Any = solver.solve()
+    shape = problem.shape
+    if shape.cone is None:
+        shape.cone = _cone(shape, clarabel)
+    cost, matrix, objective, cones = shape.cone
+    right = [(shape.levels - shape.normals @ center) / unit]
+    for m, o in zip(shape.matrices, problem.offsets, strict=True):
+        right += [np.zeros(1), (m @ center + o) / unit]
+    right = np.concatenate(right)
+    if not np.all(np.isfinite(right)):
+        return None
+    answer: Any = clarabel.DefaultSolver(cost, objective, matrix, right, cones, _settings(clarabel)).solve()
     primal: Array = np.array(answer.x, dtype=float)
     dual: Array = np.array(answer.z, dtype=float)
     if not (np.all(np.isfinite(primal)) and np.all(np.isfinite(dual))):
         return None
-    below = _dual_value(problem, offsets, levels, dual)
-    return unit * below, center + unit * primal[:size]
+    vectors, at = list[Array](), len(shape.levels)
+    for offset in problem.offsets:
+        vectors.append(-dual[at + 1 : at + 1 + len(offset)])
+        at += 1 + len(offset)
+    return center + unit * primal[: shape.size], np.concatenate(vectors), dual[: len(shape.levels)]
 
 
+def _cone(shape: Shape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
+    """What the solver takes that offsets do not change: a bound for each leg is one more unknown."""
+    sparse: Any = import_module("scipy.sparse")
+    size, legs = shape.size, len(shape.matrices)
+    rows, cones = [np.hstack([shape.normals, np.zeros((len(shape.levels), legs))])], list[Any]()
+    if len(shape.levels):
+        cones.append(clarabel.NonnegativeConeT(len(shape.levels)))
+    for i, matrix in enumerate(shape.matrices):
+        block = np.zeros((1 + len(matrix), size + legs))
+        block[0, size + i] = -1.0
+        block[1:, :size] = -matrix
+        rows.append(block)
+        cones.append(clarabel.SecondOrderConeT(1 + len(matrix)))
+    objective = np.concatenate([np.zeros(size), np.ones(legs)])
+    dense = np.vstack(rows).T
+    columns, places = dense.nonzero()
+    ends = np.searchsorted(columns, np.arange(size + legs + 1))
+    matrix = sparse.csc_matrix((dense[columns, places], places, ends), shape=dense.shape[::-1])
+    return sparse.csc_matrix((size + legs, size + legs)), matrix, objective, cones
+
+
+@cache
 def _settings(clarabel: Any) -> Any:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -103,38 +117,3 @@ def _settings(clarabel: Any) -> Any:
     settings.tol_feas = 1e-12
     settings.max_iter = 60
     return settings
-
-
-def _dual_value(problem: Problem, offsets: list[Array], levels: Array, dual: Array) -> float:
-    """The value of the feasible dual nearest to a proposal: unit vectors y and weights w >= 0 with M'y + C'w = 0.
-
-    Its value is ``sum y o - w d``. What rounding leaves of the equation is charged with the unknowns' largest size.
-    """
-    weights = np.maximum(dual[: len(levels)], 0.0)
-    vectors, at = list[Array](), len(levels)
-    for offset in offsets:
-        vectors.append(-dual[at + 1 : at + 1 + len(offset)])
-        at += 1 + len(offset)
-    stacked = np.vstack(problem.matrices)
-    flat = np.concatenate(vectors)
-    for _ in range(2):
-        residual = stacked.T @ flat + problem.normals.T @ weights
-        flat = flat - np.linalg.lstsq(stacked.T, residual, rcond=None)[0]
-    ends = np.cumsum([len(o) for o in offsets])
-    longest = max(float(np.linalg.norm(part)) for part in np.split(flat, ends[:-1]))
-    shrink = 1.0 / max(1.0, longest)
-    residual = stacked.T @ flat + problem.normals.T @ weights
-    value = float(flat @ np.concatenate(offsets) - weights @ levels)
-    return max(0.0, shrink * (value - 10.0 * float(np.linalg.norm(residual))))
-
-
-def _inside(problem: Problem, s: Array) -> Array:
-    """Move a proposal that is outside by rounding back inside."""
-    for _ in range(20):
-        beyond = problem.normals @ s - problem.levels
-        worst = int(np.argmax(beyond)) if len(beyond) else -1
-        if worst < 0 or beyond[worst] <= 0:
-            break
-        normal = problem.normals[worst]
-        s = s - normal * (beyond[worst] / float(normal @ normal))
-    return s

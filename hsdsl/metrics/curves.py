@@ -15,14 +15,14 @@ import numpy as np
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.interval import Interval
+from hsdsl.metrics.interval import CERTIFIED, ZERO, Interval
 from hsdsl.metrics.merge import Cells, common_span, merge
 from hsdsl.metrics.on_space import OnSpace, PointMetric
 from hsdsl.metrics.supremum import Supremum, supremum
-from hsdsl.metrics.trace import names_of, trace
+from hsdsl.metrics.trace import Trace, names_of, trace
 
 GAP = 1e-6  # of the lower bound, at which refinement stops: so that what is printed is the distance
-ROUNDOFF = 64 * 2.0**-53  # times the largest state: no smaller gap is asked for
+ROUNDOFF = 64 * 2.0**-53  # times the largest state: no smaller gap is asked for, beside what rounding leaves in doubt
 RESOLVED = 0.05  # a wider gap is explained in the note
 
 
@@ -33,7 +33,7 @@ class CurveDistance:
     Attributes
     ----------
     interval : Interval
-        The distance lies in it, up to the rounding of the states themselves.
+        The distance of the recorded curves lies in it, as its status says.
     time : float or None
         Where the lower bound is attained; None for a distance that is not a supremum over time.
     metric : str
@@ -61,6 +61,11 @@ class CurveDistance:
         return self.interval.upper
 
     @property
+    def status(self) -> str:
+        """What the interval rests on, see :class:`Interval`."""
+        return self.interval.status
+
+    @property
     def middle(self) -> float:
         """Middle of the interval."""
         return self.interval.middle
@@ -69,7 +74,8 @@ class CurveDistance:
     def sentence(self) -> str:
         """What is known, for a person."""
         where = "" if self.time is None or self.upper == 0 else f", the lower end attained at t = {self.time:.10g}"
-        return f"{self.metric}: {self.upper:.10g}, in {self.interval}{where}" + (f"\n{self.note}" if self.note else "")
+        found = f"{self.metric}: {self.upper:.10g}, in {self.interval} ({self.status}){where}"
+        return found + (f"\n{self.note}" if self.note else "")
 
     def as_json(self) -> dict[str, Any]:
         """Return what ``hsdsl distance --json`` prints."""
@@ -77,6 +83,7 @@ class CurveDistance:
             "metric": self.metric,
             "lower": self.lower,
             "upper": self.upper,
+            "status": self.status,
             "time": self.time,
             "span": list(self.span),
             "note": self.note,
@@ -109,10 +116,12 @@ def rho(
     cells = merged(a, b)
     if relaxation is not None:
         _check_depth(cells, relaxation)
-    floor = ROUNDOFF * largest_state(cells)
-    found = supremum(cells, OnSpace(metric, relaxation is not None), gap, floor, metric.evaluations, metric.budget)
     name = "quotient" if relaxation is None else "relaxed"
-    return curve_distance(found, cells, a, b, name, gap, metric.budget)
+    if cells.same:
+        return no_distance(cells, name)
+    on = OnSpace(metric, relaxation is not None)
+    found = supremum(cells, on, gap, rounding_of(cells.a, cells.b), metric.evaluations, metric.budget)
+    return curve_distance(found, cells, a, b, name, gap, metric.budget, metric.status)
 
 
 def _check_depth(cells: Cells, relaxation: float) -> None:
@@ -140,18 +149,31 @@ def merged(a: Execution, b: Execution) -> Cells:
     return cells
 
 
-def largest_state(cells: Cells) -> float:
-    """Return the size of the numbers that are compared."""
-    sizes = (np.max(np.abs(curve.coefficients[:, 0]), initial=0.0) for curve in (cells.a, cells.b))
-    return float(max(1.0, *sizes))
+def rounding_of(*curves: Trace) -> float:
+    """Return how far apart two bounds may be for rounding alone."""
+    largest = max(float(np.max(np.abs(curve.coefficients[:, 0]), initial=0.0)) for curve in curves)
+    return ROUNDOFF * largest + 4 * sum(float(np.max(curve.doubt, initial=0.0)) for curve in curves)
+
+
+def no_distance(cells: Cells, metric: str, status: str = CERTIFIED) -> CurveDistance:
+    """Return the distance of a curve from itself."""
+    span = common_span(cells.a, cells.b)
+    return CurveDistance(ZERO.but(status), span[0], metric, span)
 
 
 def curve_distance(
-    found: Supremum, cells: Cells, a: Execution, b: Execution, metric: str, gap: float, budget: Budget
+    found: Supremum,
+    cells: Cells,
+    a: Execution,
+    b: Execution,
+    metric: str,
+    gap: float,
+    budget: Budget,
+    status: str = CERTIFIED,
 ) -> CurveDistance:
     """Say what a supremum means."""
     notes = [span_note(a, b, common_span(cells.a, cells.b))]
-    if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + ROUNDOFF * largest_state(cells)):
+    if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + rounding_of(cells.a, cells.b)):
         if budget.ran_out:
             cause = f"the {budget.seconds:g} seconds it was given were over after {found.evaluations} point distances"
         elif found.complete:
@@ -159,7 +181,7 @@ def curve_distance(
         else:
             cause = f"the search stopped after {found.evaluations} point distances"
         notes.append(f"Upper and lower bound differ: {cause}.")
-    interval = Interval(found.lower, max(found.lower, found.upper))
+    interval = Interval(found.lower, found.upper, status)
     return CurveDistance(interval, found.time, metric, common_span(cells.a, cells.b), " ".join(filter(None, notes)))
 
 

@@ -12,12 +12,21 @@ Three rules, each proved from the geometry alone, whatever the ends of the path 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 import numpy as np
 
 from hsdsl.metrics.geometry import Array, Passage, Space
-from hsdsl.metrics.polyhedra import largest
+from hsdsl.metrics.rational import Vector, dot, maximise, never_negative, plus
 
-SLACK = 1e-12
+# A way may grow by this share where a pair is left out: far below rounding, and above what numbers that are not
+# rational were rounded to.
+SLACK = Fraction(1, 10**40)
+
+SEEN = 1e-6  # relative: what is longer by so much is so in floats too
+
+Side = tuple[Vector, tuple[Vector, ...]]
 
 
 def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]:
@@ -31,8 +40,8 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
     found: tuple[bool, bool, bool] | None = space.cache.get(key)
     if found is None:
         f, g = space.passages[first], space.passages[second]
-        after = g.source != g.target or not _nearer_behind(g, f.leave, f)
-        before = f.source != f.target or not _nearer_ahead(f, g.enter, g)
+        after = g.source != g.target or not _nearer_behind(g, f.exact[1], f)
+        before = f.source != f.target or not _nearer_ahead(f, g.exact[0], g)
         found = (_worth_returning(f, g), after, before)
         space.cache[key] = found
     return found
@@ -41,60 +50,72 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
 def _worth_returning(f: Passage, g: Passage) -> bool:
     if f.source != g.target:
         return True
-    if f.gate is g.gate and f.forward != g.forward:
-        least, most = f.gate.stretch
-        return least < 1 - SLACK if f.forward else most > 1 + SLACK
-    return not _never_longer(_difference(f.enter, g.leave), _difference(f.leave, g.enter))
+    if _seen_longer(_floats(f.enter, g.leave), _floats(f.leave, g.enter)):
+        return True
+    return not _never_longer(_difference(f.exact[0], g.exact[1]), _difference(f.exact[1], g.exact[0]))
 
 
-def _difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
-    """The matrix that takes (1, s, s') to the difference of two points."""
+def _floats(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
     return np.column_stack([one[0] - other[0], one[1], -other[1]])
 
 
-def _never_longer(short: Array, long: Array) -> bool:
-    """Whether ``|short @ u| <= |long @ u|`` for every u."""
+def _seen_longer(short: Array, long: Array) -> bool:
+    """Whether ``|short @ u| > |long @ u|`` for some u by far more than rounding; most pairs need no closer look."""
     excess = long.T @ long - short.T @ short
-    return bool(np.linalg.eigvalsh(excess)[0] >= -SLACK * (np.abs(long).max(initial=0) ** 2 + 1e-300))
+    return bool(
+        np.linalg.eigvalsh(excess)[0] < -SEEN * max(np.abs(long).max(initial=0), np.abs(short).max(initial=0)) ** 2
+    )
 
 
-def _nearer_behind(g: Passage, side: tuple[Array, Array], other: Passage) -> bool:
+def _difference(one: Side, other: Side) -> list[Vector]:
+    """The columns of the matrix that takes (1, s, s') to the difference of two points."""
+    return [plus(one[0], other[0], Fraction(-1)), *one[1], *(tuple(-v for v in column) for column in other[1])]
+
+
+def _never_longer(short: list[Vector], long: list[Vector]) -> bool:
+    """Whether ``|short u| <= (1 + slack) |long u|`` for every u."""
+    columns = list(zip(short, long, strict=True))
+    if any(not any(b) and any(a) for a, b in columns):
+        return False
+    factor = 1 + SLACK
+    return never_negative([[factor * dot(b, d) - dot(a, c) for c, d in columns] for a, b in columns])
+
+
+def _nearer_behind(g: Passage, side: Side, other: Passage) -> bool:
     """Whether ``|y - enter| >= |y - leave|`` for all y on the other passage's side and all points of g."""
-    return _never_nearer(g, g.enter, g.leave, side, other)
+    return _never_nearer(g, *g.exact, side, other)
 
 
-def _nearer_ahead(f: Passage, side: tuple[Array, Array], other: Passage) -> bool:
+def _nearer_ahead(f: Passage, side: Side, other: Passage) -> bool:
     """Whether ``|leave - y| >= |enter - y|`` for all y on the other passage's side and all points of f."""
-    return _never_nearer(f, f.leave, f.enter, side, other)
+    return _never_nearer(f, f.exact[1], f.exact[0], side, other)
 
 
-def _never_nearer(
-    g: Passage, far: tuple[Array, Array], near: tuple[Array, Array], side: tuple[Array, Array], other: Passage
-) -> bool:
+def _never_nearer(g: Passage, far: Side, near: Side, side: Side, other: Passage) -> bool:
     """Whether ``|y - far(s)| >= |y - near(s)|`` for all s in g and y in the other's side.
 
     Where far - near = (a s + b) w with one direction w, the difference of squares is that factor times
     ``w . (far + near - 2 y)``: it cannot be negative where both factors have one sign, two linear programs each.
     """
-    base, frame = far[0] - near[0], far[1] - near[1]
-    both = np.column_stack([base, frame])
-    left, sizes, right = np.linalg.svd(both, full_matrices=False)
-    if sizes.size == 0 or sizes[0] == 0:
+    apart = [plus(a, b, Fraction(-1)) for a, b in zip((far[0], *far[1]), (near[0], *near[1]), strict=True)]
+    w = next(filter(any, apart), None)
+    if w is None:
         return True
-    if sizes.size > 1 and sizes[1] > SLACK * sizes[0]:
+    factor = [dot(column, w) / dot(w, w) for column in apart]
+    if any(any(plus(column, w, -share)) for column, share in zip(apart, factor, strict=True)):
         return False
-    w, factor = left[:, 0], sizes[0] * right[0]
-    normals, levels = g.gate.normals, g.gate.levels
-    along, start = (far[1] + near[1]).T @ w, float((far[0] + near[0]) @ w)
-    other_along, other_start = side[1].T @ w, float(side[0] @ w)
-    tolerance = SLACK * (1 + abs(start) + abs(other_start) + abs(float(factor[0])))
+    both = [dot(plus(a, b), w) for a, b in zip((far[0], *far[1]), (near[0], *near[1]), strict=True)]
+    there = [-2 * dot(column, w) for column in (side[0], *side[1])]
 
-    def least(sign: float) -> tuple[float, float]:
-        own = largest(-sign * factor[1:], normals, levels)
-        near_part = largest(-sign * along, normals, levels)
-        far_part = largest(sign * 2 * other_along, other.gate.normals, other.gate.levels)
-        if own is None or near_part is None or far_part is None:
-            return -np.inf, -np.inf
-        return sign * float(factor[0]) - own, sign * (start - 2 * other_start) - near_part - far_part
+    def one_sign(sign: int) -> bool:
+        own, middle, away = (_least(sign, form, gate) for form, gate in ((factor, g), (both, g), (there, other)))
+        return own is not None and middle is not None and away is not None and own >= 0 and middle + away >= 0
 
-    return any(all(part >= -tolerance for part in least(sign)) for sign in (1.0, -1.0))
+    return one_sign(1) or one_sign(-1)
+
+
+def _least(sign: int, form: Sequence[Fraction], passage: Passage) -> Fraction | None:
+    """The minimum of ``sign (form[0] + form[1:] . s)`` over a guard, None where there is none."""
+    exact = passage.gate.exact
+    found = maximise([-sign * v for v in form[1:]], exact.rows, exact.inner)
+    return None if found is None else sign * (form[0] + dot(form[1:], found[0]))

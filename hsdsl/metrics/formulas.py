@@ -11,6 +11,7 @@ import numpy as np
 from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.backends.python import compile_routines
 from hsdsl.enclosures import ENCLOSED, Array, as_range, hull
+from hsdsl.metrics.rounding import UNIT
 from hsdsl.program import Routines
 
 Boxes = Callable[[Array, Array], tuple[Array, Array]]
@@ -54,7 +55,8 @@ def affine(matrix: Array, constant: Array) -> Formula:
     def ranges(low: Array, high: Array) -> tuple[Array, Array]:
         below = low @ positive.T + high @ negative.T + constant
         above = high @ positive.T + low @ negative.T + constant
-        sizes = 1e-15 * (np.maximum(np.abs(low), np.abs(high)) @ np.abs(matrix).T + np.abs(constant))
+        largest = np.maximum(np.abs(low), np.abs(high))
+        sizes = (matrix.shape[1] + 4) * UNIT * (largest @ np.abs(matrix).T + np.abs(constant))
         return below - sizes, above + sizes
 
     def slopes(low: Array, _: Array) -> tuple[Array, Array]:

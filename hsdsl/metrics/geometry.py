@@ -15,13 +15,17 @@ import numpy as np
 
 from hsdsl.enclosures import Array
 from hsdsl.metrics.formulas import Formula
+from hsdsl.metrics.rational import Row, Vector, axes, dot, maximise
 
-TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the numbers
+TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the points
 
 
 @dataclass(frozen=True, eq=False)
 class Domain:
-    """A mode's domain: ``normals @ x <= levels`` (m rows of n) and ``curved(x) <= 0``."""
+    """A mode's domain: ``normals @ x <= levels`` (m unit rows of n) and ``curved(x) <= 0``.
+
+    ``rows`` are the inequalities without rounding.
+    """
 
     mode: str
     coordinates: tuple[str, ...]
@@ -29,28 +33,45 @@ class Domain:
     levels: Array
     curved: tuple[Formula, ...] = ()
     texts: tuple[str, ...] = ()
+    rows: tuple[Row, ...] = ()
 
     @property
     def convex(self) -> bool:
         """Whether the polyhedron is the domain itself."""
         return not self.curved
 
-    def excess(self, x: Array) -> tuple[float, str | None]:
-        """How far a point is beyond the worst inequality, relative to its numbers, and that inequality's text."""
-        sizes = np.abs(self.normals) @ np.abs(x) + np.abs(self.levels) + 1e-300
-        flat = (self.normals @ x - self.levels) / np.maximum(sizes, 1.0)
-        beyond = [*flat.tolist(), *(value(x) / (1 + float(np.abs(x).max(initial=0))) for value in self.curved)]
-        worst = max(range(len(beyond)), key=beyond.__getitem__, default=None)
+    def excess(self, x: Array, size: float) -> tuple[float, str | None]:
+        """How far a point is beyond the worst inequality, and that inequality's text.
+
+        Relative to ``size``, the length of the points that are compared, and to the inequality's own level. Beyond a
+        curved one it counts how far, to first order, the point is from where the inequality holds.
+        """
+        size = max(size, float(np.linalg.norm(x)), 1e-300)
+        flat = (self.normals @ x - self.levels) / (size + np.abs(self.levels))
+        beyond = [*flat.tolist(), *(_beyond(value, x) / size for value in self.curved)]
+        worst = max(range(len(beyond)), key=lambda k: _or_infinite(beyond[k]), default=None)
         return (0.0, None) if worst is None else (beyond[worst], self.texts[worst] if self.texts else None)
+
+
+def _beyond(formula: Formula, x: Array) -> float:
+    value = formula(x)
+    slope = float(np.linalg.norm(formula.gradient(x))) if value > 0 else 1.0
+    return value / slope if slope > 0 else value * np.inf
+
+
+def _or_infinite(value: float) -> float:
+    return np.inf if np.isnan(value) else value
 
 
 @dataclass(frozen=True, eq=False)
 class Gate:
-    """A convex piece of a guard, ``base + frame s`` with ``normals s <= levels``, and its image.
+    """A convex piece of a guard, ``base + frame s`` with unit ``normals s <= levels``, and its image.
 
-    The image is ``image_base + image_frame s``. ``frame`` has orthonormal columns (n of n - 1), so lengths on the guard
-    are lengths of s. ``curved`` are conditions on the guard's points that are not affine; with any, the piece contains
-    the guard and may be larger.
+    The image is ``image_base + image_frame s``. ``frame`` has orthonormal columns, so lengths on the guard are lengths
+    of s. Every number is that of ``exact``, rounded once. ``inner`` is a point s at which every inequality holds with
+    some ``room``. ``across`` are unit vectors and levels, for the guard and for its image: ``vectors @ x = levels``
+    there. ``curved`` are conditions on the guard's points that are not affine; with any, the piece contains the guard
+    and may be larger.
     """
 
     edge: str
@@ -62,6 +83,10 @@ class Gate:
     image_frame: Array
     normals: Array
     levels: Array
+    inner: Array
+    room: Array
+    across: tuple[tuple[Array, Array], tuple[Array, Array]]
+    exact: Exact
     curved: tuple[Formula, ...] = ()
 
     @property
@@ -70,13 +95,23 @@ class Gate:
         return self.frame.shape[1]
 
     @cached_property
-    def stretch(self) -> tuple[float, float]:
-        """Smallest and largest factor by which the reset changes lengths along the guard."""
-        if self.size == 0:
-            return 1.0, 1.0
-        values = np.linalg.svd(self.image_frame, compute_uv=False)
-        least = float(values[-1]) if self.image_frame.shape[0] >= self.size else 0.0
-        return least, float(values[0]) if values.size else 0.0
+    def radius(self) -> float:
+        """How far the guard reaches from its base at most; infinite where it has no end."""
+        rows, inner = self.exact.rows, self.exact.inner
+        ends: list[float] = []
+        for axis in axes(self.size):
+            both = [maximise([sign * v for v in axis], rows, inner) for sign in (1, -1)]
+            ends.append(max(np.inf if end is None else abs(float(dot(axis, end[0]))) for end in both))
+        return float(np.linalg.norm(ends)) * (1 + 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """A gate in rational numbers: base and frame (by columns) of the guard and of its image, and the inequalities."""
+
+    sides: tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]
+    rows: tuple[Row, ...]
+    inner: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +157,18 @@ class Passage:
     def leave(self) -> tuple[Array, Array]:
         """Base and frame of the side it is left at."""
         return self._side(not self.forward)
+
+    @property
+    def across(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Unit vectors and levels of the planes that hold the side it is entered at, and the one it is left at."""
+        guard, image = self.gate.across
+        return (guard, image) if self.forward else (image, guard)
+
+    @property
+    def exact(self) -> tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]:
+        """Base and frame of both sides in rational numbers: where it is entered, and where it is left."""
+        guard, image = self.gate.exact.sides
+        return (guard, image) if self.forward else (image, guard)
 
     def _side(self, guard: bool) -> tuple[Array, Array]:
         gate = self.gate
@@ -175,6 +222,23 @@ class Space:
         """Every gate in both directions; gate i forwards is 2 i, backwards 2 i + 1."""
         both = [(gate, forward) for gate in self.gates for forward in (True, False)]
         return tuple(Passage(i, gate, forward) for i, (gate, forward) in enumerate(both))
+
+    def fewest(self, source: int) -> tuple[int, ...]:
+        """For each mode the fewest passages that lead there from another; 0 where none do."""
+        key = ("fewest", source)
+        found: tuple[int, ...] | None = self.cache.get(key)
+        if found is None:
+            beside: dict[int, set[int]] = {}
+            for gate in (*self.gates, *self.curved_gates):
+                beside.setdefault(gate.source, set()).add(gate.target)
+                beside.setdefault(gate.target, set()).add(gate.source)
+            steps, reached = {source: 0}, [source]
+            for mode in reached:
+                new = sorted(beside.get(mode, set()) - steps.keys())
+                steps |= dict.fromkeys(new, steps[mode] + 1)
+                reached += new
+            found = self.cache[key] = tuple(steps.get(mode, 0) for mode in range(len(self.modes)))
+        return found
 
     @cached_property
     def affine(self) -> bool:

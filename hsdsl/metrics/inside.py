@@ -6,9 +6,9 @@ import numpy as np
 
 from hsdsl.enclosures import Array
 from hsdsl.metrics.formulas import Formula
-from hsdsl.metrics.geometry import Space
+from hsdsl.metrics.geometry import TOLERANCE, Space
 
-INSIDE = 1e-9  # how far beyond an inequality a path may be, relative to the size of the numbers
+ROUNDING = 32 * 2.0**-53  # of the points' size: within it an inequality counts as kept
 HALVINGS = 24
 MOST_PARTS = 64  # of one piece that are undecided at one time
 SAMPLES = 16  # of a piece that enclosures do not decide
@@ -22,14 +22,25 @@ def straight_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
     Returns
     -------
     (B,) array of int
-        ``CERTAIN`` where every inequality holds all along, ``OUTSIDE`` where one does not (by more than rounding), and
-        ``UNDECIDED`` where none was seen broken in ``SAMPLES`` places and enclosures were too wide to prove it.
+        ``CERTAIN`` where every inequality holds all along, ``OUTSIDE`` where one does not, and ``UNDECIDED`` where none
+        was seen broken in ``SAMPLES`` places and enclosures were too wide to prove it. No place has to keep an
+        inequality better than the ends do, which may be beyond it as far as points of the space may.
     """
     verdict = np.full(len(a), CERTAIN)
-    tolerance = INSIDE * (1 + np.maximum(np.abs(a).max(axis=1, initial=0), np.abs(b).max(axis=1, initial=0)))
     for formula in space.domains[mode].curved:
+        tolerance = _tolerance(formula, np.vstack([a, b])).reshape(2, len(a)).max(axis=0)
         verdict = np.minimum(verdict, _below(formula, a, b, tolerance))
     return verdict
+
+
+def _tolerance(formula: Formula, x: Array) -> Array:
+    """How far beyond an inequality points are, or may be by rounding."""
+    below, above = formula.slopes(x, x)
+    steepest = np.maximum(np.abs(below[:, 0]), np.abs(above[:, 0])).sum(axis=1)
+    moved = steepest * np.abs(x).max(axis=1, initial=0.0)  # how much the size of the point makes
+    moved = np.where(np.isfinite(moved), moved, 0.0)
+    beyond = np.nan_to_num(formula.ranges(x, x)[1][:, 0], nan=0.0, neginf=0.0, posinf=0.0)
+    return np.clip(beyond, ROUNDING * moved, TOLERANCE * moved)
 
 
 def _below(formula: Formula, a: Array, b: Array, tolerance: Array) -> Array:

@@ -1,27 +1,55 @@
-"""Every distance comes as an interval: what it is at least, and what it is at most."""
+"""Every distance comes as an interval: what it is at least, what it is at most, and how far that is proved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf, nan
+
+CERTIFIED = "certified"
+SAMPLED = "sampled"
+SEARCHED = "searched"
+
+
+def up_to_hops(hops: int) -> str:
+    """The status of a distance whose paths with more passages were not looked at."""
+    return f"up to {hops} hops"
+
+
+def weakest(*statuses: str) -> str:
+    """The status of what rests on several; the first of those that promise least."""
+    order = {CERTIFIED: 0, SAMPLED: 2, SEARCHED: 3}
+    return max(statuses, key=lambda status: order.get(status, 1), default=CERTIFIED)
+
+
+class EndsCross(RuntimeError):
+    """A lower end above its upper end: an error of this software, never of a model."""
 
 
 @dataclass(frozen=True)
 class Interval:
     """A distance known to lie between ``lower`` and ``upper``, both included; ``inf`` where there is no path.
 
+    Attributes
+    ----------
+    lower, upper : float
+    status : str
+        ``certified``: both ends are proved. ``up to N hops``: so are they, but paths with more passages were left out,
+        and one may be shorter than the upper end. ``sampled``: something was looked at in points only. ``searched``:
+        the upper end is the best path that local solves found; the lower end is proved.
+
     Raises
     ------
-    ValueError
+    EndsCross
         Unless 0 <= lower <= upper.
     """
 
     lower: float
     upper: float
+    status: str = field(default=CERTIFIED, compare=False)
 
     def __post_init__(self) -> None:
         if not 0 <= self.lower <= self.upper:
-            raise ValueError(f"not a distance: [{self.lower}, {self.upper}]")
+            raise EndsCross(f"internal error: the bounds of a distance contradict: [{self.lower!r}, {self.upper!r}]")
 
     @property
     def width(self) -> float:
@@ -39,10 +67,14 @@ class Interval:
         return self.lower <= value <= self.upper
 
     def __add__(self, other: Interval) -> Interval:
-        return Interval(self.lower + other.lower, self.upper + other.upper)
+        return Interval(self.lower + other.lower, self.upper + other.upper, weakest(self.status, other.status))
 
     def __str__(self) -> str:
         return f"[{self.lower:.10g}, {self.upper:.10g}]"
+
+    def but(self, status: str) -> Interval:
+        """The same with a status no better than one."""
+        return replace(self, status=weakest(self.status, status))
 
 
 ZERO = Interval(0.0, 0.0)

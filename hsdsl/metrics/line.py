@@ -4,14 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
+from hsdsl.metrics.chain import Shape
 from hsdsl.metrics.geometry import Array
+from hsdsl.metrics.rounding import UNIT, charge, lengths
 
 ITERATIONS = 100
 
 
+def on_line(shape: Shape, offsets: list[Array], numbers: Array) -> tuple[Array, Array, Array]:
+    """Minimise a shape's problems of at most one unknown, both ends charged with rounding; s is (N, 0) or (N, 1).
+
+    Rounding moves the interval's ends by less than the legs are charged for.
+    """
+    if shape.size == 0:
+        s, far = np.zeros((len(numbers), 0)), np.zeros(len(numbers))
+        lower = upper = lengths(shape, offsets, s)
+    else:
+        low, high = interval_of(shape.normals, shape.levels)
+        lower, upper, where, far = minimise_on_line([m[:, 0] for m in shape.matrices], offsets, low, high)
+        s = where[:, None]
+        if shape.least > 0:  # no shorter path is farther away
+            far = np.minimum(far, np.abs(where) + 2 * upper / shape.least)
+    rounding = charge(shape, numbers, far) + shape.operations * UNIT * upper
+    return np.maximum(0.0, lower - rounding), upper + rounding, s
+
+
 def minimise_on_line(
     matrices: list[Array], offsets: list[Array], low: float, high: float
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Minimise ``sum_i |matrices[i] s + offsets[i]|`` over ``low <= s <= high``.
 
     Parameters
@@ -25,8 +45,8 @@ def minimise_on_line(
 
     Returns
     -------
-    (N,) lower bounds, (N,) values attained, (N,) where
-        They differ by round-off.
+    (N,) lower bounds, (N,) values attained, (N,) where, (N,) how far from 0 the minimum can be
+        The first two differ by round-off.
     """
     count = len(offsets[0])
     slopes = [float(m @ m) for m in matrices]
@@ -34,7 +54,7 @@ def minimise_on_line(
     if not kinks:
         s = np.full(count, np.clip(0.0, low, high))
         value = _length(matrices, offsets, s)
-        return value, value, s
+        return value, value, s, np.abs(s)
     a, b = np.min(kinks, axis=0), np.max(kinks, axis=0)
     best, where = _best(matrices, offsets, kinks)
     wide = np.flatnonzero(b - a > 4e-16 * (np.abs(a) + np.abs(b)))
@@ -46,7 +66,7 @@ def minimise_on_line(
         best[wide] = np.where(better, value, best[wide])
         where[wide] = np.where(better, at, where[wide])
         lower[wide] = np.minimum(low_wide, best[wide])
-    return lower, best, where
+    return lower, best, where, np.maximum(np.abs(a), np.abs(b))
 
 
 def _newton(matrices: list[Array], offsets: list[Array], a: Array, b: Array) -> tuple[Array, Array, Array]:

@@ -8,7 +8,7 @@ proved where enclosures can (:mod:`hsdsl.metrics.inside`). Nothing here bounds f
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib import import_module
 from typing import Any
@@ -30,7 +30,9 @@ MANY = 14  # unknowns, from which on one start and fewer iterations must do
 ITERATIONS_OF_MANY = 100
 # Room for inequalities: a reset may land on a boundary everywhere, and no solver bears that as a constraint.
 MARGINS = (1e-8, 1e-10)
+STILL = 2.0**-52  # relative: a step so short is the last
 STEPS = 12  # of Newton's method back onto a surface
+FAR = 1e3  # times a guess's size: farther out a solve ran away
 SMOOTHING = 1e-9  # of the length where a leg shrinks to nothing, relative to the points' distance
 DEPTH = 0.05  # how deep inside a bent path is held, relative to how far outside the straight one was
 BENDS = 2  # put into a path whose straight pieces leave their domains, at most so often
@@ -51,8 +53,8 @@ def search_locally(
     with one_thread():
         for start in starts:
             for end in ends:
-                for sequence in _sequences(space, start, end, hops):
-                    if found.upper <= enough or (found.upper < np.inf and budget.spent()):
+                for number, sequence in enumerate(_sequences(space, start, end, hops)):
+                    if found.upper <= enough or (number and budget.spent()):
                         return found
                     _try(space, sequence, start, end, relaxation, found)
     return found
@@ -109,13 +111,13 @@ def _try(space: Space, sequence: tuple[Crossing, ...], start: End, end: End, rel
 
 def _try_from(route: Route, guess: Array, start: End, end: End, toll: float, found: Found, bends: int = BENDS) -> None:
     """Solve from a guess; where straight pieces leave their domains, let them bend and solve again."""
-    size = 1e3 * (1 + float(max(np.abs(start.x).max(initial=0), np.abs(end.x).max(initial=0))))
+    size = FAR * (route.size(guess) or np.inf)
     for margin in MARGINS:
-        s = _solve(route, guess, margin * (1 + float(np.abs(guess).max(initial=0))))
+        s = _solve(route, guess, margin)
         # A solve that ran away: so far out its rounding alone would pass for a path.
         if s is None or not np.abs(s).max(initial=0) <= size or not route.allowed(s):
             continue
-        value = route.length(s) + toll
+        value = route.charged(s) + toll
         if value >= found.upper:
             return
         verdicts = route.judged(s)
@@ -173,42 +175,73 @@ def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End)
             middle.append(a + share * (from_q.get(name, a) - a))
     guess = np.array(middle)
     spread = np.random.default_rng(0).normal(size=((STARTS - 1) * (len(guess) < MANY), len(guess)))
-    width = 0.1 * (0.1 + float(np.abs(guess).max(initial=0)))
+    ends = np.abs(np.concatenate([start.x, end.x])).max(initial=0.0)
+    width = 0.1 * (float(np.abs(guess).max(initial=ends)) or 1.0)
     return [guess, *(guess + width * row for row in spread)]
 
 
 def _solve(route: Route, guess: Array, margin: float) -> Array | None:
+    """Solve in units of the path's own size, each constraint in units of its slope there."""
     minimise: Any = import_module("scipy.optimize").minimize
-    apart = 1e-3 + float(sum(np.linalg.norm(b - a) for _, a, b in route.legs(guess)))
+    unit = max(route.length(guess), 1e-3 * route.size(guess)) or 1.0
+    on, in_ = (1 / (unit * _slopes(rows)) for rows in (route.surface_slopes(guess), route.room_slopes(guess)))
+    clear = margin * max(1.0, route.size(guess) / unit)
 
-    def length(s: Array) -> tuple[float, Array]:
-        return route.smooth_length(s, SMOOTHING * apart)
+    def length(x: Array) -> tuple[float, Array]:
+        value, slope = route.smooth_length(unit * x, SMOOTHING * unit)
+        return value / unit, slope
 
-    def room(s: Array) -> Array:
-        return route.room(s) + margin
-
-    constraints: list[dict[str, Any]] = [
-        {"type": "eq", "fun": route.surfaces, "jac": route.surface_slopes},
-        {"type": "ineq", "fun": room, "jac": route.room_slopes},
+    constraints = [
+        _constraint("eq", route.surfaces, route.surface_slopes, unit, on, 0.0),
+        _constraint("ineq", route.room, route.room_slopes, unit, in_, clear),
     ]
     most = ITERATIONS if len(guess) < MANY else ITERATIONS_OF_MANY
     options = {"maxiter": most, "ftol": 1e-13}
     with np.errstate(all="ignore"):
         try:
-            answer: Any = minimise(length, guess, jac=True, method="SLSQP", constraints=constraints, options=options)
+            first = guess / unit
+            answer: Any = minimise(length, first, jac=True, method="SLSQP", constraints=constraints, options=options)
         except (ValueError, np.linalg.LinAlgError):
             return None
-        return onto(route, np.array(answer.x, dtype=float))
+        return onto(route, unit * np.array(answer.x, dtype=float))
+
+
+def _constraint(
+    kind: str,
+    value: Callable[[Array], Array],
+    slopes: Callable[[Array], Array],
+    unit: float,
+    factors: Array,
+    more: float,
+) -> dict[str, Any]:
+    """A constraint as the solver takes it, of unknowns in a unit, each row times a factor."""
+
+    def scaled(x: Array) -> Array:
+        return factors * value(unit * x) + more
+
+    def scaled_slopes(x: Array) -> Array:
+        return (unit * factors)[:, None] * slopes(unit * x)
+
+    return {"type": kind, "fun": scaled, "jac": scaled_slopes}
+
+
+def _slopes(rows: Array) -> Array:
+    """How steep functions are; 1 where they are not, or not known to be."""
+    steep = np.linalg.norm(rows, axis=1)
+    return np.where(np.isfinite(steep) & (steep > 0), steep, 1.0)
 
 
 def onto(route: Route, s: Array) -> Array:
     """Newton's method onto the surfaces, along their gradients."""
     for _ in range(STEPS):
         residual = route.surfaces(s)
-        if not np.all(np.isfinite(residual)) or np.abs(residual).max(initial=0) <= 1e-14:
+        if not residual.any() or not np.all(np.isfinite(residual)):
             break
         jacobian = route.surface_slopes(s)
         if not np.all(np.isfinite(jacobian)):
             break
-        s = s - np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+        step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+        s = s - step
+        if np.abs(step).max() <= STILL * np.abs(s).max():
+            break
     return s

@@ -12,21 +12,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.metrics.chain import chain_of
+from hsdsl.metrics.budget import Budget
+from hsdsl.metrics.chain import Chain, chain_of
 from hsdsl.metrics.follow import may_follow
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.line import interval_of, minimise_on_line
+from hsdsl.metrics.interval import CERTIFIED, Interval, up_to_hops, weakest
+from hsdsl.metrics.line import on_line
 from hsdsl.metrics.norms import minimise
+from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.search import TOLERANCE, gaps
-from hsdsl.metrics.sides import norms, to_side
+from hsdsl.metrics.sides import to_entry, to_exit
 
-ROUNDING = 16 * 2.0**-53
+ROUNDING = 64 * 2.0**-53  # of a norm or a short sum, relative to itself
 Indices = NDArray[np.intp]
 
 
 @dataclass
 class Pairs:
-    """The pairs and what is known of them: ``upper`` the best path, ``lower`` the least of what was computed."""
+    """The pairs and what is known of them: ``upper`` the best path, ``lower`` the least that any path can have.
+
+    ``status`` is what the bounds rest on.
+    """
 
     space: Space
     source: int
@@ -36,73 +42,97 @@ class Pairs:
     toll: float
     upper: Array
     lower: Array
+    status: str = CERTIFIED
 
     @classmethod
     def of(cls, space: Space, source: int, p: Array, target: int, q: Array, relaxation: float | None) -> Pairs:
         """Begin with the straight line, where both are in one mode."""
-        straight = norms(p - q) if source == target else np.full(len(p), np.inf)
-        return cls(space, source, p, target, q, relaxation or 0.0, straight, straight.copy())
+        straight = norm(p - q) if source == target else np.full(len(p), np.inf)
+        return cls(space, source, p, target, q, relaxation or 0.0, straight * (1 + ROUNDING), straight * (1 - ROUNDING))
 
     def least(self) -> Array:
         """A lower bound that holds everywhere: what no passage changes."""
         if self.space.kept is None:
             return np.zeros(len(self.p))
         own, other = list(self.space.kept[self.source]), list(self.space.kept[self.target])
-        return norms(self.p[:, own] - self.q[:, other])
+        return norm(self.p[:, own] - self.q[:, other]) * (1 - ROUNDING)
+
+    def bounds(self) -> tuple[Array, Array, str]:
+        """What is known: lower and upper ends, and what they rest on.
+
+        Raises
+        ------
+        EndsCross
+            A lower end is above its upper one.
+        """
+        if np.any(self.lower > self.upper):
+            worst = int(np.argmax(self.lower > self.upper))
+            Interval(float(self.lower[worst]), float(self.upper[worst]))
+        return self.lower, self.upper, self.status
 
     def open(self, bounds: Array, indices: Indices) -> Indices:
-        """Those of ``indices`` whose bound is still below the best path."""
-        return indices[bounds < self.upper[indices] * (1 - TOLERANCE)]
+        """Those of ``indices`` whose bound is still below the best path; the lower end remembers the others."""
+        still = bounds < self.upper[indices] * (1 - TOLERANCE)
+        if not still.all():
+            self.leave(bounds[~still], indices[~still])
+        return indices[still]
 
-    def widened(self) -> tuple[Array, Array]:
-        """The bounds with rounding allowed for; pairs of one point are at distance 0."""
-        sizes = np.abs(self.p).sum(axis=1) + np.abs(self.q).sum(axis=1)
-        rounding = ROUNDING * (sizes + 2 * np.where(np.isfinite(self.upper), self.upper, 0))
-        if self.source == self.target:
-            rounding = np.where(np.all(self.p == self.q, axis=1), 0.0, rounding)
-        lower = np.minimum(self.lower, self.upper)
-        return np.maximum(lower - rounding, 0), self.upper + rounding
+    def cut(self, bounds: Array, indices: Indices, hops: int) -> None:
+        """Leave out paths with more passages; where one of them could be shorter, the status says so."""
+        if self.open(bounds, indices).size:
+            self.status = weakest(self.status, up_to_hops(hops))
+        self.leave(bounds, indices)
+
+    def leave(self, bounds: Array, indices: Indices) -> None:
+        """Look no further at paths that are at least so long."""
+        self.lower[indices] = np.minimum(self.lower[indices], bounds)
 
 
-def search_many(pairs: Pairs, hops: int) -> None:
-    """Improve ``pairs`` until no sequence of at most ``hops`` passages can be shorter."""
+def search_many(pairs: Pairs, hops: int, budget: Budget) -> None:
+    """Improve ``pairs`` until no sequence of at most ``hops`` passages can be shorter, or the time is over."""
     space = pairs.space
     everything = np.arange(len(pairs.p))
     floor = pairs.least()
-    layer: list[tuple[tuple[int, ...], Indices]] = [
-        ((p.index,), pairs.open(floor, everything)) for p in space.passages if p.source == pairs.source
-    ]
-    enters, leaves = _entered(pairs), _left(pairs)
-    between = between_passages(space, pairs.toll)
+    beginning = [p.index for p in space.passages if p.source == pairs.source]
+    layer: list[tuple[tuple[int, ...], Indices]] = []
+    if beginning and (active := pairs.open(floor, everything)).size:
+        layer = [((index,), active) for index in beginning]
+    if not layer:
+        return
+    ways = Ways.of(pairs, budget)
     while layer:
         following: list[tuple[tuple[int, ...], Indices]] = []
         for sequence, candidates in layer:
-            active = _promising(pairs, sequence, candidates, floor, enters, leaves, between)
-            if not active.size:
+            if budget.spent():
+                pairs.leave(floor[candidates], candidates)
                 continue
-            if space.passages[sequence[-1]].target == pairs.target:
+            active = _promising(pairs, sequence, candidates, floor, ways)
+            if len(sequence) > hops:
+                if active.size:
+                    pairs.cut(_through(pairs, sequence, active, ways), active, hops)
+                continue
+            if active.size and space.passages[sequence[-1]].target == pairs.target:
                 _finish(pairs, sequence, active)
-            longer = [(*sequence, g) for g in followers(space, sequence[-1])] if len(sequence) < hops else []
-            if not longer:
-                continue
-            active = _still_open(pairs, sequence, pairs.open(floor[active], active), leaves, between)
+            longer = [(*sequence, g) for g in followers(space, sequence[-1])]
+            active = pairs.open(floor[active], active) if longer else active[:0]
+            if active.size:
+                active = pairs.open(_through(pairs, sequence, active, ways), active)
             if active.size:
                 following += [(one, active) for one in longer]
         layer = following
 
 
-def around_guards(pairs: Pairs) -> Array:
+def around_guards(pairs: Pairs, budget: Budget) -> Array:
     """A lower bound for paths with passages: to a guard, between guards, from one; 0 where guards are curved."""
     if pairs.space.curved_gates:
         return np.zeros(len(pairs.p))
-    enters, leaves = _entered(pairs), _left(pairs)
-    between = between_passages(pairs.space, pairs.toll)
+    ways = Ways.of(pairs, budget)
     everything = np.arange(len(pairs.p))
     best = np.full(len(pairs.p), np.inf)
     for g in pairs.space.passages:
         if g.source == pairs.source:
-            best = np.minimum(best, enters[g.index] + pairs.toll + _rest(between, leaves, g.index, everything))
-    return best
+            best = np.minimum(best, ways.enters[g.index] + pairs.toll + ways.rest(g.index, everything))
+    return best * (1 - ROUNDING)
 
 
 def followers(space: Space, last: int) -> list[int]:
@@ -116,116 +146,102 @@ def _promising(
     sequence: tuple[int, ...],
     candidates: Indices,
     floor: Array,
-    enters: Array,
-    leaves: Array,
-    between: Array,
+    ways: Ways,
 ) -> Indices:
     """Drop by the cheapest bound: from p to the first guard, from guard to guard, from some last guard to q."""
-    inner = gaps(pairs.space)
-    fixed = sum(float(inner[a, b]) for a, b in pairwise(sequence)) + pairs.toll * len(sequence)
-    rest = _rest(between, leaves, sequence[-1], candidates)
-    bound = np.maximum(enters[sequence[0], candidates] + fixed + rest, floor[candidates] + pairs.toll * len(sequence))
-    return pairs.open(bound, candidates)
+    tolls = pairs.toll * len(sequence)
+    fixed = sum(float(ways.inner[a, b]) for a, b in pairwise(sequence)) + tolls
+    rest = ways.rest(sequence[-1], candidates)
+    bound = np.maximum(ways.enters[sequence[0], candidates] + fixed + rest, floor[candidates] + tolls)
+    return pairs.open(bound * (1 - ROUNDING * len(sequence)), candidates)
 
 
-def _still_open(pairs: Pairs, sequence: tuple[int, ...], active: Indices, leaves: Array, between: Array) -> Indices:
-    """Drop by the way through the whole sequence so far."""
-    if not active.size:
-        return active
+def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Ways) -> Array:
+    """The least that paths beginning with a sequence can have."""
     space, toll = pairs.space, pairs.toll * len(sequence)
     chain = chain_of(space, sequence)
-    rest = _rest(between, leaves, sequence[-1], active)
-    zero = np.zeros(len(space.domains[pairs.source].coordinates))
-    problem = chain.problem(zero, None)
-    offsets = repeated(problem.offsets, len(active))
-    offsets[0] = offsets[0] - pairs.p[active]
-    active = active[
-        _below(pairs, active, shortest(problem.matrices, offsets, chain.normals, chain.levels)[0] + toll + rest)
-    ]
-    if space.kept is None or not active.size:
-        return active
-    goals = pairs.q[active][:, list(space.kept[pairs.target])]
-    problem = chain.problem(zero, np.zeros(len(space.kept[pairs.target])), kept=True)
-    offsets = repeated(problem.offsets, len(active))
-    offsets[0], offsets[-1] = offsets[0] - pairs.p[active], offsets[-1] - goals
-    return active[_below(pairs, active, shortest(problem.matrices, offsets, chain.normals, chain.levels)[0] + toll)]
-
-
-def _below(pairs: Pairs, active: Indices, bound: Array) -> NDArray[np.bool_]:
-    return bound < pairs.upper[active] * (1 - TOLERANCE)
+    rest = ways.rest(sequence[-1], active)
+    bound = _shortest(pairs, chain, active, None)[0] + toll + rest
+    if space.kept is not None:
+        goals: Array = pairs.q[active][:, list(space.kept[pairs.target])]
+        bound = np.maximum(bound, _shortest(pairs, chain, active, goals, kept=True)[0] + toll)
+    return bound * (1 - ROUNDING)
 
 
 def _finish(pairs: Pairs, sequence: tuple[int, ...], active: Indices) -> None:
     """The paths through exactly this sequence."""
-    chain = chain_of(pairs.space, sequence)
-    domains = pairs.space.domains
-    zeros = [np.zeros(len(domains[mode].coordinates)) for mode in (pairs.source, pairs.target)]
-    problem = chain.problem(zeros[0], zeros[1])
-    offsets = repeated(problem.offsets, len(active))
-    offsets[0], offsets[-1] = offsets[0] - pairs.p[active], offsets[-1] - pairs.q[active]
-    lower, upper, _ = shortest(problem.matrices, offsets, chain.normals, chain.levels)
+    lower, upper = _shortest(pairs, chain_of(pairs.space, sequence), active, pairs.q[active])
     toll = pairs.toll * len(sequence)
-    pairs.lower[active] = np.minimum(pairs.lower[active], lower + toll)
-    pairs.upper[active] = np.minimum(pairs.upper[active], upper + toll)
+    pairs.lower[active] = np.minimum(pairs.lower[active], (lower + toll) * (1 - ROUNDING))
+    pairs.upper[active] = np.minimum(pairs.upper[active], (upper + toll) * (1 + ROUNDING))
 
 
-def repeated(offsets: tuple[Array, ...], count: int) -> list[Array]:
-    """The same offsets for every problem."""
-    return [np.tile(o, (count, 1)) for o in offsets]
+def _shortest(
+    pairs: Pairs, chain: Chain, active: Indices, goals: Array | None, kept: bool = False
+) -> tuple[Array, Array]:
+    """Bounds on the shortest ways from p through a chain, to goals if there are any."""
+    zero = np.zeros(len(pairs.space.domains[pairs.source].coordinates))
+    problem = chain.problem(zero, None if goals is None else 0.0 * goals[0], kept)
+    offsets = [np.tile(o, (len(active), 1)) for o in problem.offsets]
+    starts = pairs.p[active]
+    offsets[0] = offsets[0] - starts
+    numbers = problem.numbers + norm(starts)
+    if goals is not None:
+        offsets[-1] = offsets[-1] - goals
+        numbers = numbers + norm(goals)
+    if problem.shape.size < 2:
+        return on_line(problem.shape, offsets, numbers)[:2]
+    return minimise(problem.shape, offsets, numbers)[:2]
 
 
-def shortest(
-    matrices: tuple[Array, ...], offsets: list[Array], normals: Array, levels: Array
-) -> tuple[Array, Array, Array]:
-    """Minimise sums of norms by the method their number of unknowns allows."""
-    size = normals.shape[1]
-    if size == 0:
-        value = sum((norms(o) for o in offsets), np.zeros(len(offsets[0])))
-        return value, value, np.zeros((len(value), 0))
-    if size == 1:
-        low, high = interval_of(normals, levels)
-        lower, upper, s = minimise_on_line([m[:, 0] for m in matrices], offsets, low, high)
-        return lower, upper, s[:, None]
-    return minimise(list(matrices), offsets, normals, levels)
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Lower bounds on ways, for P passages and N pairs.
+
+    Attributes
+    ----------
+    enters, leaves : array, shape (P, N)
+        From p to where a passage is entered, and from where it is left to q; infinite in other modes.
+    inner, between : array, shape (P, P)
+        From leaving one passage to entering another, and to leaving it with all between (0 to itself), tolls included.
+    """
+
+    enters: Array
+    leaves: Array
+    inner: Array
+    between: Array
+
+    @classmethod
+    def of(cls, pairs: Pairs, budget: Budget) -> Ways:
+        """Those of some pairs."""
+        passages = pairs.space.passages
+        enters: Array = np.full((len(passages), len(pairs.p)), np.inf)
+        leaves: Array = np.full_like(enters, np.inf)
+        for g in passages:
+            if g.source == pairs.source:
+                enters[g.index] = to_entry(g, pairs.p)
+            if g.target == pairs.target:
+                leaves[g.index] = to_exit(g, pairs.q)
+        return cls(enters, leaves, gaps(pairs.space, budget), between_passages(pairs.space, pairs.toll, budget))
+
+    def rest(self, last: int, indices: Indices) -> Array:
+        """What is left at least, once a passage has been left."""
+        rows = np.flatnonzero(np.isfinite(self.between[last]))
+        if not rows.size:
+            return np.full(len(indices), np.inf)
+        return np.min(self.between[last, rows][:, None] + self.leaves[np.ix_(rows, indices)], axis=0)
 
 
-def _entered(pairs: Pairs) -> Array:
-    """For each passage, a lower bound on how far each p is from where it is entered (inf in another mode)."""
-    passages = pairs.space.passages
-    found = np.full((len(passages), len(pairs.p)), np.inf)
-    for g in passages:
-        if g.source == pairs.source:
-            found[g.index] = to_side(g, g.enter, pairs.p)
-    return found
-
-
-def _left(pairs: Pairs) -> Array:
-    """For each passage, a lower bound on how far each q is from where it is left (inf in another mode)."""
-    passages = pairs.space.passages
-    found = np.full((len(passages), len(pairs.q)), np.inf)
-    for g in passages:
-        if g.target == pairs.target:
-            found[g.index] = to_side(g, g.leave, pairs.q)
-    return found
-
-
-def _rest(between: Array, leaves: Array, last: int, indices: Indices) -> Array:
-    """What is left at least, once a passage has been left."""
-    rows = np.flatnonzero(np.isfinite(between[last]))
-    if not rows.size:
-        return np.full(len(indices), np.inf)
-    return np.min(between[last, rows][:, None] + leaves[np.ix_(rows, indices)], axis=0)
-
-
-def between_passages(space: Space, toll: float) -> Array:
+def between_passages(space: Space, toll: float, budget: Budget) -> Array:
     """The least from leaving one passage to leaving another (0 to itself), tolls included: all pairs, Floyd's way."""
     key = ("between", toll)
     found: Any = space.cache.get(key)
     if found is None:
         count = len(space.passages)
-        found = gaps(space) + toll
+        found = (gaps(space, budget) + toll) * (1 - ROUNDING * count)
         found[np.arange(count), np.arange(count)] = 0.0
         for k in range(count):
             found = np.minimum(found, found[:, k, None] + found[None, k, :])
-        space.cache[key] = found
+        if not budget.ran_out:
+            space.cache[key] = found
     return found

@@ -25,6 +25,8 @@ class Side:
         Depth in the strip at the cell's ends, 0 where the state flows.
     duration : array, shape (n,)
         Length of the cell in time.
+    doubt : array, shape (n,)
+        How far rounding may have moved any point of the curve, in computing it from the piece.
     """
 
     trace: Trace
@@ -32,6 +34,12 @@ class Side:
     powers: Array
     depth: Array
     duration: Array
+    doubt: Array
+
+    @property
+    def stray(self) -> Array:
+        """How much of the length of the control polygon rounding may have hidden: its legs are short of the curve."""
+        return 2 * self.powers.shape[1] * self.trace.roughness[self.pieces]
 
     @property
     def mode(self) -> Array:
@@ -54,6 +62,7 @@ class Side:
             powers=self.powers[chosen],
             depth=self.depth[chosen],
             duration=self.duration[chosen],
+            doubt=self.doubt[chosen],
         )
 
 
@@ -96,6 +105,11 @@ class Cells:
         middle = self.begin + (self.end - self.begin) / 2
         return (middle > self.begin) & (middle < self.end)
 
+    @property
+    def same(self) -> bool:
+        """Whether both curves are one."""
+        return self.a.equals(self.b)
+
     def sides(self) -> tuple[Side, Side]:
         """Return both curves on the cells, their polynomials of one degree."""
         degree = max(self.a.coefficients.shape[1], self.b.coefficients.shape[1]) - 1
@@ -105,7 +119,7 @@ class Cells:
         first, last = trace.share(pieces, self.begin), trace.share(pieces, self.end)
         powers = degree_raised(restrict(trace.coefficients[pieces], first, last), degree)
         depth = np.stack([trace.depths(pieces, first), trace.depths(pieces, last)], axis=1)
-        return Side(trace, pieces, powers, depth, self.end - self.begin)
+        return Side(trace, pieces, powers, depth, self.end - self.begin, trace.doubt[pieces])
 
 
 def common_span(a: Trace, b: Trace) -> tuple[float, float]:

@@ -11,10 +11,11 @@ import numpy as np
 from hsdsl.enclosures import Array
 from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Space
-from hsdsl.metrics.sides import to_side
+from hsdsl.metrics.sides import to_entry
 
 HALVINGS = 12
-FARTHEST = 1e6  # no bound beyond this is looked for
+FARTHEST = 1e6  # times the points' size: no bound beyond it is looked for where a gradient vanishes
+ROUNDING = 4 * 2.0**-53
 
 
 def to_passages(space: Space, mode: int, x: Array) -> Array:
@@ -22,7 +23,7 @@ def to_passages(space: Space, mode: int, x: Array) -> Array:
     nearest = np.full(len(x), np.inf)
     for passage in space.passages:
         if passage.source == mode:
-            nearest = np.minimum(nearest, to_side(passage, passage.enter, x))
+            nearest = np.minimum(nearest, to_entry(passage, x))
     for gate in space.curved_gates:
         if gate.source == mode:
             nearest = np.minimum(nearest, to_zeros(gate.surface, x))
@@ -45,15 +46,18 @@ def _free(formula: Formula, k: int, x: Array, size: Array) -> Array:
     """The largest half width found in whose box a function that is ``size`` at x has no zero."""
     near = np.zeros(len(x))
     with np.errstate(all="ignore"):
-        far = np.fmin(size / _steepest(formula, k, x, near), FARTHEST)
+        cap = FARTHEST * (float(np.abs(x).max(initial=0.0)) or 1.0)
+        far = np.fmin(size / _steepest(formula, k, x, near), cap)
         for n in range(HALVINGS):
             tried = far if n == 0 else (near + far) / 2
-            free = tried * _steepest(formula, k, x, tried) <= size
+            free = tried * _steepest(formula, k, x, tried) * (1 + ROUNDING) <= size
             near, far = np.where(free, tried, near), np.where(free, far, tried)
     return near
 
 
 def _steepest(formula: Formula, k: int, x: Array, half_width: Array) -> Array:
     """A bound on the length of the gradient in boxes."""
-    below, above = formula.slopes(x - half_width[:, None], x + half_width[:, None])
-    return np.sqrt(np.sum(np.maximum(np.abs(below[:, k]), np.abs(above[:, k])) ** 2, axis=1))
+    low, high = x - half_width[:, None], x + half_width[:, None]
+    below, above = formula.slopes(np.nextafter(low, -np.inf), np.nextafter(high, np.inf))
+    largest = np.maximum(np.abs(below[:, k]), np.abs(above[:, k]))
+    return np.sqrt(np.sum(largest**2, axis=1)) * (1 + (x.shape[1] + 4) * ROUNDING)

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from hsdsl.metrics.beyond import beyond_affine
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.inside import OUTSIDE, straight_inside
+from hsdsl.metrics.inside import OUTSIDE, UNDECIDED, straight_inside
+from hsdsl.metrics.interval import CERTIFIED, SAMPLED, SEARCHED, weakest
 from hsdsl.metrics.local import improve, onto
-from hsdsl.metrics.many import Pairs
+from hsdsl.metrics.many import ROUNDING, Pairs
 from hsdsl.metrics.nearest import to_passages
 from hsdsl.metrics.routes import Route
-from hsdsl.metrics.search import HOPS, End, search
+from hsdsl.metrics.search import End, most_hops, search
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
@@ -51,6 +52,7 @@ class Neighbours:
     space: Space
     relaxation: float | None
     budget: Budget
+    hops: int | None = None
     known: dict[tuple[int, int], list[Known]] = field(default_factory=dict[tuple[int, int], list[Known]])
 
     def bound(self, pairs: Pairs, enough: float) -> None:
@@ -71,7 +73,7 @@ class Neighbours:
                     enough = max(enough, float(pairs.upper[k]) if np.isfinite(pairs.upper[k]) else 0.0)
         if len(search.open(enough)):
             self.budget.spent()
-        pairs.lower = np.minimum(pairs.lower, pairs.upper)
+        pairs.status = weakest(pairs.status, search.status())
 
 
 class _Batch:
@@ -79,7 +81,7 @@ class _Batch:
 
     def __init__(self, owner: Neighbours, pairs: Pairs, pool: list[Known]) -> None:
         self.owner, self.pairs, self.pool = owner, pairs, pool
-        self.done = np.zeros(len(pairs.p), dtype=bool)
+        self.done, self.shortened = np.zeros((2, len(pairs.p)), dtype=bool)
         self.guess: dict[int, Known] = {}
         self.at = np.hstack([pairs.p, pairs.q])
         self._quick()
@@ -87,18 +89,26 @@ class _Batch:
     def _quick(self) -> None:
         """What no passage changes, and the straight line."""
         pairs, space = self.pairs, self.owner.space
-        straight = pairs.upper.copy()
-        pairs.lower = np.minimum(straight, pairs.least() + pairs.toll)
+        self.straight = pairs.lower
+        pairs.lower = np.minimum(self.straight, pairs.least() + pairs.toll)
+        self.looked_at = np.zeros(len(pairs.p), dtype=bool)
         if pairs.source == pairs.target and not space.domains[pairs.source].convex:
-            inside = straight_inside(space, pairs.source, pairs.p, pairs.q) != OUTSIDE
-            pairs.upper = np.where(inside, straight, np.inf)
-        self.straight = straight
+            verdicts = straight_inside(space, pairs.source, pairs.p, pairs.q)
+            pairs.upper = np.where(verdicts == OUTSIDE, np.inf, pairs.upper)
+            self.looked_at = verdicts == UNDECIDED
+
+    def status(self) -> str:
+        """What the bounds rest on: local solves, straight lines looked at in points, or proofs alone."""
+        apart = self.pairs.upper > self.pairs.lower * (1 + CLOSED)
+        if np.any(apart & (self.done | self.shortened)):
+            return SEARCHED
+        return SAMPLED if np.any(self.looked_at) else CERTIFIED
 
     def around(self, chosen: Indices) -> None:
         """The way to the nearest guard and from one, which every path takes that is not straight."""
         pairs, space = self.pairs, self.owner.space
         ways = to_passages(space, pairs.source, pairs.p[chosen]) + to_passages(space, pairs.target, pairs.q[chosen])
-        passing = np.minimum(self.straight[chosen], ways + pairs.toll)
+        passing = np.minimum(self.straight[chosen], (ways + pairs.toll) * (1 - ROUNDING))
         pairs.lower[chosen] = np.maximum(pairs.lower[chosen], passing)
 
     def open(self, enough: float) -> Indices:
@@ -144,7 +154,7 @@ class _Batch:
             holds &= straight_inside(self.owner.space, pieces[0][0], a, b) != OUTSIDE
         for (k, found), good in zip(moved, holds.tolist(), strict=True):
             if good:
-                self._shorter(k, found.route.length(found.points) + self._toll(found.route), found)
+                self._shorter(k, found.route.charged(found.points) + self._toll(found.route), found)
 
     def improve(self, k: int, enough: float) -> None:
         """Search from the best guess, or from nothing where there is none, or another way may be much shorter."""
@@ -164,10 +174,11 @@ class _Batch:
         """Search as for a single pair."""
         pairs, owner = self.pairs, self.owner
         starts, ends = [End(pairs.source, pairs.p[k])], [End(pairs.target, pairs.q[k])]
-        outer = search(owner.space, starts, ends, pairs.toll, HOPS, np.inf, owner.budget)
+        hops = most_hops(owner.space, pairs.source, pairs.target, owner.hops)
+        outer = search(owner.space, starts, ends, pairs.toll, hops, np.inf, owner.budget)
         enough = max(enough, float(pairs.lower[k]) * (1 + CLOSED))
-        found = beyond_affine(owner.space, starts, ends, pairs.toll, HOPS, np.inf, outer, owner.budget, enough)
-        pairs.lower[k] = max(pairs.lower[k], min(found.lower, found.upper))
+        found = beyond_affine(owner.space, starts, ends, pairs.toll, hops, np.inf, outer, owner.budget, enough)
+        pairs.lower[k] = max(pairs.lower[k], found.lower * (1 - ROUNDING))
         pairs.upper[k] = min(pairs.upper[k], found.upper)
         self.done[k] = True
         if found.through is not None and found.through.sequence:
@@ -179,7 +190,7 @@ class _Batch:
 
     def _shorter(self, k: int, value: float, found: Known) -> None:
         if value < self.pairs.upper[k]:
-            self.pairs.upper[k], self.guess[k] = value, found
+            self.pairs.upper[k], self.guess[k], self.shortened[k] = value, found, True
 
     def _toll(self, route: Route) -> float:
         return self.pairs.toll * sum(c.edge is not None for c in route.sequence)

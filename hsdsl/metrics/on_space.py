@@ -49,6 +49,11 @@ class PointMetric(Protocol):
         ...
 
     @property
+    def status(self) -> str:
+        """What all bounds given so far rest on, see :class:`hsdsl.metrics.Interval`."""
+        ...
+
+    @property
     def evaluations(self) -> int:
         """How many distances may be asked for before a search has to end with what it knows."""
         ...
@@ -86,7 +91,7 @@ class OnSpace:
             if self.strips:
                 apart = np.max(a.depth[same] + b.depth[same], axis=1)
                 bound[same] += apart
-        return bound
+        return bound + a.doubt + b.doubt
 
     def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
         """Bound at single times, mode pair by mode pair."""
@@ -99,11 +104,12 @@ class OnSpace:
             q = self._points(b[here], j, y[here], times[here], end)
             lower[here], upper[here] = self.metric.between(p, q, enough)
             enough = max(enough, float(lower[here].max()))
-        return lower, upper
+        doubt = a.doubt + b.doubt
+        return np.maximum(0.0, lower - doubt), upper + doubt
 
     def motion(self, side: Side) -> Array:
         """Bound the way by the length of the control polygon, with the depth and the time where they count."""
-        way = length(side.powers)
+        way = length(side.powers) + side.stray
         if self.strips:
             way += np.abs(side.depth[:, 1] - side.depth[:, 0])
         return way + side.duration if self.metric.timed else way

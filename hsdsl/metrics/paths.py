@@ -8,10 +8,10 @@ import numpy as np
 
 from hsdsl.metrics.chain import chain_of
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.interval import INFINITE, Interval
-from hsdsl.metrics.search import End, Found
+from hsdsl.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
+from hsdsl.metrics.search import TOLERANCE, End, Found
 
-ROUNDING = 16 * 2.0**-53  # relative to the size of the numbers
+ROUNDING = 16 * 2.0**-53  # of a few sums, relative to themselves
 CLOSED = 1e-9  # relative: such a gap counts as none
 
 
@@ -47,6 +47,11 @@ class PointDistance:
     interval: Interval
     path: tuple[Piece, ...]
     certified: str
+
+    @property
+    def status(self) -> str:
+        """What the interval rests on, see :class:`Interval`."""
+        return self.interval.status
 
     @property
     def sentence(self) -> str:
@@ -99,23 +104,32 @@ def coordinates(space: Space, place: Place) -> tuple[int, Array]:
     return mode, np.array(values, dtype=float)
 
 
-def answer(space: Space, found: Found, a: End, b: End, hops: int) -> PointDistance:
-    upper, lower = found.upper, min(found.lower, found.upper)
-    if upper == np.inf and not found.local and found.cut == np.inf and not found.ended_early:
+def answer(space: Space, found: Found, hops: int) -> PointDistance:
+    """The answer to a search.
+
+    Raises
+    ------
+    EndsCross
+        The search contradicts itself.
+    """
+    lower, upper = min(found.lower, found.cut) * (1 - ROUNDING), found.upper * (1 + ROUNDING)
+    if lower == upper == np.inf and not found.local:
         return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
-    rounding = ROUNDING * float(np.abs(a.x).sum() + np.abs(b.x).sum() + 2 * (0 if upper == np.inf else upper))
-    interval = Interval(max(0.0, lower - rounding), upper + rounding)
-    return PointDistance(interval, _path(space, found), _sentence(found, hops))
+    status = CERTIFIED
+    if found.local:
+        status = SEARCHED
+        if found.upper <= found.lower * (1 + CLOSED):
+            status = CERTIFIED if found.proved else SAMPLED
+    elif found.cut < found.upper * (1 - TOLERANCE):
+        status = up_to_hops(hops)
+    return PointDistance(Interval(lower, upper, status), _path(space, found), _sentence(found, status))
 
 
-def _sentence(found: Found, hops: int) -> str:
+def _sentence(found: Found, status: str) -> str:
     if found.local:
         return _of_local_solves(found)
-    if found.ended_early:
-        return "certified, with a wide gap: the search ended early"
-    if found.cut < np.inf:
-        return f"certified up to {hops} hops"
-    return "certified"
+    early = ", with a wide gap: the search ended early" if found.ended_early else ""
+    return f"certified{early}" if status == CERTIFIED else f"certified {status}{early}"
 
 
 def _of_local_solves(found: Found) -> str:

@@ -16,7 +16,7 @@ from hsdsl.metrics.interval import INFINITE, ZERO
 from hsdsl.metrics.many import Pairs, around_guards, search_many
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.paths import Piece, Place, PointDistance, answer, coordinates, ends_of
-from hsdsl.metrics.search import HOPS, End, search
+from hsdsl.metrics.search import End, most_hops, search
 
 __all__ = ["Piece", "Place", "PointDistance", "coordinates", "distance", "distances", "quick_bounds"]
 
@@ -41,7 +41,8 @@ def distance(
         The relaxed metric's (Def. 19); without it, the quotient metric's (Def. 12), in which a point of a strip counts
         as its guard point.
     hops : int, optional
-        The most passages of the paths compared.
+        The most passages of the paths compared; left out, eight more than the fewest that connect the modes. The lower
+        end holds for paths with more, too.
     budget : Budget, optional
         The time that may be spent; then the best that is known is returned.
 
@@ -57,11 +58,11 @@ def distance(
     if space.components[a.mode] != space.components[b.mode]:
         return PointDistance(INFINITE, (), "certified: no edges connect the modes")
     strip = _along_strip(p, q, a, b, relaxation)
-    most, toll, budget = HOPS if hops is None else hops, relaxation or 0.0, budget or Budget()
+    most, toll, budget = most_hops(space, a.mode, b.mode, hops), relaxation or 0.0, budget or Budget()
     found = search(space, starts, ends, toll, most, strip, budget)
     if not space.affine:
         found = beyond_affine(space, starts, ends, toll, most, strip, found, budget)
-    return answer(space, found, a, b, most)
+    return answer(space, found, most)
 
 
 def distances(
@@ -73,7 +74,9 @@ def distances(
     relaxation: float | None = None,
     neighbours: Neighbours | None = None,
     enough: float = 0.0,
-) -> tuple[Array, Array]:
+    hops: int | None = None,
+    budget: Budget | None = None,
+) -> tuple[Array, Array, str]:
     """The distances of many pairs of points in the same two modes' domains.
 
     Parameters
@@ -90,20 +93,24 @@ def distances(
         Where something is not affine: paths found for earlier pairs, to begin with.
     enough : float
         There, bounds of at most this need not be close.
+    hops, budget
+        As for :func:`distance`.
 
     Returns
     -------
     lower, upper : (N,) arrays
-        Bounds; of paths with up to eight passages where no cap can be proved.
+        Bounds.
+    status : str
+        What they rest on, see :class:`hsdsl.metrics.Interval`.
     """
     pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
     if space.components[pairs.source] != space.components[pairs.target]:
         pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
     elif space.affine:
-        search_many(pairs, HOPS)
+        search_many(pairs, most_hops(space, pairs.source, pairs.target, hops), budget or Budget())
     else:
-        (neighbours or Neighbours(space, relaxation, Budget())).bound(pairs, enough)
-    return pairs.widened()
+        (neighbours or Neighbours(space, relaxation, budget or Budget(), hops)).bound(pairs, enough)
+    return pairs.bounds()
 
 
 def quick_bounds(
@@ -117,10 +124,10 @@ def quick_bounds(
     if space.components[pairs.source] != space.components[pairs.target]:
         pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
         return pairs.lower, pairs.upper
-    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, around_guards(pairs)))
+    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, around_guards(pairs, Budget())))
     if not space.domains[pairs.source].convex:
         pairs.upper = np.full(len(pairs.p), np.inf)
-    return pairs.widened()
+    return pairs.bounds()[:2]
 
 
 def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None) -> Pairs:

@@ -12,6 +12,7 @@ from hsdsl.execution import Array
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.inside import highest
+from hsdsl.metrics.interval import weakest
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.on_space import Points
 from hsdsl.metrics.points import Place, distance, distances
@@ -26,6 +27,13 @@ class SpaceMetric:
     space: Space
     relaxation: float | None = None
     budget: Budget = field(default_factory=Budget)
+    hops: int | None = None
+    _statuses: set[str] = field(default_factory=set[str], repr=False)
+
+    @property
+    def status(self) -> str:
+        """What all bounds given so far rest on."""
+        return weakest(*self._statuses)
 
     @property
     def timed(self) -> bool:
@@ -39,7 +47,7 @@ class SpaceMetric:
 
     @cached_property
     def _neighbours(self) -> Neighbours:
-        return Neighbours(self.space, self.relaxation, self.budget)
+        return Neighbours(self.space, self.relaxation, self.budget, self.hops)
 
     def contains(self, mode: str, low: Array, high: Array) -> Array:
         """Whether whole boxes are known to be in a mode's domain, or that domain to be convex."""
@@ -57,17 +65,21 @@ class SpaceMetric:
         if len(flows):
             lower[flows], upper[flows] = self._flowing(p, q, flows, enough)
         for k in np.flatnonzero(waits).tolist():
-            found = distance(self.space, self._place(p, k), self._place(q, k), self.relaxation, budget=self.budget)
+            ends = self._place(p, k), self._place(q, k)
+            found = distance(self.space, *ends, self.relaxation, self.hops, self.budget)
             lower[k], upper[k] = found.interval.lower, found.interval.upper
+            self._statuses.add(found.status)
         return lower, upper
 
     def _flowing(self, p: Points, q: Points, chosen: Array, enough: float) -> tuple[Array, Array]:
         x, y = self._coordinates(p, chosen), self._coordinates(q, chosen)
         for points in (p, q):
             self._index(points.mode)
-        if self.space.affine:
-            return distances(self.space, p.mode, x, q.mode, y, self.relaxation)
-        return distances(self.space, p.mode, x, q.mode, y, self.relaxation, self._neighbours, enough)
+        known = None if self.space.affine else self._neighbours
+        where = self.space, p.mode, x, q.mode, y, self.relaxation
+        lower, upper, status = distances(*where, known, enough, self.hops, self.budget)
+        self._statuses.add(status)
+        return lower, upper
 
     def _index(self, mode: str) -> int:
         try:

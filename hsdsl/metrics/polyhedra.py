@@ -1,101 +1,131 @@
-"""Polyhedra in the few coordinates a guard has: made from inequalities, found empty or not, measured."""
+"""Guards as polyhedra in the few coordinates they have: made in rational numbers, then rounded once."""
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
 
 from hsdsl.metrics.formulas import Formula
-from hsdsl.metrics.geometry import Array, Domain, Gate
+from hsdsl.metrics.geometry import Array, Exact, Gate
+from hsdsl.metrics.rational import (
+    ZERO,
+    Plane,
+    Row,
+    Vector,
+    about,
+    axes,
+    deepest,
+    dot,
+    orthogonal,
+    plus,
+    times,
+)
 
-SLACK = 1e-12  # relative: what counts as zero among coefficients made by rounding
+Reset = tuple[tuple[Vector, ...], Vector]  # matrix by rows, and vector
 
 
-def pieces_of(
+def gate_of(
     edge: str,
-    source: tuple[int, Domain],
-    target: tuple[int, Domain],
-    surface: tuple[Array, float],
-    inequalities: tuple[Array, Array],
-    reset: tuple[Array, Array],
+    modes: tuple[int, int],
+    surface: Row,
+    inequalities: Sequence[Row],
+    reset: Reset,
+    image: Sequence[Row],
     curved: tuple[Formula, ...],
-) -> list[Gate]:
-    """A guard as gates: one, or none where it is empty.
+) -> Gate | None:
+    """A guard as a gate, None where it is empty.
 
     Parameters
     ----------
     edge : str
         Its name.
-    source, target : (int, Domain)
+    modes : (int, int)
         Where it leaves and leads.
-    surface : (n,) normal and level
-        ``normal @ x = level`` on the guard.
-    inequalities : (m, n) normals and (m,) levels
+    surface : row
+        ``normal . x = level`` on the guard.
+    inequalities : rows
         What holds on it besides.
-    reset : (k, n) matrix and (k,) vector
+    reset : matrix and vector
         Its affine reset.
+    image : rows
+        What holds in the domain it leads into.
     curved : tuple of callable
         Conditions that are not affine.
     """
-    normal, level = surface
-    size = float(np.linalg.norm(normal))
-    if size == 0:
-        return []
-    base = normal * (level / size**2)
-    frame = _orthogonal(normal / size)
+    if not any(surface[0]):
+        return None
     matrix, offset = reset
-    image_base, image_frame = matrix @ base + offset, matrix @ frame
-    image = target[1]
-    rows = [
-        _reduced(inequalities[0] @ frame, inequalities[1] - inequalities[0] @ base, np.abs(inequalities[1])),
-        _reduced(image.normals @ image_frame, image.levels - image.normals @ image_base, np.abs(image.levels)),
-    ]
-    if any(row is None for row in rows):
-        return []
-    normals = np.vstack([row[0] for row in rows if row is not None])
-    levels = np.concatenate([row[1] for row in rows if row is not None])
-    nothing = np.zeros(len(base) - 1)
-    if len(levels) and largest(nothing, normals, levels) is None:
-        return []
-    return [Gate(edge, source[0], target[0], base, frame, image_base, image_frame, normals, levels, curved)]
+    columns = list(zip(*matrix, strict=True)) or [()] * len(surface[0])
+    pulled = [(times(columns, normal), level - dot(normal, offset)) for normal, level in image]
+    found = _polyhedron(len(surface[0]), [surface], list(dict.fromkeys([*inequalities, *pulled])))
+    if found is None:
+        return None
+    plane, frame, rows, inner = found
+    sides = (
+        (plane.point, tuple(frame)),
+        (plus(times(matrix, plane.point), offset), tuple(times(matrix, f) for f in frame)),
+    )
+    return _rounded(edge, modes, Exact(sides, tuple(rows), inner), curved)
 
 
-def _orthogonal(unit: Array) -> Array:
-    """An orthonormal basis of what is orthogonal to a unit vector; coordinate axes where those are."""
-    n = len(unit)
-    axis = int(np.argmax(np.abs(unit)))
-    if abs(unit[axis]) == 1.0:
-        return np.delete(np.eye(n), axis, axis=1)
-    mirror = unit.copy()
-    mirror[axis] += np.copysign(1.0, unit[axis])
-    reflection = np.eye(n) - 2 * np.outer(mirror, mirror) / (mirror @ mirror)
-    return np.delete(reflection, axis, axis=1)
-
-
-def _reduced(normals: Array, levels: Array, sizes: Array) -> tuple[Array, Array] | None:
-    """Unit normals; without inequalities that hold of themselves; None where one never holds."""
-    keep: list[int] = []
-    lengths = np.linalg.norm(normals, axis=1)
-    for i, length in enumerate(lengths.tolist()):
-        if length > SLACK:
-            keep.append(i)
-        elif levels[i] < -1e-9 * (1 + sizes[i]):
+def _polyhedron(
+    size: int, equations: list[Row], inequalities: list[Row]
+) -> tuple[Plane, list[Vector], list[Row], Vector] | None:
+    """The smallest plane that holds a polyhedron, its directions, what is left of the rows, and a point inside."""
+    while True:
+        plane = Plane(size, equations)
+        if plane.empty:
             return None
-    return normals[keep] / lengths[keep, None], levels[keep] / lengths[keep]
+        frame = plane.along()
+        rows: list[Row] = []
+        own: list[Row] = []
+        for normal, level in inequalities:
+            along, rest = times(frame, normal), level - dot(normal, plane.point)
+            if any(along):
+                rows.append((along, rest))
+                own.append((normal, level))
+            elif rest < 0:
+                return None
+        if not rows:
+            return plane, frame, rows, (ZERO,) * len(frame)
+        depth, inner, weights = deepest(rows)
+        if depth < 0:
+            return None
+        if depth > 0:
+            return plane, frame, rows, inner
+        equations = [*equations, *(row for row, weight in zip(own, weights, strict=True) if weight > 0)]
 
 
-def largest(cost: Array, normals: Array, levels: Array) -> float | None:
-    """The maximum of ``cost @ s`` where ``normals @ s <= levels``; inf where unbounded, None where that is empty."""
-    linprog: Any = import_module("scipy.optimize").linprog
+def _rounded(edge: str, modes: tuple[int, int], exact: Exact, curved: tuple[Formula, ...]) -> Gate:
+    normals, levels = unit_rows(exact.rows, len(exact.inner))
+    (base, frame), (image_base, image_frame) = exact.sides
+    inner = tuple(Fraction(float(v)) for v in exact.inner)
+    room = [float((level - dot(normal, inner)) / about(normal)) for normal, level in exact.rows]
+    own, image = ((floats(b), _columns(f, len(b))) for b, f in exact.sides)
+    across = _across(base, frame), _across(image_base, image_frame)
+    return Gate(edge, *modes, *own, *image, normals, levels, floats(inner), np.array(room), across, exact, curved)
 
-    if len(cost) == 0:
-        return 0.0 if np.all(levels >= -SLACK) else None
-    if len(levels) == 0:
-        return 0.0 if not np.any(cost) else np.inf
-    slack = levels + 1e-9 * (1 + np.abs(levels)) * (not np.any(cost))
-    found: Any = linprog(-cost, A_ub=normals, b_ub=slack, bounds=(None, None), method="highs")
-    if found.status == 0:
-        return -float(found.fun)
-    return None if found.status == 2 else np.inf
+
+def unit_rows(rows: Sequence[Row], size: int) -> tuple[Array, Array]:
+    """Inequalities in floats, each divided by its length; one without a direction by its level."""
+    lengths = [about(normal) or abs(level) or Fraction(1) for normal, level in rows]
+    normals = [floats([v / length for v in normal]) for (normal, _), length in zip(rows, lengths, strict=True)]
+    levels = [float(level / length) for (_, level), length in zip(rows, lengths, strict=True)]
+    return np.array(normals).reshape(len(rows), size), np.array(levels)
+
+
+def floats(x: Sequence[Fraction]) -> Array:
+    """The nearest floats."""
+    return np.array([float(v) for v in x])
+
+
+def _columns(vectors: Sequence[Vector], size: int) -> Array:
+    return np.array([floats(v) for v in vectors]).reshape(len(vectors), size).T.copy()
+
+
+def _across(base: Vector, frame: Sequence[Vector]) -> tuple[Array, Array]:
+    """Unit vectors orthogonal to a plane, and their products with its points."""
+    found = orthogonal(axes(len(base)), orthogonal(frame))
+    return unit_rows([(v, dot(v, base)) for v in found], len(base))

@@ -17,8 +17,9 @@ import numpy as np
 from hsdsl.execution import Execution
 from hsdsl.metrics.bernstein import largest_norm, length
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.curves import GAP, ROUNDOFF, CurveDistance, curve_distance, largest_state, merged
+from hsdsl.metrics.curves import GAP, CurveDistance, curve_distance, merged, no_distance, rounding_of
 from hsdsl.metrics.merge import Side
+from hsdsl.metrics.rounding import UNIT
 from hsdsl.metrics.supremum import supremum
 from hsdsl.metrics.trace import Array
 
@@ -31,17 +32,19 @@ class Labelled:
 
     def over(self, a: Side, b: Side) -> Array:
         """Bound by the difference of the two polynomials."""
-        return largest_norm(a.powers - b.powers) + (a.mode != b.mode)
+        return largest_norm(a.powers - b.powers) + (a.mode != b.mode) + a.doubt + b.doubt
 
     def at(self, a: Side, b: Side, end: int, times: Array, enough: float = 0.0) -> tuple[Array, Array]:
-        """Return D, exact up to rounding."""
+        """Return D, less or more than rounding."""
         difference = a.at_end(end) - b.at_end(end)
-        apart = np.sqrt(np.sum(difference**2, axis=1)) + (a.mode != b.mode)
-        return apart, apart
+        states = np.sqrt(np.sum(difference**2, axis=1))
+        apart = states + (a.mode != b.mode)
+        doubt = a.doubt + b.doubt + (difference.shape[1] + 4) * UNIT * states
+        return np.maximum(0.0, apart - doubt), apart + doubt
 
     def motion(self, side: Side) -> Array:
         """Bound the way by the length of the control polygon."""
-        return length(side.powers)
+        return length(side.powers) + side.stray
 
 
 def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
@@ -59,6 +62,8 @@ def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
         The runs have no time in common, or one is not finite there.
     """
     cells = merged(a, b)
+    if cells.same:
+        return no_distance(cells, "sup")
     budget = Budget()
-    found = supremum(cells, Labelled(), gap, ROUNDOFF * largest_state(cells), EVALUATIONS, budget)
+    found = supremum(cells, Labelled(), gap, rounding_of(cells.a, cells.b), EVALUATIONS, budget)
     return curve_distance(found, cells, a, b, "sup", gap, budget)

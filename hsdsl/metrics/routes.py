@@ -9,8 +9,8 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from hsdsl.metrics.formulas import Formula, affine, stacked
-from hsdsl.metrics.geometry import Array, CurvedGate, Domain, Gate, Space
-from hsdsl.metrics.inside import INSIDE, OUTSIDE, straight_inside
+from hsdsl.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain, Gate, Space
+from hsdsl.metrics.inside import OUTSIDE, straight_inside
 
 # Where a leg that is held is held: dense towards its ends, at which it may leave a boundary it begins on.
 SHARES = (0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999)
@@ -178,11 +178,30 @@ class Route:
                 rows += [-f.jacobian(at) @ moves for f in self.space.domains[mode].curved]
         return np.vstack(rows)
 
+    def excess(self, unknowns: Array) -> float:
+        """How far the guard points are, to first order, from where surfaces and inequalities let them be."""
+        on, in_ = np.abs(self.surfaces(unknowns)), np.maximum(-self.room(unknowns), 0.0)
+        if not (np.all(np.isfinite(on)) and np.all(np.isfinite(in_))):
+            return np.inf
+        parts = [(on, self.surface_slopes), (in_, self.room_slopes)]
+        return max(_farthest(off, slopes(unknowns)) if off.any() else 0.0 for off, slopes in parts)
+
+    def size(self, unknowns: Array) -> float:
+        """The largest coordinate of its ends and guard points."""
+        return float(np.abs(np.concatenate([self.start[1], unknowns, self.end[1]])).max(initial=0.0))
+
     def allowed(self, unknowns: Array) -> bool:
-        """Whether guards' conditions hold and images lie in their domains, up to rounding."""
-        size = INSIDE * (1 + float(np.abs(unknowns).max(initial=0)))
-        on = np.abs(self.surfaces(unknowns)).max(initial=0) <= size
-        return bool(on and self.room(unknowns).min(initial=0) >= -size)
+        """Whether guard points are on their guards and images in their domains, nearly; what is missing is charged."""
+        return self.excess(unknowns) <= TOLERANCE * self.size(unknowns)
+
+    def charged(self, unknowns: Array) -> float:
+        """The path's length, and what it may take to put its guard points where they have to be."""
+        excess = self.excess(unknowns)
+        if not excess > 0:
+            return self.length(unknowns)
+        slopes = (c.slopes(x) for c, x in zip(self.sequence, self.points(unknowns), strict=True))
+        moved = sum(float(np.linalg.norm(side)) for both in slopes for side in both)
+        return self.length(unknowns) + 2 * excess * moved
 
     def judged(self, unknowns: Array) -> list[int]:
         """For each leg whether it stays in its domain, see :func:`hsdsl.metrics.inside.straight_inside`."""
@@ -196,6 +215,12 @@ def beyond(space: Space, mode: int, a: Array, b: Array) -> float:
     """How far a straight piece is seen to leave its domain."""
     at = [a + share * (b - a) for share in SHARES]
     return max((f(x) for f in space.domains[mode].curved for x in at), default=0.0)
+
+
+def _farthest(off: Array, slopes: Array) -> float:
+    """The way to where functions that are ``off`` are not, along their steepest slopes."""
+    with np.errstate(all="ignore"):
+        return float(np.max(np.where(off > 0, off / np.linalg.norm(slopes, axis=1), 0.0)))
 
 
 def _placed(block: Array, first: int, width: int) -> Array:

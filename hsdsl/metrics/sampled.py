@@ -11,8 +11,8 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.metrics.curves import CurveDistance, merged, span_note
-from hsdsl.metrics.interval import Interval
+from hsdsl.metrics.curves import ROUNDOFF, CurveDistance, merged, no_distance, span_note
+from hsdsl.metrics.interval import SAMPLED, Interval
 from hsdsl.metrics.merge import Cells, common_span
 from hsdsl.metrics.trace import Array, Trace
 from hsdsl.names import did_you_mean
@@ -39,6 +39,8 @@ def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None
     columns = _columns(cells, coordinates)
     first, second = cells.sides()
     ours = np.isin(cells.begin, cells.a.start), np.isin(cells.end, cells.a.end)
+    if cells.same:
+        return no_distance(cells, "rho-hat", SAMPLED)
     largest, time = 0.0, float(cells.begin[0])
     for end, times, chosen in ((0, cells.begin, ours[0]), (1, cells.end, ours[1])):
         difference = (first.at_end(end) - second.at_end(end))[chosen][:, columns]
@@ -46,7 +48,9 @@ def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None
         if len(apart) and apart.max() > largest:
             largest, time = float(apart.max()), float(times[chosen][int(np.argmax(apart))])
     span = common_span(cells.a, cells.b)
-    return CurveDistance(Interval(largest, largest), time, "rho-hat", span, span_note(a, b, span))
+    doubt = float(np.max(first.doubt + second.doubt)) + ROUNDOFF * largest
+    interval = Interval(max(0.0, largest - doubt), largest + doubt, SAMPLED)
+    return CurveDistance(interval, time, "rho-hat", span, span_note(a, b, span))
 
 
 def _columns(cells: Cells, coordinates: Sequence[str] | None) -> Array:

@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.chain import Chain, Problem, chain_of
+from hsdsl.metrics.chain import Problem, Shape, chain_of
 from hsdsl.metrics.cones import solve
 from hsdsl.metrics.follow import may_follow
 from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.serial import one_thread
+from hsdsl.metrics.sides import to_entry, to_exit
 
-TOLERANCE = 2e-10  # relative: bounds this near to the best path do not beat it
-HOPS = 8
-MOST_PROBLEMS = 20_000
+TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
+ROUNDING = 4 * 2.0**-53  # of a sum of bounds, for each of them
+NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
+HOPS = 8  # more than the fewest that lead from one mode to the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,11 @@ class End:
 
 @dataclass
 class Found:
-    """What a search knows: the best path, and the least that what it left out can have."""
+    """What a search knows: the best path, and the least that anything else can have.
+
+    ``lower`` is the least of what was looked at or left out as too long, ``cut`` that of paths with more passages than
+    the cap.
+    """
 
     upper: float = np.inf
     lower: float = np.inf
@@ -75,10 +82,11 @@ def search(
     budget : Budget
         The time for it.
     """
-    found = Found(upper=limit)
-    for end in ends:
-        for start in starts:
-            _Search(space, start, end, relaxation, hops, found, budget).run()
+    found = Found(upper=limit, lower=limit)
+    with one_thread():
+        for end in ends:
+            for start in starts:
+                _Search(space, start, end, relaxation, hops, found, budget).run()
     return found
 
 
@@ -92,33 +100,64 @@ class _Search:
         self.relaxation, self.hops, self.found = relaxation, hops, found
         self.fixed = start.cost + end.cost
         self.heap: list[tuple[float, int, tuple[int, ...]]] = []
-        self.solved = 0
-        self.rest = remaining(space, end, relaxation)
+        self.rest = np.zeros(len(space.passages))
 
     def run(self) -> None:
         """Best first until nothing open can be shorter."""
         self._finish(())
-        self._go_on((), self.fixed)
+        least = max(self.fixed, least_with_passages(self.space, self.start, self.end) + self.fixed)
+        if self._left_out(least):
+            return
+        self.rest = remaining(self.space, self.end, self.relaxation, self.budget)
+        self._straight_there()
+        self._go_on((), least)
         while self.heap:
             bound, _, sequence = heapq.heappop(self.heap)
-            if bound >= self._enough():
-                self.found.lower = min(self.found.lower, bound)
+            if self._left_out(bound):
                 break
-            if self.solved > MOST_PROBLEMS or self.budget.spent():
-                self.found.lower = min(self.found.lower, bound)
-                self.found.ended_early = True
+            if self.budget.spent():
+                self._open(bound)
                 break
             self._finish(sequence)
             self._go_on(sequence, bound)
 
-    def _go_on(self, sequence: tuple[int, ...], bound: float) -> None:
-        if len(sequence) < self.hops:
-            self._extend(sequence)
-        elif (least := self._cut(sequence, bound)) < self._enough():
-            self.found.cut = min(self.found.cut, least)
+    def _straight_there(self) -> None:
+        """Try the sequence that the bounds between passages make look shortest, so that some path is known early."""
+        inner, sequence = gaps(self.space, self.budget), tuple[int, ...]()
+        while len(sequence) < self.hops:
+            far = np.zeros(len(self.rest)) if not sequence else inner[sequence[-1]]
+            open_ = [i for i in self._following(sequence) if i not in sequence and self.rest[i] < np.inf]
+            if not open_:
+                return
+            sequence = (*sequence, min(open_, key=lambda i: float(far[i] + self.rest[i])))
+            if self.space.passages[sequence[-1]].target == self.end.mode:
+                self._finish(sequence)
+                return
 
-    def _enough(self) -> float:
-        return self.found.upper * (1 - TOLERANCE)
+    def _left_out(self, bound: float) -> bool:
+        """Whether no path that is at least so long is worth a look; the lower end remembers it."""
+        if bound < self.found.upper * (1 - TOLERANCE):
+            return False
+        self.found.lower = min(self.found.lower, bound)
+        return True
+
+    def _open(self, bound: float) -> None:
+        """Leave what is at least so long for want of time."""
+        self.found.lower, self.found.ended_early = min(self.found.lower, bound), True
+
+    def _go_on(self, sequence: tuple[int, ...], bound: float) -> None:
+        for following in self._following(sequence):
+            longer = (*sequence, following)
+            if self.budget.spent():
+                self._open(bound)
+                return
+            least = max(bound, self._bound(longer))
+            if least == np.inf or self._left_out(least):
+                continue
+            if len(sequence) < self.hops:
+                heapq.heappush(self.heap, (least, len(longer), longer))
+            else:
+                self.found.cut = min(self.found.cut, least)
 
     def _finish(self, sequence: tuple[int, ...]) -> None:
         """The path through exactly this sequence."""
@@ -132,10 +171,8 @@ class _Search:
         if sequence:
             problem = chain_of(self.space, sequence).problem(self.start.x, self.end.x)
         else:
-            problem = Problem(
-                (np.zeros((len(self.end.x), 0)),), (self.end.x - self.start.x,), np.zeros((0, 0)), np.zeros(0)
-            )
-        lower, upper, s = self._solve(problem)
+            problem = straight(self.start.x, self.end.x)
+        lower, upper, s = solve(problem)
         toll = self.fixed + self.relaxation * len(sequence)
         self.found.lower = min(self.found.lower, lower + toll)
         if upper + toll < self.found.upper:
@@ -148,13 +185,6 @@ class _Search:
         return len(sequence) < 2 or self._pair(
             sequence[-2], sequence[-1], len(sequence) - 2, self.end.bound is not None
         )
-
-    def _extend(self, sequence: tuple[int, ...]) -> None:
-        """Every sequence one passage longer, with its bound."""
-        for following in self._following(sequence):
-            longer = (*sequence, following)
-            if (bound := self._bound(longer)) < self._enough():
-                heapq.heappush(self.heap, (bound, len(longer), longer))
 
     def _following(self, sequence: tuple[int, ...]) -> Iterator[int]:
         if not sequence:
@@ -183,53 +213,81 @@ class _Search:
         if rest == np.inf:
             return np.inf
         chain = chain_of(self.space, sequence)
-        simple = self._solve(chain.problem(self.start.x, None))[0] + rest + toll
-        if simple >= self._enough() or self.space.kept is None:
+        simple = self._least(chain.problem(self.start.x, None), rest + toll)
+        if simple >= self.found.upper * (1 - TOLERANCE) or self.space.kept is None:
             return simple
         goal = self.end.x[list(self.space.kept[self.end.mode])]
-        return max(simple, self._solve(chain.problem(self.start.x, goal, kept=True))[0] + toll)
+        return max(simple, self._least(chain.problem(self.start.x, goal, kept=True), toll))
 
-    def _cut(self, sequence: tuple[int, ...], bound: float) -> float:
-        """The least that continuations beyond the cap on hops can have."""
-        longer = [self._bound((*sequence, following)) for following in self._following(sequence)]
-        return max(bound, min(longer, default=np.inf))
-
-    def _solve(self, problem: Problem) -> tuple[float, float, Array]:
-        self.solved += 1
-        return solve(problem)
+    def _least(self, problem: Problem, more: float) -> float:
+        """A lower bound, closer where that may decide."""
+        bound = solve(problem, 1)[0] + more
+        near = self.found.upper * (1 - NEAR) < bound < self.found.upper * (1 - TOLERANCE)
+        return max(bound, solve(problem)[0] + more) if near else bound
 
 
-def remaining(space: Space, end: End, relaxation: float) -> Array:
+def straight(p: Array, q: Array) -> Problem:
+    """The straight way: no numbers but the difference, which is exact to a share of itself."""
+    nothing = np.zeros((len(p), 0))
+    return Problem(Shape((nothing,), np.zeros((0, 0)), np.zeros(0)), (q - p,), 0.0)
+
+
+def least_with_passages(space: Space, start: End, end: End) -> float:
+    """A lower bound on ways with passages: to the nearest one and from one; infinite without any."""
+    x, y = start.x[None], end.x[None]
+    first = [float(to_entry(p, x)[0]) for p in space.passages if p.source == start.mode]
+    last = [float(to_exit(p, y)[0]) for p in space.passages if p.target == end.mode]
+    if not first or not last:
+        return np.inf
+    return (min(first) if start.bound is None else 0.0) + (min(last) if end.bound is None else 0.0)
+
+
+def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:
+    """The cap on passages: the one given, or some more than the fewest that lead from one mode to the other."""
+    return space.fewest(source)[target] + HOPS if hops is None else hops
+
+
+def remaining(space: Space, end: End, relaxation: float, budget: Budget) -> Array:
     """For each passage, a lower bound on what is left to the end once it has been left (Bellman's recursion)."""
     count = len(space.passages)
     rest = np.full(count, np.inf)
     for passage in space.passages:
         if passage.target == end.mode:
-            goal = chain_of(space, (passage.index,)).problem(None, end.x)
-            rest[passage.index] = solve(goal)[0]
-    between = gaps(space)
+            rest[passage.index] = to_exit(passage, end.x[None])[0]
+            if passage.gate.size > 1 and not budget.spent():
+                goal = chain_of(space, (passage.index,)).problem(None, end.x)
+                rest[passage.index] = max(rest[passage.index], solve(goal)[0])
+    between = gaps(space, budget)
     for _ in range(count):
         through = np.min(between + (rest + relaxation)[None, :], axis=1, initial=np.inf)
         closer = np.minimum(rest, through)
         if np.array_equal(closer, rest):
             break
         rest = closer
-    return rest
+    return rest * (1 - count * ROUNDING)
 
 
-def gaps(space: Space) -> Array:
-    """The distance from where one passage is left to where another is entered, inf in different modes."""
+def gaps(space: Space, budget: Budget) -> Array:
+    """A lower bound on the way from where one passage is left to where another is entered, inf in different modes.
+
+    It is 0 where the time is over before it is known.
+    """
     found: Array | None = space.cache.get("gaps")
     if found is None:
         count = len(space.passages)
         found = np.full((count, count), np.inf)
         for f in space.passages:
             for g in space.passages:
-                if f.target == g.source:
-                    found[f.index, g.index] = _gap(chain_of(space, (f.index, g.index)))
-        space.cache["gaps"] = found
+                if f.target == g.source and np.isinf(found[f.index, g.index]):
+                    # The same two sides face each other the other way round: passage i backwards is i with the last bit
+                    # changed.
+                    gap = 0.0 if budget.spent() else _gap(space, f.index, g.index)
+                    found[f.index, g.index] = found[g.index ^ 1, f.index ^ 1] = gap
+        if not budget.ran_out:
+            space.cache["gaps"] = found
     return found
 
 
-def _gap(chain: Chain) -> float:
-    return solve(chain.problem(None, None))[0]
+def _gap(space: Space, f: int, g: int) -> float:
+    """0 where a passage is taken back at once."""
+    return 0.0 if f == g ^ 1 else solve(chain_of(space, (f, g)).problem(None, None), 1)[0]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from hsdsl.execution import Execution
-from hsdsl.metrics.curves import CurveDistance, merged, span_note
+from hsdsl.metrics.curves import ROUNDOFF, CurveDistance, merged, no_distance, rounding_of, span_note
 from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.merge import common_span
 from hsdsl.metrics.polyline import Polyline, polylines
@@ -42,14 +42,16 @@ def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> Curve
     """
     cells = merged(a, b)
     span = common_span(cells.a, cells.b)
+    if cells.same:
+        return no_distance(cells, "skorokhod")
     p, q = polylines((cells.a, cells.b), (span, span), resolution)
-    coupled = coupling(p, q)
+    coupled, doubt = coupling(p, q), rounding_of(cells.a, cells.b) + ROUNDOFF * max(map(abs, span))
     same_time = sup_norm(a, b).upper
-    upper = min(coupled + (p.reach + q.reach) / 2, same_time)
-    lower = max(coupled - max(p.reach, q.reach) / 2, switches_apart(cells.a, cells.b, span), 0.0)
+    upper = min(coupled + (p.reach + q.reach) / 2 + doubt, same_time)
+    lower = max(coupled - max(p.reach, q.reach) / 2 - doubt, switches_apart(cells.a, cells.b, span), 0.0)
     note = f"Curves by {len(p)} and {len(q)} points, up to {max(p.reach, q.reach):.2g} apart."
     notes = " ".join(filter(None, (span_note(a, b, span), note)))
-    return CurveDistance(Interval(min(lower, upper), upper), None, "skorokhod", span, notes)
+    return CurveDistance(Interval(lower, upper), None, "skorokhod", span, notes)
 
 
 def coupling(p: Polyline, q: Polyline) -> float:

@@ -110,7 +110,7 @@ def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, mos
     search.best_first(frontier.take(likely))
     search.best_first(frontier.take(others[search.undecided(bounds[others])]))
     search.best_first(search.coarse_to_fine(frontier, np.flatnonzero(~known)))
-    found.upper = max(found.upper, found.points, found.lower)
+    found.upper = max(found.upper, found.points)
     return found
 
 

@@ -27,6 +27,7 @@ class Request:
     space: SpaceMaker
     relaxation: float | None = None
     coordinates: Sequence[str] | None = None
+    hops: int | None = None
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ CURVE_METRICS: dict[str, CurveMetric] = {
 }
 
 RELAXED = ("rho", "relaxed")
+ON_THE_SPACE = ("rho", "quotient", "relaxed")
 
 
 def between(metric: str, request: Request) -> CurveDistance:
@@ -83,6 +85,8 @@ def between(metric: str, request: Request) -> CurveDistance:
     check_same_model(request.a, request.b)
     if request.relaxation is not None and metric not in RELAXED:
         raise UsageError(f"the distance '{metric}' has no relaxation", f"with one: {' or '.join(RELAXED)}")
+    if request.hops is not None and metric not in ON_THE_SPACE:
+        raise UsageError(f"the distance '{metric}' has no paths", f"hops are for {', '.join(ON_THE_SPACE)}")
     if request.coordinates is not None and metric != "rho-hat":
         raise UsageError(f"the distance '{metric}' takes all states; coordinates are for rho-hat")
     return replace(CURVE_METRICS[metric].compute(request), metric=metric)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hsdsl.execution import Execution
+from hsdsl.metrics.bernstein import sizes
+from hsdsl.metrics.rounding import UNIT
 
 Array = npt.NDArray[Any]
 
@@ -58,6 +61,35 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.start)
+
+    def equals(self, other: Trace) -> bool:
+        """Whether the two are one curve, number by number."""
+        if (self.names, self.modes, len(self)) != (other.names, other.modes, len(other)):
+            return False
+        names = ("start", "end", "mode", "coefficients", "depth")
+        same = (np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+        return all(same) and self._strips() == other._strips()
+
+    def _strips(self) -> list[str]:
+        numbers: list[int] = self.strip.tolist()
+        return [self.edges[k] if k >= 0 else "" for k in numbers]
+
+    @cached_property
+    def doubt(self) -> Array:
+        """How far rounding may move any point of each piece that is computed from its coefficients.
+
+        To find the share of a piece and shift its polynomial there takes some 8 p roundings of numbers that add up to
+        no more than the coefficients but the first, and p that are added to the first. Where nothing moves nothing is
+        rounded.
+        """
+        first = np.sqrt(np.sum(self.coefficients[:, 0] ** 2, axis=1))
+        added = (self.coefficients.shape[1] + 4) * UNIT * first
+        return self.roughness + np.where(self.roughness > 0, added, 0.0)
+
+    @cached_property
+    def roughness(self) -> Array:
+        """The same for differences of points, to which the first coefficient adds nothing."""
+        return (8 * self.coefficients.shape[1] + 16) * UNIT * sizes(self.coefficients[:, 1:])
 
     def find(self, times: Array) -> Array:
         """Return the piece that begins at or holds each time, seen from the right."""

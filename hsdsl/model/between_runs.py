@@ -46,6 +46,7 @@ def distance(
     model: Model | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     coordinates: Sequence[str] | None = None,
+    hops: int | None = None,
     seconds: float = SECONDS,
     watch: Callable[[float, float], None] | None = None,
 ) -> CurveDistance:
@@ -66,6 +67,9 @@ def distance(
         these values. Where the second run has others, the note says so.
     coordinates : names, optional
         For ``rho-hat``: the states that count as the position.
+    hops : int, optional
+        For ``rho``, ``quotient`` and ``relaxed``: the most passages of a path; left out, eight more than the fewest
+        that connect the modes. The lower end holds for paths with more, too.
     seconds : float
         For ``rho``, ``quotient`` and ``relaxed``: about how long the search may take. When they are over the interval
         is what is known by then, and the note says so.
@@ -82,10 +86,23 @@ def distance(
         Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
         since.
     """
-    source = _Source(run, other, model, parameters or {}, budget_of(seconds, watch))
+    check_hops(hops)
+    source = _Source(run, other, model, parameters or {}, budget_of(seconds, watch), hops)
     depth = None if relaxation is None else source.number(relaxation)
-    found = between(metric, Request(run, other, source.space, depth, coordinates))
+    found = between(metric, Request(run, other, source.space, depth, coordinates, hops))
     return replace(found, note="\n".join(filter(None, (found.note, source.note))))
+
+
+def check_hops(hops: int | None) -> None:
+    """Refuse a number of passages that is none.
+
+    Raises
+    ------
+    UsageError
+        It is negative or no whole number.
+    """
+    if hops is not None and not (hops >= 0 and hops == int(hops)):
+        raise UsageError(f"hops must be a whole number, not {hops}")
 
 
 class _Source:
@@ -98,9 +115,10 @@ class _Source:
         model: Model | str | os.PathLike[str] | None,
         parameters: Mapping[str, Any],
         budget: Budget,
+        hops: int | None = None,
     ) -> None:
-        self.run, self.other, self.model, self.parameters, self.budget = run, other, model, parameters, budget
-        self.note = ""
+        self.run, self.other, self.model, self.parameters = run, other, model, parameters
+        self.budget, self.hops, self.note = budget, hops, ""
 
     @cached_property
     def values(self) -> Values:
@@ -133,7 +151,7 @@ class _Source:
 
         space = make_space(self.values.system, [float(v) for v in self.values.parameters])
         self.budget.start()
-        return SpaceMetric(space, depth, self.budget)
+        return SpaceMetric(space, depth, self.budget, self.hops)
 
 
 def _differ(first: Values, second: Values) -> str:
@@ -163,6 +181,7 @@ def plot_distance(
     relaxation: Any = None,
     model: Model | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
+    hops: int | None = None,
     seconds: float = SECONDS,
 ) -> None:
     """Draw the distance of two runs over time, beside the difference of their states; see :func:`distance`.
@@ -178,7 +197,7 @@ def plot_distance(
     from hsdsl.plot.over_time import plot_over_time
 
     check_same_model(run, other)
-    source = _Source(run, other, model, parameters or {}, budget_of(seconds))
+    source = _Source(run, other, model, parameters or {}, budget_of(seconds), hops)
     depth = None if relaxation is None else source.number(relaxation)
     found = profiles(run, other, source.space(depth), depth)
     words = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}

@@ -358,7 +358,8 @@ class Model:
         parameters : mapping, optional
             Overrides by name.
         hops : int, optional
-            The most passages of a path.
+            The most passages of a path; left out, eight more than the fewest that connect the modes. The lower end
+            holds for paths with more, too.
         seconds : float
             About how long the search may take; then the interval is what is known by then, and ``certified`` says so.
         plot : path, optional

@@ -16,6 +16,7 @@ from hsdsl.metrics.geometry import TOLERANCE, Space
 from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.metrics.table import CURVE_METRICS
+from hsdsl.model.between_runs import check_hops
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate.stops import show
@@ -44,12 +45,10 @@ def distance_of_points(
     depth = None if metric == "quotient" else _relaxation(values, relaxation)
     if metric == "quotient" and relaxation is not None:
         raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
-    if hops is not None and not (hops >= 0 and hops == int(hops)):
-        raise UsageError(f"hops must be a whole number, not {hops}")
+    check_hops(hops)
     space = make_space(values.system, [float(v) for v in values.parameters])
     start, end = (read_place(values, space, given) if isinstance(given, str) else given for given in (p, q))
-    for place in (start, end):
-        _check_inside(space, place)
+    _check_inside(space, start, end)
     budget.start()
     try:
         found = distance(space, start, end, depth, hops, budget)
@@ -120,14 +119,16 @@ def _default(values: Values) -> float:
     return least_relaxation(float(DEFAULTS["relaxation"]), float(values.constant("until")[0]))
 
 
-def _check_inside(space: Space, place: Place) -> None:
-    """Refuse a point that is in no domain: the distance is between points of the space."""
+def _check_inside(space: Space, *places: Place) -> None:
+    """Refuse points that are in no domain: the distance is between points of the space."""
     try:
-        mode, x = coordinates(space, place)
+        found = [coordinates(space, place) for place in places]
     except ValueError as error:
         raise UsageError(str(error)) from error
-    excess, text = space.domains[mode].excess(x)
-    if not excess <= TOLERANCE:
-        at = ", ".join(f"{n} = {show(v)}" for n, v in zip(space.domains[mode].coordinates, x.tolist(), strict=True))
-        beyond = f"beyond `{text}`" if np.isfinite(excess) else f"where `{text}` has no value"
-        raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")
+    size = max(float(np.linalg.norm(x)) for _, x in found)
+    for place, (mode, x) in zip(places, found, strict=True):
+        excess, text = space.domains[mode].excess(x, size)
+        if not excess <= TOLERANCE:
+            at = ", ".join(f"{n} = {show(v)}" for n, v in zip(space.domains[mode].coordinates, x.tolist(), strict=True))
+            beyond = f"where `{text}` has no value" if np.isnan(excess) else f"beyond `{text}`"
+            raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")

@@ -16,7 +16,7 @@ def test_json_has_both_ends_and_the_path(command):
     found = answer.json
     assert found["lower"] <= 9 <= found["upper"]
     assert found["upper"] - found["lower"] < 1e-8
-    assert (found["metric"], found["certified"]) == ("quotient", "certified")
+    assert (found["metric"], found["certified"], found["status"]) == ("quotient", "certified", "certified")
     assert [piece["edge"] for piece in found["path"]] == ["impact", "impact", None]
     assert [piece["forward"] for piece in found["path"]] == [True, False, None]
 
@@ -28,6 +28,14 @@ def test_relaxed_metric_and_overridden_parameter(command):
     )
     assert answer.json["lower"] <= 1e-3 <= answer.json["upper"]
     assert answer.json["upper"] < 1.001e-3
+
+
+def test_a_cap_on_hops_is_an_option_and_said(command):
+    states = ("--from", "free x=14 v=10", "--to", "free x=14 v=20")
+    answer = command("distance", MODEL, *states, "--hops", "1", "--json")
+    assert answer.json["status"] == "up to 1 hops"
+    assert answer.json["lower"] <= 9 <= 10 <= answer.json["upper"]
+    assert "(certified up to 1 hops)" in command("distance", MODEL, *states, "--hops", "1").out
 
 
 def test_sentence(command):

@@ -34,7 +34,7 @@ def test_one_object_on_standard_output(ask, folder):
     asked = ask("coarse.npz", "fine.npz", "--json")
     found = asked.json
     assert asked.code == 0
-    assert list(found) == ["metric", "lower", "upper", "time", "span", "note"]
+    assert list(found) == ["metric", "lower", "upper", "status", "time", "span", "note"]
     assert found["metric"] == "rho"
     assert 0 < found["lower"] <= found["upper"] <= 1.05 * found["lower"]
     assert found["span"] == [0.0, 24.0]

@@ -55,7 +55,8 @@ def test_agrees_with_a_fine_graph(modes, stretch, toll):
             passages = sum(piece.edge is not None for piece in found.path)
             assert found.interval.lower <= expected + 1e-9
             assert expected <= found.interval.upper + spacing * passages + 1e-9
-            assert found.interval.width <= 1e-9 * found.interval.upper + 1e-13
+            if found.status == "certified":
+                assert found.interval.width <= 1e-9 * found.interval.upper + 1e-13
 
 
 points = st.tuples(

@@ -86,6 +86,9 @@ def test_exact_distances_in_the_plane(name, space):
         assert found.time == pytest.approx(time, abs=1e-3)
 
 
+ROUNDING = 1e-13  # what the ends are widened by, for states of about 1
+
+
 @pytest.mark.parametrize("space", [Plane(), Bent()], ids=["convex", "points only"])
 def test_curves_that_coincide_in_different_modes(space):
     """The distance is 0, and what can be certified falls with the number of points looked at, no faster."""
@@ -97,7 +100,7 @@ def test_curves_that_coincide_in_different_modes(space):
 
 def test_of_several_transitions_at_one_instant_only_the_last_value_counts():
     found = rho(two_modes(1.0, instant="c"), two_modes(1.0), Plane())
-    assert (found.lower, found.upper) == (0.0, 0.0)
+    assert found.lower == 0.0 and found.upper < ROUNDING
 
 
 class Counting(Bent):
@@ -116,8 +119,7 @@ def test_few_point_distances_decide_many_samples():
     a, b = ramp((0, 0), (2, 2), cuts=cuts), ramp((0, 5), (2, 2.5), cuts=cuts[::3])
     space = Counting()
     found = rho(a, b, space)
-    assert found.lower == 5.0
-    assert found.upper <= 5.0 * (1 + 2e-6)
+    assert 5.0 - ROUNDING < found.lower <= 5.0 <= found.upper <= 5.0 * (1 + 2e-6)
     assert space.asked < 200
 
 
@@ -129,7 +131,7 @@ class Clock(Bent):
 
 def test_time_as_a_coordinate_counts_as_way():
     found = rho(ramp((0, 0), (2, 2)), ramp((0, 0.5), (2, 2.5)), Clock())
-    assert found.lower == pytest.approx(0.5, abs=1e-15)
+    assert found.lower == pytest.approx(0.5, abs=ROUNDING)
     assert 0.5 <= found.upper <= 0.5 * 1.002
 
 
@@ -150,9 +152,9 @@ def test_values_are_compared_with_values_and_left_limits_with_left_limits():
     draft.arc("m", ("x",), 1, [(1.0, [5.0], [], 0.0, []), (2.0, [6.0], [], 0.0, [])])
     a = draft.make()
     b = replace(a, values=a.values + 0.25)
-    assert rho(a, b, Plane()).lower == 0.25
-    assert sup_norm(a, b).lower == 0.25
-    assert rho_hat(a, b).lower == 0.25
+    assert rho(a, b, Plane()).lower == pytest.approx(0.25, abs=ROUNDING)
+    assert sup_norm(a, b).lower == pytest.approx(0.25, abs=ROUNDING)
+    assert rho_hat(a, b).lower == pytest.approx(0.25, abs=ROUNDING)
 
 
 def test_the_value_at_the_very_end_counts():
@@ -161,7 +163,7 @@ def test_the_value_at_the_very_end_counts():
     draft.transition(1.0, 1.0, "go", "m", "m", {"x": 1.0}, {"x": 5.0})
     draft.arc("m", ("x",), 1, [(1.0, [5.0], [], 0.0, [])])
     a, b = draft.make(), ramp((0, 0), (1, 1))
-    assert rho(a, b, Plane()).lower == 4.0
+    assert rho(a, b, Plane()).lower == pytest.approx(4.0, abs=ROUNDING)
     assert skorokhod(a, b).lower > 3.9
 
 
@@ -176,9 +178,9 @@ def test_a_bounce_a_little_later_is_a_little_far_in_the_quotient_only():
 
 def test_a_strip_counts_by_its_depth_only_on_the_relaxed_space():
     a, b = strip(0.25, 0.25), strip(0.25, 0.125)
-    assert rho(a, b, Plane()).upper == 0.0
+    assert rho(a, b, Plane()).upper < ROUNDING
     relaxed = rho(a, b, Plane(), relaxation=0.25)
-    assert relaxed.lower == 0.125
+    assert relaxed.lower == pytest.approx(0.125, abs=ROUNDING)
     assert relaxed.upper <= 0.125 * (1 + 2e-6)
 
 
@@ -201,7 +203,7 @@ def test_no_common_time_is_refused():
 
 
 def test_an_instant_in_common_is_enough():
-    assert rho(ramp((0, 0), (2, 2)), ramp((2, 5), (3, 6)), Plane()).lower == 3.0
+    assert rho(ramp((0, 0), (2, 2)), ramp((2, 5), (3, 6)), Plane()).lower == pytest.approx(3.0, abs=ROUNDING)
 
 
 def test_a_run_that_is_not_finite_is_refused():
@@ -266,8 +268,9 @@ def test_rho_hat_takes_the_first_runs_times_and_the_coordinates_asked_for():
 
 def test_modes_that_differ_are_one_apart():
     a, b = two_modes(1.0), two_modes(1.5)
-    assert (sup_norm(a, b).lower, sup_norm(a, b).upper) == (1.0, 1.0)
-    assert sup_norm(a, two_modes(1.0, gone=("a", "c"))).lower == 1.0
+    found = sup_norm(a, b)
+    assert 1.0 - ROUNDING < found.lower <= 1.0 <= found.upper < 1.0 + ROUNDING
+    assert sup_norm(a, two_modes(1.0, gone=("a", "c"))).lower == pytest.approx(1.0, abs=ROUNDING)
     shared = skorokhod(a, b)
     assert shared.lower <= 0.5 <= shared.upper <= 0.51  # the switch is retimed by 1/2, and x = t with it
     assert shared.lower == 0.5  # no retiming moves the switch by less
@@ -323,7 +326,7 @@ def test_closeness_counts_jumps():
 def test_closeness_sees_an_instant_in_another_mode():
     a, b = two_modes(1.0, instant="c"), two_modes(1.0, instant="d")
     assert tau_epsilon(a, b).lower == 1.0
-    assert skorokhod(a, b).upper == 0.0  # right-continuous curves do not
+    assert skorokhod(a, b).upper < ROUNDING  # right-continuous curves do not
 
 
 def test_runs_of_different_models_are_refused():
@@ -382,7 +385,7 @@ def test_every_metric_is_documented_and_answers_to_its_name(metric):
 
 def test_the_profile_holds_both_sides_of_a_transition():
     found = profiles(two_modes(1.0), two_modes(1.5), Plane())
-    assert found["rho"].upper.max() == 0.0
+    assert found["rho"].upper.max() < ROUNDING
     labels = found["sup"]
     assert labels.times.tolist() == [0.0, 1.0, 1.0, 1.5, 1.5, 2.0, 2.0, 2.0]
-    assert labels.lower.tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    assert labels.lower.tolist() == pytest.approx([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], abs=ROUNDING)

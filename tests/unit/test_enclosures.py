@@ -65,6 +65,14 @@ def test_enclosures_of_points_are_as_narrow_as_rounding():
     assert np.all(above - below <= 1e-13)
 
 
+def test_pi_is_enclosed_where_it_is_a_bound():
+    """The nearest float is below pi: where atan2 jumps and acos ends, the enclosure goes beyond it."""
+    low, high = np.array([[-1.0, -1.0]]), np.array([[1.0, -0.5]])
+    below, above = made("atan2(x, y)").ranges(low, high)
+    assert below[0, 0] < -np.pi and above[0, 0] > np.pi
+    assert made("acos(x)").ranges(np.array([[-1.0, 0.0]]), np.array([[-1.0, 0.0]]))[1][0, 0] > np.pi
+
+
 def test_where_a_formula_has_no_value_nothing_is_concluded():
     low, high = np.array([[-1.0, 0.0]]), np.array([[1.0, 0.0]])
     for text in ("sqrt(x)", "log(x)", "1/x", "asin(2*x)", "tan(2*x)"):

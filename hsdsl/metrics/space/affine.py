@@ -5,19 +5,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
-import numpy as np
 import sympy as sp
 
 from hsdsl import functions
+from hsdsl.metrics.rational import Row, Vector
+
+DIGITS = 60  # of a number that is not rational
 
 
 @dataclass(frozen=True)
 class Affine:
-    """``gradient @ x + constant``."""
+    """``gradient . x + constant``."""
 
-    gradient: np.ndarray
-    constant: float
+    gradient: Vector
+    constant: Fraction
+
+    @property
+    def row(self) -> Row:
+        """The inequality that it is at most 0."""
+        return self.gradient, -self.constant
 
 
 def affine(expression: sp.Expr, symbols) -> Affine | None:
@@ -30,11 +38,16 @@ def affine(expression: sp.Expr, symbols) -> Affine | None:
     if any(g.free_symbols & own for g in gradient):
         return None
     constant = expression.xreplace(dict.fromkeys(symbols, sp.S.Zero))
-    numbers = np.array([float(sp.N(v, 20)) for v in (*gradient, constant)])
-    return Affine(numbers[:-1], float(numbers[-1])) if np.all(np.isfinite(numbers)) else None
+    numbers = [_rational(v) for v in (*gradient, constant)]
+    if any(v is None for v in numbers):
+        return None
+    return Affine(tuple(numbers[:-1]), numbers[-1])
 
 
-def stack(rows: list[Affine], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows as inequalities: normals and levels."""
-    normals = np.array([r.gradient for r in rows]).reshape(len(rows), size)
-    return normals, np.array([-r.constant for r in rows])
+def _rational(value: sp.Expr) -> Fraction | None:
+    if not value.is_Rational:
+        value = sp.N(value, DIGITS)
+        if not (value.is_Float and value.is_finite):
+            return None
+        value = sp.Rational(value)
+    return Fraction(int(value.p), int(value.q))

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-import numpy as np
 import sympy as sp
 
 from hsdsl import functions
@@ -19,9 +18,8 @@ from hsdsl.errors import UsageError
 from hsdsl.expression.stack import deep_stack
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
-from hsdsl.metrics.polyhedra import pieces_of
+from hsdsl.metrics.polyhedra import gate_of, unit_rows
 from hsdsl.metrics.space.affine import affine as as_affine
-from hsdsl.metrics.space.affine import stack
 from hsdsl.metrics.space.conditions import clauses
 from hsdsl.metrics.space.formulas import formula
 from hsdsl.metrics.space.images import equations
@@ -123,11 +121,11 @@ class _Maker:
                 curved.append(self._formula((residual,), j))
                 curved_texts.append(surface.text)
             else:
-                rows.append(row)
+                rows.append(row.row)
                 texts.append(surface.text)
         coordinates = self.states[j] + ("t",) * self.timed
-        normals, levels = stack(rows, len(coordinates))
-        return Domain(mode.name, coordinates, normals, levels, tuple(curved), (*texts, *curved_texts))
+        normals, levels = unit_rows(rows, len(coordinates))
+        return Domain(mode.name, coordinates, normals, levels, tuple(curved), (*texts, *curved_texts), tuple(rows))
 
     def _guard(self, j: int, edge: Edge, clause, domains, gates: list[Gate], curved: list[CurvedGate]) -> None:
         k = [m.name for m in self.system.modes].index(edge.target)
@@ -153,14 +151,11 @@ class _Maker:
             curved.append(CurvedGate(edge.name, j, k, *made))
             return
         rows = [(c, as_affine(c, self.symbols[j])) for c in conditions]
-        normals, levels = stack([r for _, r in rows if r is not None], len(self.symbols[j]))
         bent = (*domains[j].curved, *(self._formula((c,), j) for c, r in rows if r is None))
-        linear = np.array([f.gradient for f in flat[1:]]).reshape(len(reset), len(self.symbols[j]))
-        gates += pieces_of(
-            edge.name, (j, domains[j]), (k, domains[k]), (flat[0].gradient, -flat[0].constant),
-            (np.vstack([domains[j].normals, normals]), np.concatenate([domains[j].levels, levels])),
-            (linear, np.array([f.constant for f in flat[1:]])), bent,
-        )  # fmt: skip
+        reset_to = tuple(f.gradient for f in flat[1:]), tuple(f.constant for f in flat[1:])
+        inequalities = [*domains[j].rows, *(r.row for _, r in rows if r is not None)]
+        gate = gate_of(edge.name, (j, k), flat[0].row, inequalities, reset_to, domains[k].rows, bent)
+        gates += [] if gate is None else [gate]
 
     def _image_symbols(self, edge: Edge) -> list[sp.Symbol]:
         return [*map(_symbol, edge.target_states), *(TIME,) * self.timed]
