@@ -43,11 +43,16 @@ def _claimed(folder: Path) -> tuple[Path, int]:
     while True:
         path = folder / f"{BEFORE}{secrets.token_hex(6)}{AFTER}"
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-        with suppress(OSError):  # a file system without locks
+        try:
             _lock(descriptor)
+        except BlockingIOError:  # another writer took it for left, and removes it
+            os.close(descriptor)
+            continue
+        except OSError:
+            pass  # a file system without locks
         if path.exists():
             return path, descriptor
-        os.close(descriptor)  # another process took it for left before it was locked
+        os.close(descriptor)
 
 
 def _lock(descriptor: int) -> None:

@@ -127,8 +127,7 @@ class Steps:
 
     def scales(self, closer: bool) -> Sequence[Number]:
         """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
-        assert self._tried is not None
-        if closer and self._smooth:
+        if closer and self._smooth and self._tried is not None:
             with suppress(*DOMAIN_ERRORS):
                 self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic)
                 lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))

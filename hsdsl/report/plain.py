@@ -13,7 +13,7 @@ import numpy as np
 from hsdsl import decimals
 from hsdsl.execution import Execution, Transition
 
-STAGES = ("load", "compile", "simulate", "verdict")
+STAGES = ("load", "compile", "simulate")
 WIDTH = 100
 
 

@@ -45,7 +45,10 @@ class Chunks:
         wanted = min(max(rows, self._before), MOST_ROWS, memory // self._shape.row_bytes)
         wanted = max(wanted, LEAST_ROWS)
         if wanted > self._rows:
-            self._open(int(wanted))
+            try:
+                self._open(int(wanted))
+            except MemoryError:
+                self._open(LEAST_ROWS)
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large; a small one where no more may be kept."""

@@ -26,7 +26,9 @@ def crowded(recorder: Recorder, free: int, t: Number) -> None:
 
 
 def at_rest(recorder: Recorder, edge: str, start: Number, end: Number) -> None:
-    """The state rested on a guard."""
+    """The state rested on a guard; for less than can be seen, that is no rest."""
+    if show(start) == show(end):
+        return
     recorder.depart(None, f"at rest on the guard of {edge} from t = {show(start)} to t = {show(end)}")
 
 

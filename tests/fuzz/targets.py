@@ -48,7 +48,7 @@ _GENERATED = re.compile(
 )
 _GENERATED_C = re.compile(
     r"Generated|from|a|model|see|h|for|what|the|tables|mean|include|static|extern|const|restrict|int|double|void|return"
-    r"|[ptx]|out|bad|hs|hs_\w+|HS_\w+|(?:routine|routines|edges|modes|walls|inputs|[a-z])_?\d+(?:_\d+)?|NAN|INFINITY"
+    r"|[ptx]|out|bad|hs|hs_\w+|HS_\w+|(?:routine|routines|edges|modes|walls|inputs|state|[a-z])_?\d+(?:_\d+)?|NAN|INFINITY"
     r"|(?:series|surface_series|flow_lines|surface_lines|surface_line|jacobian)_\d+|i|place|order|lines|length|size_t|[ck]|for|if|else"
 )
 _HEXADECIMAL = re.compile(r"\b0x[0-9a-f.]+p[-+]\d+")

@@ -9,6 +9,7 @@ import hsdsl
 MODEL = Path(__file__).parents[2] / "models" / "stiff-switch.yaml"
 LAST = 4.999999646216
 UNDECIDED = "a transition of switch_down within the error of the end is undecided"
+UNRELIABLE = "the run is unreliable from t = 4.99999"  # a finer run makes the last switch
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +21,7 @@ def model():
 def test_loose_tolerances_say_that_it_is_undecided(model, tolerance):
     verdict = model.simulate(tolerance=tolerance).verdict
     assert verdict.theorem == "unknown"
-    assert any(UNDECIDED in reason for reason in verdict.reasons)
+    assert any(UNDECIDED in reason or UNRELIABLE in reason for reason in verdict.reasons)
 
 
 @pytest.mark.parametrize("tolerance", [1e-7, 1e-8, 1e-9])

@@ -60,7 +60,7 @@ experiment: {{until: 1}}
         program = Model(elaborate("random.yaml", text=text.encode())).program
     except Exception:  # the language refuses what has no value anywhere, such as 1/0
         return None
-    data = [0.35, 1.0, 0.2, 0.0]
+    data = [0.35, 1.0, 0.2, 0.0, *(1.0 for _ in program.switches)]
     both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
     return both[0].bind(0, data), both[1].bind(0, data)
 

@@ -39,7 +39,8 @@ experiment: {{until: 1}}
     except Exception:  # the language refuses what has no value anywhere, such as 1/0
         return None
     both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
-    found = both[0].taylor(0, DATA), both[1].taylor(0, DATA)
+    data = [*DATA, *(1.0 for _ in program.switches)]
+    found = both[0].taylor(0, data), both[1].taylor(0, data)
     assert (found[0] is None) == (found[1] is None)
     return None if found[0] is None or found[1] is None else (found[0], found[1])
 

@@ -61,7 +61,7 @@ experiment: {{until: 1}}
         kernel = PythonKernel(program, arithmetic)
         data = [kernel.constant("parameter_0", ())[0], *(arithmetic.zero + n for n in (1, 0, 0))]
         data[2] = arithmetic.constant(__import__("fractions").Fraction(1, 5))
-        bound.append(kernel.bind(0, data))
+        bound.append(kernel.bind(0, [*data, *(arithmetic.zero + 1 for _ in program.switches)]))
     return bound
 
 
