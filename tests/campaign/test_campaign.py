@@ -79,7 +79,7 @@ def test_no_wrong_run_holds(name):
     judge(name, FEW, "located")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", FAMILIES)
 def test_no_wrong_run_holds_among_many(name):
     counted = judge(name, MANY, "located")
@@ -88,7 +88,7 @@ def test_no_wrong_run_holds_among_many(name):
         assert counted["right unknown"] <= MOST_DOUBTED * MANY, counted
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", [name for name in FAMILIES if name not in RELAXED_MAY_MISS])
 def test_no_wrong_relaxed_run_holds_among_many(name):
     print(name, dict(judge(name, FEW * 10, "relaxed")))

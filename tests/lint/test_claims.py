@@ -9,7 +9,7 @@ def test_no_run_contradicts_a_claim(seed):
     assert Attack(seed, starts=4).all().wrong == []
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("part", range(10))
 def test_no_run_of_a_long_campaign_contradicts_a_claim(part):
     attacks = [Attack(seed).all() for seed in range(100 * part, 100 * part + 100)]

@@ -72,6 +72,6 @@ def test_guards_of_time_and_inputs_fire_while_a_state_rests() -> None:
     assert check(range(12)) > 12
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_many_guards_fire_while_a_state_rests() -> None:
     assert check(range(100, 500)) > 400

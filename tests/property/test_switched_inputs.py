@@ -88,7 +88,7 @@ def drawn(rng: random.Random, depth: int) -> Affine:
     return getattr(one, kind)(*([drawn(rng, depth - 1)] if kind in ("plus", "min", "max") else []))
 
 
-@pytest.mark.parametrize("seed", [*range(25), *(pytest.param(s, marks=pytest.mark.slow) for s in range(25, 300))])
+@pytest.mark.parametrize("seed", [*range(25), *(pytest.param(s, marks=pytest.mark.campaign) for s in range(25, 300))])
 def test_runs_integrate_inputs_exactly(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
     u, v = drawn(rng, rng.randint(1, 4)), drawn(rng, rng.randint(1, 3))

@@ -191,7 +191,7 @@ def test_what_was_passed_stays_transparent_until_it_is_left() -> None:
     assert sum(check(seed, SETTINGS, ["python"]) for seed in range(30)) > 20
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("block", range(8))
 def test_many_passed_surfaces_stay_transparent(block: int) -> None:
     for seed in range(1000 + 50 * block, 1050 + 50 * block):

@@ -66,7 +66,7 @@ def test_no_false_end_in_eight_units(tmp_path):
     assert found == [] and count == 128
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("block", range(10))
 def test_two_thousand_distances_in_eight_units(tmp_path, block):
     found, count = faults(tmp_path, range(40 * block, 40 * block + 40), 5)
