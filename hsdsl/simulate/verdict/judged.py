@@ -30,11 +30,9 @@ def judged(run: Looking, place: Place, k: int, row: int, how: str) -> Finding | 
     if conditional and not may_hold(run, place, k, row):
         return None
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
-    if value > _level(run, place, k) and not conditional:
+    if value > _level(run, place, k):
         sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
         return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
-    if value > 0 and conditional:
-        return None
     margin = abs(value) / shift if shift > 0 else run.arithmetic.zero + float("inf")
     if margin < SAFE:
         return Finding("miss", "unknown", f"the run {how} {where}, {times(margin)} the error away")

@@ -124,8 +124,9 @@ def _turned(run: Looking, arc: Arc, each: Open) -> Finding | None:
     try:
         places = [look(run.arithmetic.zero + s) for s in _shares(each)]
         place = max(places, key=lambda place: place.value(k))
-        if has_condition(place, k) and not may_hold(run, place, k, each.row + 1):
-            return None
+        beyond = has_condition(place, k) and look(run.arithmetic.zero).value(k) > 0
+        if beyond or (has_condition(place, k) and not may_hold(run, place, k, each.row + 1)):
+            return None  # transparent there
         if finding := judged(run, place, k, each.row + 1, "turns back close to"):
             return finding
         sentence = f"whether {place.name(k)} is reached close to t = {show(place.t)} could not be decided"
