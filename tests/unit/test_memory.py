@@ -68,6 +68,7 @@ def test_memory_that_is_refused_by_the_system_ends_a_run_as_well(monkeypatch):
 
     original = np.empty
     model = hsdsl.load(OSCILLATOR)
+    monkeypatch.setattr(chunks, "MOST_ROWS", 1 << 14)  # what the tests before have left room for
     monkeypatch.setattr(chunks.np, "empty", empty)
     run = model.simulate(engine="c", step=1e-7, method="rk4", until=1)
     monkeypatch.undo()
