@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOM = 2 << 30  # bytes for a process of tests, and for each that it starts
+ROOM = 4 << 30  # bytes of addresses for a process of tests, and for each that it starts; memory in use is far less
 
 
 def pytest_sessionstart() -> None:
