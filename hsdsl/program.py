@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-JUMPS = re.compile(r"\b(?:sign|floor)\(")
+JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 Hold = Literal["zero", "linear"]
 
 
@@ -177,8 +177,9 @@ class ModeProgram:
 
     @property
     def jumps(self) -> bool:
-        """Whether the flow has `sign` or `floor`, which jump."""
-        return any(JUMPS.search(text) for text in self.flow_texts)
+        """Whether the flow has `sign`, `floor` or `atan2`, which jump; those of time alone are boundaries of steps."""
+        flow = self.routines.source.partition("def flow(")[2].partition("    def ")[0]
+        return JUMPS.search(flow) is not None
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
 
-TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
-
 
 def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
     """Look at every transition that the flow made."""
@@ -64,11 +62,9 @@ def _findings(
 ) -> list[Finding]:
     found: list[Finding] = []
     where = f"{made.edge} at t = {show(made.time)}"
-    gradient, slope = place.kernel.gradients[k](place.t, *place.x), place.kernel.flow(place.t, *place.x)
-    size = abs(gradient[0]) + sum((abs(g * f) for g, f in zip(gradient[1:], slope, strict=True)), rate * 0)
-    if not any(gradient):
+    if not any(place.kernel.gradients[k](place.t, *place.x)):
         return [Finding("flat", "unknown", f"the surface of {where} has no slope there")]
-    if not rate > TANGENT_UNITS * run.arithmetic.unit * size:
+    if not rate > place.rate_roundoff(k):
         return [Finding("tangency", "left", f"the flow is tangent to the surface of {where}")]
     if margin is not None and margin < SAFE:
         found.append(

@@ -18,7 +18,7 @@ from hsdsl.enclosures import as_range
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.looking import Looking, jumping, visited
+from hsdsl.simulate.verdict.looking import Looking, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 14
@@ -29,7 +29,8 @@ STEEP = re.compile(r"\b(?:sqrt|asin|acos|acosh)\(|\*\* *(?:\(|[a-zA-Z_]|\d*\.|\d
 
 def flows(run: Looking) -> tuple[list[Finding], list[str]]:
     """Look at the flow of every mode along all steps in it."""
-    found = [_jumping(modes) for modes in [[m for m in visited(run) if jumping(m)]] if modes]
+    jumping = [mode for mode in visited(run) if mode.jumps]
+    found = [_jumping(jumping)] if jumping else []
     if run.errors is None:
         return found, []
     for steps in steps_of(run):

@@ -12,13 +12,13 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Transition
 from hsdsl.integrators.stepper import State
+from hsdsl.program import JUMPS
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.looking import Looking, jumps
+from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
 
-TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 ALONG = 1e-3  # of what a surface may change by: less is along it
 ROUNDS = 3  # of Newton's method, back onto a guard
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
@@ -50,14 +50,14 @@ def _on(run: Looking, arc: Arc, place: Place, k: int, made: Transition | None) -
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
     if arc.first == 0:
-        if abs(value) <= noise and (conditional or abs(rate) <= _still(run, place, k)):
+        if abs(value) <= noise and (conditional or abs(rate) <= place.rate_roundoff(k)):
             how = "which has an `if`" if conditional else "to which the flow is tangent"
             yield Finding("start", "unknown", f"the run starts on {where}, {how}")
         return
     shift = run.shift(place, k, arc.first)
     if made is None or _tied(run, made) or abs(value) > SAFE * shift + noise:
         return
-    if rate > _still(run, place, k) and not conditional:
+    if rate > place.rate_roundoff(k) and not conditional:
         return  # it is crossed at once, on either side of it
     if _keeps(run, made, k, value):
         return
@@ -71,12 +71,6 @@ def _tied(run: Looking, made: Transition) -> bool:
     """Whether a transition follows another at one instant: `choices` looks at these."""
     before = run.transitions[made.index - 1] if made.index else None
     return before is not None and before.resumed is not None and made.time - before.resumed <= run.tie(made.time)
-
-
-def _still(run: Looking, place: Place, k: int) -> Number:
-    gradient, slope = place.kernel.gradients[k](place.t, *place.x), place.kernel.flow(place.t, *place.x)
-    size = abs(gradient[0]) + sum((abs(g * f) for g, f in zip(gradient[1:], slope, strict=True)), run.arithmetic.zero)
-    return TANGENT_UNITS * run.arithmetic.unit * size
 
 
 def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
@@ -126,7 +120,7 @@ def _continuous(run: Looking, made: Transition) -> Iterator[Finding]:
     if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
         yield Finding("input", "unknown", f"an input jumps within the error of the time of {where}")
     edge = place.mode.edges[k]
-    if made.after is None or not any(map(jumps, edge.reset_texts)):
+    if made.after is None or not any(map(JUMPS.search, edge.reset_texts)):
         return
     error = run.around(place, run.row_at(made.time))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,8 +19,6 @@ from hsdsl.simulate.run import Run
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
-
-JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 
 
 @dataclass(frozen=True)
@@ -200,11 +197,8 @@ class Looking:
         assert self.errors is not None
         columns = self.errors.columns
         sizes = tuple(float(self.errors.sizes[row, columns[name]]) for name in place.mode.states)
-        return self.surfaces_of(place, sizes).noise(k, place.t, place.x, entry=True)
-
-    def surfaces_of(self, place: Place, scale: State) -> Surfaces:
-        """A place's surfaces, its states having been computed from numbers of these sizes."""
-        return Surfaces(place.kernel, place.mode.edges, scale, self.arithmetic)
+        surfaces = Surfaces(place.kernel, place.mode.edges, sizes, self.arithmetic)
+        return surfaces.noise(k, place.t, place.x, entry=True)
 
     def row_at(self, t: Number) -> int:
         """The last row before a time, or at it."""
@@ -215,17 +209,7 @@ class Looking:
         return self.run.tie(t)
 
 
-def jumps(text: str) -> bool:
-    """Whether an expression may jump."""
-    return JUMPS.search(text) is not None
-
-
 def visited(run: Looking) -> list[ModeProgram]:
     """The modes that a run flowed in."""
     names = {arc.mode for arc in run.flows}
     return [mode for mode in run.run.program.modes if mode.name in names]
-
-
-def jumping(mode: ModeProgram) -> bool:
-    """Whether a mode's flow may jump, but for switches of time alone: those are boundaries of steps."""
-    return jumps(mode.routines.source.partition("def flow(")[2].partition("    def ")[0])

@@ -11,6 +11,8 @@ from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.surfaces import Surfaces
 
+TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
+
 
 @dataclass(frozen=True)
 class Place:
@@ -29,6 +31,12 @@ class Place:
     def rate(self, k: int) -> Number:
         """How fast surface k rises along the flow."""
         return self.kernel.rates[k](self.t, *self.x)[0]
+
+    def rate_roundoff(self, k: int) -> Number:
+        """Below this the rate of surface k counts as zero."""
+        gradient, slope = self.kernel.gradients[k](self.t, *self.x), self.kernel.flow(self.t, *self.x)
+        terms = (abs(g * f) for g, f in zip(gradient[1:], slope, strict=True))
+        return TANGENT_UNITS * self.surfaces.arithmetic.unit * sum(terms, abs(gradient[0]))
 
     def noise(self, k: int) -> Number:
         """Round-off of surface k."""
