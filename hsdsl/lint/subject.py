@@ -14,11 +14,11 @@ from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
 from hsdsl.lint.analysis.dynamics import Dynamics
-from hsdsl.lint.influence import Influence, influence
+from hsdsl.lint.dependence import Influence, influence
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
+from hsdsl.lint.source_expressions import SourceExpression, written
 from hsdsl.lint.units.model import Units
 from hsdsl.lint.uses import Definition, unused
-from hsdsl.lint.written import Written, written
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
@@ -72,17 +72,17 @@ class Subject:
         return tuple(found)
 
     @cached_property
-    def expressions(self) -> tuple[Written, ...]:
+    def expressions(self) -> tuple[SourceExpression, ...]:
         """Every expression of the file."""
         return tuple(written(self.document))
 
-    def written_in(self, mode: str) -> tuple[Written, ...]:
+    def written_in(self, mode: str) -> tuple[SourceExpression, ...]:
         """The expressions that belong to a mode."""
         return self._by_mode.get(mode, ())
 
     @cached_property
-    def _by_mode(self) -> dict[str | None, tuple[Written, ...]]:
-        found: dict[str | None, list[Written]] = {}
+    def _by_mode(self) -> dict[str | None, tuple[SourceExpression, ...]]:
+        found: dict[str | None, list[SourceExpression]] = {}
         for expression in self.expressions:
             found.setdefault(expression.mode, []).append(expression)
         return {mode: tuple(expressions) for mode, expressions in found.items()}
@@ -176,7 +176,7 @@ class Subject:
         """The mathematics of the rules about domains, guards and flows, with what is known of them so far."""
         return Dynamics(self.system)
 
-    def value(self, expression: Written, node: Tree | None = None) -> Any:
+    def value(self, expression: SourceExpression, node: Tree | None = None) -> Any:
         """The SymPy expression of a part of an expression, `let` and inputs substituted."""
         scope = self.reading.top if expression.mode is None else self.reading.scopes[expression.mode]
         return symbolic.number(expression.tree if node is None else node, scope, expression.scalar.value).expr

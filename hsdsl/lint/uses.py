@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from hsdsl.lint.written import Written
+from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.schema import Model
 
 _DEFINING = ("parameter", "input", "let")
@@ -31,7 +31,7 @@ class Names:
             for key, mode in document.modes.items()
         }
 
-    def used(self, expression: Written) -> Iterator[Definition]:
+    def used(self, expression: SourceExpression) -> Iterator[Definition]:
         """What an expression names, but for `t`, `pi` and the like."""
         everywhere = expression.role == "output" and expression.mode is None  # it is read in every mode
         inner = self.own.values() if everywhere else [self.own.get(expression.mode or "", {})]
@@ -42,7 +42,7 @@ class Names:
             yield from own
 
 
-def unused(document: Model, expressions: Iterable[Written]) -> frozenset[Definition]:
+def unused(document: Model, expressions: Iterable[SourceExpression]) -> frozenset[Definition]:
     """The parameters, inputs and `let` names that nothing depends on but, at most, other unused ones."""
     names = Names(document)
     tables = (names.top, *names.own.values())

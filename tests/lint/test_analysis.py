@@ -10,9 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hsdsl.functions import FUNCTIONS
-from hsdsl.lint.analysis.ladder import Ladder
+from hsdsl.lint.analysis.decide import Decider
+from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.question import Range, at_most_zero, negative, positive, zero
-from hsdsl.lint.analysis.ring import Ring, expression
 from hsdsl.lint.analysis.tape import Tape
 
 x, y, v, t = sp.symbols("x y v t", real=True)
@@ -72,7 +72,7 @@ def test_bounds_contain_every_value(expr, a, b, wide, high, p, q):
 @settings(max_examples=150, deadline=None)
 @given(EXPRESSIONS, NUMBER, NUMBER)
 def test_a_polynomial_has_the_value_of_its_expression(expr, a, b):
-    exact, again = (value(e, (a, b)) for e in (expr, expression(Ring().of(expr))))
+    exact, again = (value(e, (a, b)) for e in (expr, expression(NormalForms().of(expr))))
     if exact is not None and again is not None:
         assert abs(exact - again) <= 1e-20 * (1 + abs(exact))
 
@@ -87,7 +87,7 @@ def test_a_polynomial_has_the_value_of_its_expression(expr, a, b):
     ],
 )
 def test_what_vanishes_is_seen_to(expr):
-    assert not Ring().of(expr).terms
+    assert not NormalForms().of(expr).terms
 
 
 CIRCLE = zero(x**2 + y**2 - 1)
@@ -113,7 +113,7 @@ QUESTIONS = [
 
 @pytest.mark.parametrize(("verdict", "decided", "constraints"), QUESTIONS)
 def test_questions(verdict, decided, constraints):
-    answer = Ladder().decide(constraints, RANGES, prove=True)
+    answer = Decider().decide(constraints, RANGES, prove=True)
     assert (answer.verdict, answer.decided) == (verdict, decided)
     for constraint in constraints if answer.somewhere else ():
         found = float(constraint.expr.subs(answer.point))
@@ -121,7 +121,7 @@ def test_questions(verdict, decided, constraints):
 
 
 def test_a_search_says_how_far_it_went():
-    answer = Ladder().decide((zero(sp.exp(x) - t), positive(x - 3)), RANGES, prove=True)
+    answer = Decider().decide((zero(sp.exp(x) - t), positive(x - 3)), RANGES, prove=True)
     ((symbol, low, high),) = answer.searched
     assert symbol == x and low == -np.inf and high >= 100
 
@@ -135,11 +135,11 @@ def test_linear_questions_are_never_denied_a_point_they_have(rows, at):
         expr = a * x + b * y
         level = sp.Rational(str(at[0])) * a + sp.Rational(str(at[1])) * b
         held.append(zero(expr - level) if kind == 0 else at_most_zero(expr - level - abs(kind) + 1))
-    assert not Ladder().decide(held, RANGES, prove=True).never
+    assert not Decider().decide(held, RANGES, prove=True).never
 
 
 def test_work_is_bounded():
-    ladder = Ladder(left=0)
-    assert ladder.decide((CIRCLE, at_most_zero(half - x * y)), RANGES).verdict == "unknown"
+    decider = Decider(left=0)
+    assert decider.decide((CIRCLE, at_most_zero(half - x * y)), RANGES).verdict == "unknown"
     large = sp.Add(*(sp.sin(k * x) for k in range(2000)))
-    assert Ladder().decide((zero(large),), RANGES).verdict == "unknown"
+    assert Decider().decide((zero(large),), RANGES).verdict == "unknown"

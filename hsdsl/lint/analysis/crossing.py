@@ -18,10 +18,10 @@ from typing import Any
 
 from hsdsl.errors import Decided
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.pieces import Piece, pieces
 from hsdsl.lint.analysis.proof import Proof, closed
 from hsdsl.lint.analysis.question import positive, zero
-from hsdsl.lint.analysis.singular import breaks, discontinuities
+from hsdsl.lint.analysis.singularities import breaks, discontinuities
+from hsdsl.lint.analysis.smooth_pieces import SmoothPiece, pieces
 from hsdsl.system import Edge
 
 DEEPEST = 6  # derivatives along the flow that are looked at
@@ -64,7 +64,7 @@ class _Part:
     """The surface of an edge on one piece."""
 
     proof: Proof
-    piece: Piece
+    piece: SmoothPiece
     domain: Clause
     inside: list[Clause]
 

@@ -18,7 +18,7 @@ import sympy as sp
 
 from hsdsl.errors import Decided
 from hsdsl.expression.scope import symbol
-from hsdsl.lint.analysis.ladder import MOST_PARTS, Ladder
+from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
 from hsdsl.lint.analysis.tape import at_point, enclosure, parts_of, too_large
@@ -33,7 +33,7 @@ Clause = tuple[Constraint, ...]
 
 
 class Dynamics:
-    """A hybrid system with numbers for its parameters, and a ladder to decide questions about it.
+    """A hybrid system with numbers for its parameters, and a decider of questions about it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Dynamics:
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
         self.modes = {mode.name: mode for mode in system.modes}
-        self.ladder = Ladder()
+        self.decider = Decider()
         self._values: dict[Any, Any] = {}
         for parameter in system.parameters:
             self._values[symbol(parameter.name)] = replaced(parameter.value, self._values, {})
@@ -194,11 +194,11 @@ class Dynamics:
 
     def bounds(self, mode: Mode) -> dict[Any, tuple[Any, Any]]:
         """What a mode's surfaces say of single states: exact ends, None where there is none."""
-        return self.ladder.bounds(self.domain(mode), self.ranges(mode))
+        return self.decider.bounds(self.domain(mode), self.ranges(mode))
 
     def ask(self, mode: Mode, constraints: Iterable[Constraint], prove: bool = False) -> Answer:
         """Whether there is a point of a mode's states, inputs and time where all constraints hold."""
-        return self.ladder.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
+        return self.decider.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
 
     def ask_any(
         self, mode: Mode, alternatives: Sequence[Clause] | None, *more: Constraint, prove: bool = False
@@ -218,11 +218,11 @@ class Dynamics:
 
     def contradicts(self, mode: Mode, given: Clause, constraint: Constraint) -> bool:
         """Whether constraints and one more inequality are known to have no point."""
-        return self.ladder.contradicts(given, constraint, self.ranges(mode))
+        return self.decider.contradicts(given, constraint, self.ranges(mode))
 
     def vanishes(self, mode: Mode, expr: Any, given: Clause) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
-        return self.ladder.vanishes(expr, given, self.ranges(mode))
+        return self.decider.vanishes(expr, given, self.ranges(mode))
 
     def ranges(self, mode: Mode) -> dict[Any, Range]:
         """What is known of the values of a mode's states, of the sampled inputs and of time."""
@@ -252,7 +252,7 @@ class Dynamics:
         found: dict[str, float] = {}
         for mode in self.system.modes:
             for surface in (*(edge.surface for edge in mode.edges), *mode.walls):
-                p = self.ladder.ring.of(self.residual(surface))
+                p = self.decider.normal_forms.of(self.residual(surface))
                 for name in p.names if len(p.names) == 1 else ():
                     coefficient = linear_in(p, name)
                     level = (

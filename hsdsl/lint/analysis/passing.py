@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import strict
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, positive, zero
 from hsdsl.system import Edge
@@ -43,12 +43,12 @@ def _passed(
         for speed in dict.fromkeys((out, ())):
             clauses = [(zero(residual), *inside, *speed, *clause) for clause in conditions]
             answer = dynamics.ask_any(mode, clauses, *more)
-            if answer.somewhere and _goes_out(Local(dynamics, mode, answer.point), edge):
+            if answer.somewhere and _goes_out(ModePoint(dynamics, mode, answer.point), edge):
                 return answer
     return UNKNOWN
 
 
-def _goes_out(here: Local, edge: Edge) -> bool:
+def _goes_out(here: ModePoint, edge: Edge) -> bool:
     """Whether the flow goes out of the surface of an edge, and into all else that the point lies on."""
     domain = here.dynamics.domain(here.mode, without=edge)
     try:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from hsdsl.expression.scope import symbol
-from hsdsl.lint.analysis.singular import Expression
+from hsdsl.lint.analysis.singularities import Expression
 
 if TYPE_CHECKING:
     from hsdsl.lint.subject import ModePart, Subject

@@ -2,7 +2,7 @@
 """Sums of products of atoms with exact coefficients: equal ones are equal objects.
 
 The unknowns of such a polynomial are its *atoms*: names, pi, and what is no polynomial (``sin(x + 1)``, a square
-root, the reciprocal of a sum), whose arguments are polynomials again. `ring` makes them of expressions.
+root, the reciprocal of a sum), whose arguments are polynomials again. `normal_form` makes them of expressions.
 """
 
 from __future__ import annotations

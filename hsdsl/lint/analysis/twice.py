@@ -24,7 +24,7 @@ def twice(
     copies, ranges = dynamics.remembered(("twice", mode.name), lambda: _copies(dynamics, mode))
     for clause in alternatives:
         later = tuple(c.along(replaced(c.expr, copies, {})) for c in (*clause, again))
-        answer = dynamics.ladder.decide(tuple(dict.fromkeys((*clause, once, *later))), ranges)
+        answer = dynamics.decider.decide(tuple(dict.fromkeys((*clause, once, *later))), ranges)
         if answer.somewhere:
             return answer, {name: answer.point[copy] for name, copy in copies.items()}
     return UNKNOWN, {}

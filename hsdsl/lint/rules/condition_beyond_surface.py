@@ -51,7 +51,7 @@ from collections.abc import Iterator
 from hsdsl.lint.analysis.passing import passes_by
 from hsdsl.lint.analysis.proof import strict
 from hsdsl.lint.analysis.question import Answer, Constraint, negative, positive, zero
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 

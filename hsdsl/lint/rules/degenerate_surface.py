@@ -44,10 +44,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import negative, positive, zero
-from hsdsl.lint.analysis.words import at, within
+from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import ModePart, Subject
 from hsdsl.source import Scalar
@@ -80,7 +80,7 @@ def _look(subject: Subject, part: ModePart, surface: Surface, scalar: Scalar) ->
             hint = "compare what passes through zero, not its square"
             yield Finding(scalar.place.span, message, hint, proof.decided, severity="warning")
             return
-    if _smooth(Local(dynamics, mode, answer.point), residual):
+    if _smooth(ModePoint(dynamics, mode, answer.point), residual):
         message = f"the gradient of the surface '{surface.text}' vanishes on it {where}"
         yield Finding(scalar.place.span, message, None, answer.decided or "sampled", severity="note")
 
@@ -93,7 +93,7 @@ def _beyond(text: str, limits: str) -> str:
     return f"every state{limits} is on or beyond the surface '{text}': r is nowhere negative there"
 
 
-def _smooth(here: Local, residual: object) -> bool:
+def _smooth(here: ModePoint, residual: object) -> bool:
     """Whether the function has a gradient at a point."""
     try:
         here.piece(residual, {})

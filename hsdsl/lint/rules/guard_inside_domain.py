@@ -50,7 +50,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.passing import passes_by
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 

@@ -57,7 +57,7 @@ from collections.abc import Iterator
 
 from hsdsl.lint.analysis.crossing import uncrossed
 from hsdsl.lint.analysis.landing import entered_beyond
-from hsdsl.lint.analysis.words import within
+from hsdsl.lint.analysis.wording import within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 

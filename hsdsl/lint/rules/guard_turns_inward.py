@@ -51,7 +51,7 @@ from collections.abc import Iterator
 
 from hsdsl.lint.analysis.question import negative, positive
 from hsdsl.lint.analysis.twice import twice
-from hsdsl.lint.analysis.words import at, number
+from hsdsl.lint.analysis.wording import at, number
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 from hsdsl.system import TIME

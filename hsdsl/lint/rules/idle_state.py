@@ -43,8 +43,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hsdsl.lint.dependence import first_places
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.influence import first_places
 from hsdsl.lint.subject import Subject
 
 

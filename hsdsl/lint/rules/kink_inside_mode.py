@@ -45,8 +45,8 @@ from collections.abc import Iterator
 
 from hsdsl.lint.analysis.places import evaluated
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.singular import kinks
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.singularities import kinks
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 

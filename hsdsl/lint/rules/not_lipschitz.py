@@ -50,8 +50,8 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.places import evaluated
 from hsdsl.lint.analysis.question import positive
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.singular import steep
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.singularities import steep
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 

@@ -65,10 +65,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from hsdsl.lint.analysis.local import Local
-from hsdsl.lint.analysis.orders import commute, matters, meeting, speeds, together
+from hsdsl.lint.analysis.commutation import commute, matters, meeting, speeds, together
+from hsdsl.lint.analysis.mode_point import ModePoint
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at, within
+from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -100,7 +100,7 @@ def _look(subject: Subject, part: ModePart, first: EdgePart, second: EdgePart, f
     answer = next((answer for answer in answers if answer.somewhere), None)
     if answer is None:
         return
-    different = matters(Local(dynamics, mode, answer.point), first.edge, second.edge)
+    different = matters(ModePoint(dynamics, mode, answer.point), first.edge, second.edge)
     proof = None if different else commute(dynamics, first.edge, second.edge, [(*o, *out) for o in overlaps])
     decided = answer.decided or "sampled"
     if proof is not None:

@@ -51,12 +51,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.landing import surfaces_of
-from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.passing import fires
 from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import at_most_zero, positive
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at, within
+from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -85,7 +85,7 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, found: Repeats) -> N
         where = at(dynamics, part.mode, answer, about)
         beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
         lands = f"lands{within(proof.searched)}" if always else "can land"
-        then = _then(Local(dynamics, part.mode, answer.point), edge)
+        then = _then(ModePoint(dynamics, part.mode, answer.point), edge)
         message = f"the reset of '{edge.edge.name}' {lands} beyond {beyond}: {where}{then}"
         decided = proof.decided if always else answer.decided or "sampled"
         severity = "warning" if always else "note"
@@ -93,7 +93,7 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, found: Repeats) -> N
         found.add(kind, Finding(edge.document.to.place.span, message, None, decided, severity=severity))
 
 
-def _then(here: Local, edge: EdgePart) -> str:
+def _then(here: ModePoint, edge: EdgePart) -> str:
     """Say what a run does there."""
     try:
         following = here.after(edge.edge).next()

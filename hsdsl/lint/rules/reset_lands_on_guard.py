@@ -56,10 +56,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.lint.analysis.landing import Landing, landings
-from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.question import at_most_zero, positive, zero
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -88,7 +88,7 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, landing: Landing, fo
     if not answer.somewhere and own and landing.bend is not None:
         answer = dynamics.ask_any(part.mode, landing.guard, zero(landing.rate), at_most_zero(-landing.bend))
         then, order = "the flow does not lead away from it (Zeno is possible)", 2
-    if not answer.somewhere or not _stays(Local(dynamics, part.mode, answer.point), edge, landing, order):
+    if not answer.somewhere or not _stays(ModePoint(dynamics, part.mode, answer.point), edge, landing, order):
         return
     on = f"the guard of '{landing.edge.name}'" if landing.edge else f"the wall '{landing.surface.text}'"
     on = "its own guard" if own else on
@@ -99,7 +99,7 @@ def _look(subject: Subject, part: ModePart, edge: EdgePart, landing: Landing, fo
     found.add(kind, Finding(edge.document.to.place.span, message, None, decided))
 
 
-def _stays(here: Local, edge: EdgePart, landing: Landing, order: int) -> bool:
+def _stays(here: ModePoint, edge: EdgePart, landing: Landing, order: int) -> bool:
     """Whether the flow goes out of the surface after landing, or from the second order on does not go in."""
     try:
         reached = here.after(edge.edge)

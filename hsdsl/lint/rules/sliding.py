@@ -53,12 +53,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.lint.analysis.instants import same
 from hsdsl.lint.analysis.landing import landings
-from hsdsl.lint.analysis.local import Local, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.question import positive
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.wording import at
+from hsdsl.lint.analysis.zero_time_cycle import same
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 from hsdsl.system import Edge
@@ -82,7 +82,7 @@ def check(subject: Subject) -> Iterator[Finding]:
                 ):
                     continue
                 answer = dynamics.ask_any(part.mode, landing.guard, positive(rate), positive(landing.rate))
-                if not answer.somewhere or not _returns(Local(dynamics, part.mode, answer.point), edge.edge, back):
+                if not answer.somewhere or not _returns(ModePoint(dynamics, part.mode, answer.point), edge.edge, back):
                     continue
                 told.add((edge.edge.source, edge.edge.name, back.source, back.name))
                 where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
@@ -95,7 +95,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     yield from found
 
 
-def _returns(here: Local, edge: Edge, back: Edge) -> bool:
+def _returns(here: ModePoint, edge: Edge, back: Edge) -> bool:
     """Whether the second transition is the one that follows the first, and leads back to where that was made."""
     try:
         reached = here.after(edge)

@@ -44,7 +44,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.lint.analysis.local import Local, Unsure, ranked
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import holds
 from hsdsl.lint.start import BEYOND, ON, leaves, side
@@ -76,7 +76,7 @@ def _leaves(subject: Subject, mode: Mode, surface: Surface) -> bool:
         return False
     dynamics = subject.dynamics
     try:
-        Local(dynamics, mode, dynamics.starting_point).piece(dynamics.residual(surface), dynamics.flow(mode))
+        ModePoint(dynamics, mode, dynamics.starting_point).piece(dynamics.residual(surface), dynamics.flow(mode))
     except Unsure:
         return False
     return True

@@ -43,7 +43,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hsdsl.lint.analysis.local import ranked
+from hsdsl.lint.analysis.mode_point import ranked
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.start import BEYOND, side
 from hsdsl.lint.subject import Subject

@@ -55,12 +55,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hsdsl.lint.analysis.local import Local, Unsure
-from hsdsl.lint.analysis.pieces import pieces
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import strict
 from hsdsl.lint.analysis.question import Answer, negative, zero
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.smooth_pieces import pieces
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -100,14 +100,14 @@ def _touched(subject: Subject, part: ModePart, edge: EdgePart) -> tuple[Answer, 
         surface = (zero(piece.residual), zero(rate), *piece.inside)
         inside = [(*surface, *strict(domain), *clause) for clause in conditions]
         answer = dynamics.ask_any(mode, inside, negative(bend))
-        if answer.somewhere and _what(Local(dynamics, mode, answer.point), residual) == _GRAZES:
+        if answer.somewhere and _what(ModePoint(dynamics, mode, answer.point), residual) == _GRAZES:
             return answer, _GRAZES
     guard = dynamics.guard(edge.edge)
     answer = dynamics.ask_any(mode, guard, zero(dynamics.rate(mode, residual)))
-    return answer, _what(Local(dynamics, mode, answer.point), residual) if answer.somewhere else ""
+    return answer, _what(ModePoint(dynamics, mode, answer.point), residual) if answer.somewhere else ""
 
 
-def _what(here: Local, residual: Any) -> str:
+def _what(here: ModePoint, residual: Any) -> str:
     """Say what the flow does at a point of a surface where the first derivative vanishes."""
     try:
         order, sign = here.first(residual)

@@ -51,8 +51,8 @@ from hsdsl.lint.analysis.dynamics import Clause
 from hsdsl.lint.analysis.places import evaluated
 from hsdsl.lint.analysis.question import Answer, positive, zero
 from hsdsl.lint.analysis.repeats import Repeats
-from hsdsl.lint.analysis.singular import divisors
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.singularities import divisors
+from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import ModePart, Subject
 

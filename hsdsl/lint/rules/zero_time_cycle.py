@@ -53,12 +53,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hsdsl.expression.scope import symbol
-from hsdsl.lint.analysis.instants import Cycle, cycle
 from hsdsl.lint.analysis.landing import landings, surfaces_of
-from hsdsl.lint.analysis.local import Local
+from hsdsl.lint.analysis.mode_point import ModePoint
 from hsdsl.lint.analysis.passing import fires
 from hsdsl.lint.analysis.question import Answer, positive
-from hsdsl.lint.analysis.words import at
+from hsdsl.lint.analysis.wording import at
+from hsdsl.lint.analysis.zero_time_cycle import Cycle, cycle
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
 
@@ -71,7 +71,7 @@ def check(subject: Subject) -> Iterator[Finding]:
             for answer in _chained(subject, part, edge):
                 if not answer.somewhere:
                     continue
-                found = cycle(Local(subject.dynamics, part.mode, answer.point), edge.edge)
+                found = cycle(ModePoint(subject.dynamics, part.mode, answer.point), edge.edge)
                 if found is None or frozenset(found.edges) in told:
                     continue
                 told.add(frozenset(found.edges))

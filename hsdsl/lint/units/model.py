@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
-from hsdsl.lint.written import Written
 from hsdsl.schema import Model, ParameterEntry
 from hsdsl.source import Scalar
 
@@ -19,7 +19,7 @@ _VALUES = ("parameter", "input", "initial", "output")
 class Checked:
     """An expression, its unit, and what does not fit in it."""
 
-    written: Written
+    written: SourceExpression
     measure: Measure
     misfits: tuple[Misfit, ...]
 
@@ -40,11 +40,11 @@ class Units:
     ----------
     document : Model
         The file.
-    expressions : tuple of Written
+    expressions : tuple of SourceExpression
         Its expressions.
     """
 
-    def __init__(self, document: Model, expressions: tuple[Written, ...]) -> None:
+    def __init__(self, document: Model, expressions: tuple[SourceExpression, ...]) -> None:
         self._document = document
         self._expressions = expressions
         self._lets: dict[str, dict[str | None, Measure]] = {}  # by name, and by the mode that has it
@@ -86,7 +86,7 @@ class Units:
         roles = (*_VALUES, "let", "flow", "domain", "when", "if", "reset")
         return tuple(self._check(e) for e in self._expressions if e.role in roles) if self.given else ()
 
-    def _check(self, written: Written) -> Checked:
+    def _check(self, written: SourceExpression) -> Checked:
         walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value)
         measure = walk.measure(written.tree)
         if written.role == "let":

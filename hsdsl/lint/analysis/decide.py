@@ -1,5 +1,5 @@
 # pyright: basic
-"""The ladder by which a question is decided: exact reasoning, then a point that is found, then proof by boxes.
+"""Decision of questions: exact reasoning, then a search for a point, then a proof by branch and bound.
 
 Every step is bounded in what it does, not in time, so that an answer is the same on every machine; a model has one
 budget for all its questions, after which only exact reasoning goes on.
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from hsdsl.errors import Decided
-from hsdsl.lint.analysis import boxes, exact, trial
-from hsdsl.lint.analysis.exact import Reduced
+from hsdsl.lint.analysis import branch_and_bound, elimination, rational_witness
+from hsdsl.lint.analysis.elimination import Reduced
 from hsdsl.lint.analysis.intervals import Array
-from hsdsl.lint.analysis.points import ROUNDS, STARTS, Search
+from hsdsl.lint.analysis.newton_search import ROUNDS, STARTS, NewtonSearch
+from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.polynomial import Polynomial
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Range
-from hsdsl.lint.analysis.ring import Ring, expression
 from hsdsl.lint.analysis.tape import Tape, too_large
 from hsdsl.lower.straight import replaced
 
@@ -32,10 +32,10 @@ OVERHEAD = 400  # operations that one call of NumPy costs as much as
 
 
 @dataclass
-class Ladder:
+class Decider:
     """Decides questions about one model and remembers the answers."""
 
-    ring: Ring = field(default_factory=Ring)
+    normal_forms: NormalForms = field(default_factory=NormalForms)
     left: int = WORK_OF_A_MODEL
     _known: dict[Any, Answer] = field(default_factory=dict)
     _left: dict[Any, Reduced | None] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Ladder:
         reduced = self._reduced(constraints, ranges)
         if reduced is None:
             return NEVER
-        point = trial.point(reduced, ranges)
+        point = rational_witness.point(reduced, ranges)
         if point is not None:
             return Answer("somewhere", "symbolic", point)
         return self._numerically(constraints, ranges, reduced, prove)
@@ -74,9 +74,9 @@ class Ladder:
         if too_large([constraint.expr, *(c.expr for c in given)], MOST_PARTS):
             return False
         reduced = self._reduced(given, ranges)
-        if reduced is None or exact.contradicts(reduced, constraint, self.ring, ranges):
+        if reduced is None or elimination.contradicts(reduced, constraint, self.normal_forms, ranges):
             return True
-        return not exact.linear(reduced) and self.decide((*given, constraint), ranges).never
+        return not elimination.linear(reduced) and self.decide((*given, constraint), ranges).never
 
     def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
@@ -85,7 +85,7 @@ class Ladder:
         reduced = self._reduced(given, ranges)
         if reduced is None:
             return None
-        p = exact.moved(self.ring.of(expr), reduced, self.ring)
+        p = elimination.moved(self.normal_forms.of(expr), reduced, self.normal_forms)
         if not p.terms or any(q in (p, -p) for q, relation in reduced.rows if relation == "= 0"):
             return "symbolic"
         if p.number is not None or (len(reduced.solved) == sum(c.relation == "= 0" for c in given) and _polynomial(p)):
@@ -118,7 +118,7 @@ class Ladder:
     def _reduced(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Reduced | None:
         key = (tuple(given), id(ranges))
         if key not in self._left:
-            self._left[key] = exact.reduce(given, self.ring, ranges)
+            self._left[key] = elimination.reduce(given, self.normal_forms, ranges)
         return self._left[key]
 
     def _numerically(
@@ -131,7 +131,7 @@ class Ladder:
         if search is None:
             return UNKNOWN
         never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
-        if boxes.excluded(search.tape, search.relations, search.low, search.high, 1):
+        if branch_and_bound.excluded(search.tape, search.relations, search.low, search.high, 1):
             return never
         found = search.point()
         if found is not None:
@@ -146,7 +146,7 @@ class Ladder:
         settled: set[Any] = set()
         for constraint in constraints:
             moved = Constraint(replaced(constraint.expr, solved, done), constraint.relation)
-            row = (self.ring.of(moved.expr), moved.relation)
+            row = (self.normal_forms.of(moved.expr), moved.relation)
             if row in unsettled and row not in settled:
                 settled.add(row)
                 rest.append(moved)
@@ -154,7 +154,7 @@ class Ladder:
 
     def _search(
         self, rest: Sequence[Constraint], ranges: Mapping[Any, Range], reduced: Reduced, names: Sequence[Any]
-    ) -> Search | None:
+    ) -> NewtonSearch | None:
         """A search for points; None where that would cost more than there is left."""
         if too_large((c.expr for c in rest), MOST_PARTS):
             return None
@@ -165,12 +165,12 @@ class Ladder:
         self.left -= cost
         low, high = _box(names, reduced, ranges)
         typical = np.array([min(max(ranges[s].typical, a), b) for s, a, b in zip(names, low, high, strict=True)])
-        return Search(tape, tuple(c.relation for c in rest), low, high, typical)
+        return NewtonSearch(tape, tuple(c.relation for c in rest), low, high, typical)
 
-    def _excluded(self, search: Search) -> bool:
-        most = min(boxes.MOST_BOXES, MOST_WORK // len(search.tape), self.left // (8 * len(search.tape)))
+    def _excluded(self, search: NewtonSearch) -> bool:
+        most = min(branch_and_bound.MOST_BOXES, MOST_WORK // len(search.tape), self.left // (8 * len(search.tape)))
         self.left -= 8 * len(search.tape) * most
-        return most > 0 and boxes.excluded(search.tape, search.relations, search.low, search.high, most)
+        return most > 0 and branch_and_bound.excluded(search.tape, search.relations, search.low, search.high, most)
 
     def _somewhere(
         self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Mapping[Any, Range]

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from hsdsl.lint.analysis.bounds import Bounds, bounds_of, holds, of_constant
-from hsdsl.lint.analysis.exact import Reduced
+from hsdsl.lint.analysis.elimination import Reduced
 from hsdsl.lint.analysis.polynomial import Atom, Polynomial, linear_in
 from hsdsl.lint.analysis.question import Range
+from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
 
 
 def point(reduced: Reduced, ranges: Mapping[Any, Range]) -> dict[Any, float] | None:

@@ -25,7 +25,7 @@ KINKED = (*_SIGNS, *_SIZES, *_LEAST, *_LARGEST)
 
 
 @dataclass(frozen=True)
-class Piece:
+class SmoothPiece:
     """A part of the states and times.
 
     Attributes
@@ -55,7 +55,7 @@ class Piece:
         """The piece without its ends."""
         return (*(negative(-side) for side in self.sides), *map(zero, self.zeros))
 
-    def split(self, kink: Any) -> Iterator[Piece]:
+    def split(self, kink: Any) -> Iterator[SmoothPiece]:
         """The pieces on both sides of a kink, and that of a sign's zero."""
         first = kink.args[0]
         rest = kink.func(*kink.args[1:]) if len(kink.args) > 2 else kink.args[-1]
@@ -71,18 +71,18 @@ class Piece:
             yield self._where(first - rest, kink, larger)
             yield self._where(rest - first, kink, smaller)
 
-    def _where(self, side: Any, kink: Any, value: Any) -> Piece:
+    def _where(self, side: Any, kink: Any, value: Any) -> SmoothPiece:
         def replaced(expr: Any) -> Any:
             return expr.xreplace({kink: value})
 
         sides = (*map(replaced, self.sides), *([] if side is None else [side]))
         zeros = (*map(replaced, self.zeros), *([kink.args[0]] if side is None else []))
-        return Piece(sides, zeros, replaced(self.residual), {s: replaced(f) for s, f in self.flow.items()})
+        return SmoothPiece(sides, zeros, replaced(self.residual), {s: replaced(f) for s, f in self.flow.items()})
 
 
-def pieces(residual: Any, flow: Mapping[Any, Any]) -> list[Piece] | None:
+def pieces(residual: Any, flow: Mapping[Any, Any]) -> list[SmoothPiece] | None:
     """The pieces of a surface function and of the flows that it depends on; None where they are too many."""
-    waiting, done = [Piece((), (), residual, influencing(residual, flow))], []
+    waiting, done = [SmoothPiece((), (), residual, influencing(residual, flow))], []
     while waiting:
         piece = waiting.pop(0)
         kink = _innermost((piece.residual, *piece.flow.values()))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hsdsl.expression.scope import symbol
-from hsdsl.lint.analysis.local import NEAR, Local, Unsure
+from hsdsl.lint.analysis.mode_point import NEAR, ModePoint, Unsure
 from hsdsl.system import Edge
 
 MOST = 40
@@ -19,7 +19,7 @@ class Cycle:
     edges: tuple[str, ...]
 
 
-def chain(here: Local, edge: Edge) -> Iterator[tuple[Edge, Local]]:
+def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
     """Follow an edge and the transitions that are made at the same instant: each with where it leads to.
 
     Raises
@@ -37,9 +37,9 @@ def chain(here: Local, edge: Edge) -> Iterator[tuple[Edge, Local]]:
     raise Unsure
 
 
-def cycle(here: Local, edge: Edge) -> Cycle | None:
+def cycle(here: ModePoint, edge: Edge) -> Cycle | None:
     """The cycle that transitions run into which follow an edge at one instant; None where none is known."""
-    visited: list[Local] = []
+    visited: list[ModePoint] = []
     names: list[str] = []
     try:
         for following, reached in chain(here, edge):
@@ -53,7 +53,7 @@ def cycle(here: Local, edge: Edge) -> Cycle | None:
     return None
 
 
-def same(one: Local, other: Local) -> bool:
+def same(one: ModePoint, other: ModePoint) -> bool:
     """Whether two points are one, as far as can be told."""
     if one.mode is not other.mode:
         return False

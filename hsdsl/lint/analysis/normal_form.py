@@ -20,7 +20,7 @@ MOST_TERMS = 300
 MOST_POWER = 12
 
 
-class Ring:
+class NormalForms:
     """Makes polynomials of expressions; atoms and results are kept, so that nothing is worked out twice."""
 
     def __init__(self) -> None:

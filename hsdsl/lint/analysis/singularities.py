@@ -12,11 +12,11 @@ from typing import Any
 import sympy as sp
 
 from hsdsl import functions
+from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause
-from hsdsl.lint.analysis.ladder import MOST_PARTS
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, positive, zero
 from hsdsl.lint.analysis.tape import too_large
-from hsdsl.lint.written import Written
+from hsdsl.lint.source_expressions import SourceExpression
 
 _SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
 _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
@@ -39,7 +39,7 @@ class Part:
 class Expression:
     """An expression of a mode as written, its mathematics, and where it is evaluated."""
 
-    written: Written
+    written: SourceExpression
     expr: Any
     where: tuple[Clause, ...]
 

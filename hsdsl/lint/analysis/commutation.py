@@ -14,12 +14,12 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.instants import chain, same
-from hsdsl.lint.analysis.local import Local, Unsure, ranked
-from hsdsl.lint.analysis.pieces import KINKED, influencing
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.analysis.proof import Proof, strict
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, at_most_zero, positive, zero
-from hsdsl.lint.analysis.singular import breaks
+from hsdsl.lint.analysis.singularities import breaks
+from hsdsl.lint.analysis.smooth_pieces import KINKED, influencing
+from hsdsl.lint.analysis.zero_time_cycle import chain, same
 from hsdsl.lower.straight import replaced
 from hsdsl.system import Edge, Mode, Surface
 
@@ -47,12 +47,12 @@ def meeting(dynamics: Dynamics, first: Edge, second: Edge, overlap: Clause) -> A
     inside = strict(at_most_zero(dynamics.residual(surface)) for surface in (*others, *mode.walls))
     for more in dict.fromkeys(((*out, *inside), out, ())):
         answer = dynamics.ask(mode, (*overlap, *more))
-        if answer.somewhere and _meets(Local(dynamics, mode, answer.point), first, second):
+        if answer.somewhere and _meets(ModePoint(dynamics, mode, answer.point), first, second):
             return answer
     return UNKNOWN
 
 
-def _meets(here: Local, first: Edge, second: Edge) -> bool:
+def _meets(here: ModePoint, first: Edge, second: Edge) -> bool:
     """Whether one of two edges goes first at a point; also where a kink leaves that open."""
     for edge in ranked(here.mode.edges):
         try:
@@ -67,14 +67,14 @@ def _meets(here: Local, first: Edge, second: Edge) -> bool:
     return all(_leaves(here, edge) for edge in (first, second))
 
 
-def _leaves(here: Local, edge: Edge) -> bool:
+def _leaves(here: ModePoint, edge: Edge) -> bool:
     try:
         return here.first(here.dynamics.residual(edge.surface))[1] > 0
     except Unsure:
         return True
 
 
-def matters(here: Local, first: Edge, second: Edge) -> bool | None:
+def matters(here: ModePoint, first: Edge, second: Edge) -> bool | None:
     """Whether the two orders lead from a point to different ones, followed with numbers; None where that is not known.
 
     They end where nothing more happens at that instant. Two that pass one point have no difference from there on.

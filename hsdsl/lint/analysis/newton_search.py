@@ -1,4 +1,4 @@
-"""The second step of the ladder: a point that satisfies everything, by Newton's method from many starts at once.
+"""Second step of a decision: a point that satisfies everything, by Newton's method from many starts at once.
 
 Equations, and inequalities that do not hold, are linearised by difference quotients and solved by the shortest step.
 The starts are the same every time. A point that is found holds to round-off; that none is found means nothing.
@@ -24,7 +24,7 @@ _STEP = 1e-7
 
 
 @dataclass(frozen=True)
-class Search:
+class NewtonSearch:
     """Constraints as a tape over a box.
 
     Attributes

@@ -15,10 +15,10 @@ import numpy as np
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
+from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.ladder import MOST_PARTS
-from hsdsl.lint.analysis.pieces import Piece, pieces
-from hsdsl.lint.analysis.singular import breaks
+from hsdsl.lint.analysis.singularities import breaks
+from hsdsl.lint.analysis.smooth_pieces import SmoothPiece, pieces
 from hsdsl.lint.analysis.tape import Tape, too_large
 from hsdsl.system import TIME, Edge, Mode
 
@@ -33,7 +33,7 @@ class Unsure(Exception):
 
 
 @dataclass(frozen=True)
-class Local:
+class ModePoint:
     """A point of a mode.
 
     Attributes
@@ -90,7 +90,7 @@ class Local:
                 break
         return DEEPEST, 0
 
-    def piece(self, residual: Any, flow: Mapping[Any, Any]) -> Piece:
+    def piece(self, residual: Any, flow: Mapping[Any, Any]) -> SmoothPiece:
         """The piece that the point is inside of, and on which surface and flow have all derivatives here.
 
         Raises
@@ -134,7 +134,7 @@ class Local:
             raise Unsure
         return True
 
-    def after(self, edge: Edge) -> Local:
+    def after(self, edge: Edge) -> ModePoint:
         """Where an edge leads to from here."""
         target = self.dynamics.modes[edge.target]
         kept = {s: v for s, v in self.point.items() if s is TIME or s in self.dynamics.inputs}
@@ -142,7 +142,7 @@ class Local:
         new = {symbol(s): self.dynamics.value(self.dynamics.placed(r), self.point) for s, r in values}
         if any(value != value for value in new.values()):
             raise Unsure
-        return Local(self.dynamics, target, kept | new)
+        return ModePoint(self.dynamics, target, kept | new)
 
     def next(self) -> Edge | None:
         """The transition that a run makes at once that enters here (M4, M5, M6); None where it flows, or stops.

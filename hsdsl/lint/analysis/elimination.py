@@ -1,8 +1,8 @@
 # pyright: basic
-"""The first step of the ladder: exact reasoning with polynomials.
+"""First step of a decision: elimination of linear equations between polynomials.
 
 Equations that are linear in a name are solved for it and put into the rest; what is left is compared with bounds that
-the constraints themselves give (`tighten`). No search, no general solver.
+the constraints themselves give (`bound_propagation`). No search, no general solver.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from hsdsl.lint.analysis.bounds import Bounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.bound_propagation import Contradiction, Row, tighten
+from hsdsl.lint.analysis.normal_form import NormalForms
 from hsdsl.lint.analysis.polynomial import Polynomial, linear_in, number
 from hsdsl.lint.analysis.question import Constraint, Range
-from hsdsl.lint.analysis.ring import Ring
-from hsdsl.lint.analysis.tighten import Contradiction, Row, tighten
+from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
 
 
 @dataclass
@@ -38,11 +38,11 @@ class Reduced:
     bounds: dict[Any, Bounds] = field(default_factory=dict)
 
 
-def reduce(constraints: Sequence[Constraint], ring: Ring, ranges: Mapping[Any, Range]) -> Reduced | None:
+def reduce(constraints: Sequence[Constraint], normal_forms: NormalForms, ranges: Mapping[Any, Range]) -> Reduced | None:
     """Say what is left of a question when its linear equations are solved; None where it has no answer."""
     try:
-        reduced = Reduced([(ring.of(c.expr), c.relation) for c in constraints])
-        _eliminate(reduced, ring, ranges)
+        reduced = Reduced([(normal_forms.of(c.expr), c.relation) for c in constraints])
+        _eliminate(reduced, normal_forms, ranges)
         reduced.bounds = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
         tighten(reduced.rows, reduced.bounds)
     except Contradiction:
@@ -50,9 +50,11 @@ def reduce(constraints: Sequence[Constraint], ring: Ring, ranges: Mapping[Any, R
     return reduced
 
 
-def contradicts(reduced: Reduced, constraint: Constraint, ring: Ring, ranges: Mapping[Any, Range]) -> bool:
+def contradicts(
+    reduced: Reduced, constraint: Constraint, normal_forms: NormalForms, ranges: Mapping[Any, Range]
+) -> bool:
     """Whether one more constraint, an inequality, is found to leave nothing of a question."""
-    p = moved(ring.of(constraint.expr), reduced, ring)
+    p = moved(normal_forms.of(constraint.expr), reduced, normal_forms)
     bounds: dict[Any, Bounds] = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
     try:
         tighten([*reduced.rows, *_kept([(p, constraint.relation)])], bounds)
@@ -66,14 +68,14 @@ def linear(reduced: Reduced) -> bool:
     return all(atom.kind == "name" and e == 1 for p, _ in reduced.rows for m in p.terms if m for atom, e in m[:1])
 
 
-def moved(p: Polynomial, reduced: Reduced, ring: Ring) -> Polynomial:
+def moved(p: Polynomial, reduced: Reduced, normal_forms: NormalForms) -> Polynomial:
     """A polynomial where the equations hold."""
     for symbol, value in reduced.solved:
-        p = ring.substituted(p, {symbol: value})
+        p = normal_forms.substituted(p, {symbol: value})
     return p
 
 
-def _eliminate(reduced: Reduced, ring: Ring, ranges: Mapping[Any, Range]) -> None:
+def _eliminate(reduced: Reduced, normal_forms: NormalForms, ranges: Mapping[Any, Range]) -> None:
     reduced.rows = _kept(reduced.rows)
     while True:
         found = _solvable(reduced.rows, ranges)
@@ -83,7 +85,7 @@ def _eliminate(reduced: Reduced, ring: Ring, ranges: Mapping[Any, Range]) -> Non
         reduced.solved.append((symbol, value))
         limits = _limits(value, ranges[symbol])
         rest = [row for i, row in enumerate(reduced.rows) if i != index]
-        touched: list[Row] = [(ring.substituted(p, {symbol: value}), r) for p, r in rest if symbol in p.names]
+        touched: list[Row] = [(normal_forms.substituted(p, {symbol: value}), r) for p, r in rest if symbol in p.names]
         reduced.rows = [row for row in rest if symbol not in row[0].names] + _kept(touched + limits)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from hsdsl.lint.analysis.bounds import Bounds, bounds_of, holds, of_constant
 from hsdsl.lint.analysis.polynomial import Atom, Monomial, Polynomial
 from hsdsl.lint.analysis.question import Relation
+from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
 
 Row = tuple[Polynomial, Relation]
 

@@ -31,7 +31,7 @@ _WANTED: dict[Role, Wanted] = {"domain": "inequality", "when": "inequality", "if
 
 
 @dataclass(frozen=True)
-class Written:
+class SourceExpression:
     """One expression of a file.
 
     Attributes
@@ -72,7 +72,7 @@ class Written:
         return self.scalar.span(node.start, node.end)
 
 
-def written(document: Model) -> Iterator[Written]:
+def written(document: Model) -> Iterator[SourceExpression]:
     """Every expression of a model, in the order of the language's sections."""
     for name, entry in document.parameters.items():
         values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
@@ -81,15 +81,15 @@ def written(document: Model) -> Iterator[Written]:
         if isinstance(entry, InputSamples):
             yield from _each("input", (*entry.times, *entry.values), name)
         elif not isinstance(entry, InputFile):
-            yield Written("input", entry, name)
+            yield SourceExpression("input", entry, name)
     for name, scalar in document.let.items():
-        yield Written("let", scalar, name)
+        yield SourceExpression("let", scalar, name)
     for name, mode in document.modes.items():
         yield from _of_mode(str(name), mode)
     for name, scalar in document.outputs.items():
-        yield Written("output", scalar, name)
+        yield SourceExpression("output", scalar, name)
     for name, scalar in document.initial.__pydantic_extra__.items():
-        yield Written("initial", scalar, name)
+        yield SourceExpression("initial", scalar, name)
     experiment = document.experiment
     for name in ("until", "step", "tolerance", "relaxation", "max_transitions"):
         yield from _each("experiment", (getattr(experiment, name),), name)
@@ -99,25 +99,25 @@ def written(document: Model) -> Iterator[Written]:
         yield from _each("reference", _of_reference(reference), "")
 
 
-def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[Written]:
-    return (Written(role, scalar, name) for scalar in scalars if scalar is not None)
+def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[SourceExpression]:
+    return (SourceExpression(role, scalar, name) for scalar in scalars if scalar is not None)
 
 
-def _of_mode(name: str, mode: Mode) -> Iterator[Written]:
+def _of_mode(name: str, mode: Mode) -> Iterator[SourceExpression]:
     for key, scalar in mode.let.items():
-        yield Written("let", scalar, key, name)
+        yield SourceExpression("let", scalar, key, name)
     for key, scalar in (mode.flow or {}).items():
-        yield Written("flow", scalar, key, name)
+        yield SourceExpression("flow", scalar, key, name)
     for index, scalar in enumerate(mode.domain):
-        yield Written("domain", scalar, "", name, index)
+        yield SourceExpression("domain", scalar, "", name, index)
     for index, transition in enumerate(mode.transitions):
-        yield Written("when", transition.when, "", name, index)
+        yield SourceExpression("when", transition.when, "", name, index)
         if transition.condition is not None:
-            yield Written("if", transition.condition, "", name, index)
+            yield SourceExpression("if", transition.condition, "", name, index)
         for key, scalar in transition.reset.items():
-            yield Written("reset", scalar, key, name, index)
+            yield SourceExpression("reset", scalar, key, name, index)
     for key, scalar in mode.outputs.items():
-        yield Written("output", scalar, key, name)
+        yield SourceExpression("output", scalar, key, name)
 
 
 def _of_reference(reference: Reference) -> Iterator[Scalar | None]:

@@ -1,4 +1,4 @@
-"""The third step of the ladder: proof that there is no point, by branch and bound with interval arithmetic.
+"""Third step of a decision: proof that there is no point, by branch and bound with interval arithmetic.
 
 A box where the bounds of some constraint exclude it is thrown away, every other is halved. When none is left, there is
 no point; when the boxes get too many, nothing is known.
