@@ -202,6 +202,7 @@ CODES: dict[str, str] = {
     "HS317": "a data file outside the model's folder",
     "HS320": "both a step and a tolerance",
     "HS321": "a setting outside its range",
+    "HS322": "a scale of a name that is not a state",
 }
 
 TOO_LONG = "HS122"

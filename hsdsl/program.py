@@ -188,8 +188,8 @@ class Program:
 
     ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``minimum_i`` and ``maximum_i``
     where the file bounds it, ``initial``, ``input_i`` (times, then values; where they are not plain numbers), ``until``
-    and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions`` and ``sample_count`` or
-    ``sample_times``.
+    and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions``, ``scale`` (sizes of
+    ``scaled_states``) and ``sample_count`` or ``sample_times``.
 
     ``switching`` has, for each of ``switches``, ``argument_i(t)``: what it is the floor or sign of, and the derivative
     of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
@@ -214,3 +214,4 @@ class Program:
     left_out: tuple[str, ...] = ()
     switches: tuple[Switch, ...] = ()
     switching: Routines = NOTHING
+    scaled_states: tuple[str, ...] = ()

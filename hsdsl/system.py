@@ -118,6 +118,7 @@ class Experiment:
     """What the file asks of a run; None where it says nothing. Numbers are expressions of parameters.
 
     ``samples`` is an expression (how many equally spaced samples) or a tuple of expressions (their times).
+    ``scale`` has the states with a given size, each with its expression.
     """
 
     until: sp.Expr
@@ -128,6 +129,7 @@ class Experiment:
     relaxation: sp.Expr | None = None
     samples: sp.Expr | tuple[sp.Expr, ...] | None = None
     max_transitions: sp.Expr | None = None
+    scale: tuple[tuple[str, sp.Expr], ...] = ()
 
 
 @dataclass(frozen=True)

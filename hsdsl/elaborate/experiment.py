@@ -70,6 +70,7 @@ def elaborate_experiment(world: World) -> Experiment:
         scheme=world.text(document.scheme),
         method=_placed(document.method),
         samples=_samples(world, scope, document.samples),
+        scale=_scale(world, scope, document.scale),
         **numbers,
     )
 
@@ -96,7 +97,7 @@ def _setting(world: World, scope: Scope, key: str, scalar: Scalar | None) -> Any
 def _wanted(key: str, value: Value) -> str | None:
     """What a constant setting must be, where it is not."""
     whole = value.number == int(value.number)
-    if key in _POSITIVE and not value.number > 0:
+    if (key in _POSITIVE or key.startswith("scale.")) and not value.number > 0:
         return "positive"
     if key == "until" and value.number < 0:
         return "0 or a later time"
@@ -105,6 +106,16 @@ def _wanted(key: str, value: Value) -> str | None:
     if key == "samples" and (value.number < 2 or not whole):
         return "a list of times, or a whole number of at least 2"
     return None
+
+
+def _scale(world: World, scope: Scope, given: dict[Key, Scalar]) -> tuple[tuple[str, Any], ...]:
+    """The states with a given size, each with the expression of its size."""
+    states = world.all_states()
+    for key in given:
+        if key not in states:
+            world.reader.add(key.place, "HS322", f"the model has no state '{shown(key)}'", did_you_mean(key, states))
+    sizes = {str(key): _setting(world, scope, f"scale.{key}", scalar) for key, scalar in given.items()}
+    return tuple((name, size) for name, size in sizes.items() if size is not None)
 
 
 def _samples(world: World, scope: Scope, given: Scalar | list[Scalar] | None) -> Any:

@@ -26,11 +26,14 @@ def only(system: HybridSystem, asked: Iterable[str]) -> HybridSystem:
         return system
     outputs = [k for k, name in enumerate(system.outputs) if name in wanted]
     own = _with_states(system)
+    states = {state for _, state in needed}
+    scale = tuple((state, size) for state, size in system.experiment.scale if state in states)
     start = {state for mode, state in needed if mode == system.initial.mode}
     return replace(
         system,
         modes=tuple(_mode(mode, needed, outputs, own) for mode in system.modes),
         outputs=tuple(system.outputs[k] for k in outputs),
+        experiment=replace(system.experiment, scale=scale),
         initial=replace(
             system.initial,
             values=tuple(v for v in system.initial.values if system.initial.mode not in own or v[0] in start),

@@ -61,6 +61,8 @@ class _Checker:
                 self.known(group, key.place, "parameter", [n for n in self.world.document.parameters])
             elif group == "initial":
                 self.known(rest, key.place, "state", ["mode", *self.world.all_states()])
+            elif group == "experiment" and rest.startswith("scale."):
+                self.known(rest.removeprefix("scale."), key.place, "state", [*self.world.all_states()])
             elif group == "experiment":
                 self.known(rest, key.place, "setting", list(Experiment.model_fields))
             else:

@@ -95,5 +95,6 @@ def _settings(system: HybridSystem) -> Iterable[Any]:
         experiment.max_transitions,
     ]
     samples = experiment.samples
+    values += [size for _, size in experiment.scale]
     values += samples if isinstance(samples, tuple) else [samples]
     return [value for value in values if value is not None]

@@ -24,6 +24,7 @@ Role = Literal[
     "reset",  # its new value of the state `name`
     "output",  # the output `name`, of `mode` or of the whole model
     "initial",  # the initial value of the state `name`
+    "scale",  # the size of the state `name`
     "experiment",  # the setting `name`
     "reference",  # a number in `reference`
 ]
@@ -93,6 +94,8 @@ def written(document: Model) -> Iterator[SourceExpression]:
     experiment = document.experiment
     for name in ("until", "step", "tolerance", "relaxation", "max_transitions"):
         yield from _each("experiment", (getattr(experiment, name),), name)
+    for name, scalar in experiment.scale.items():
+        yield Written("scale", scalar, name)
     samples = experiment.samples
     yield from _each("experiment", samples if isinstance(samples, list) else (samples,), "samples")
     for reference in document.reference:

@@ -80,6 +80,7 @@ def _lower(system: HybridSystem) -> lowered.Program:
         constants=print_routines(_constants(system, names), ()),
         switches=switch_programs(switches),
         switching=print_routines(switch_routines(switches, names.shared), names.data),
+        scaled_states=tuple(name for name, _ in experiment.scale),
     )
 
 
@@ -137,6 +138,8 @@ def _constants(system: HybridSystem, names: Names):
     for key in ("until", "step", "tolerance", "relaxation", "max_transitions"):
         if getattr(experiment, key) is not None:
             yield define(key, getattr(experiment, key))
+    if experiment.scale:
+        yield define("scale", *(size for _, size in experiment.scale))
     if isinstance(experiment.samples, tuple):
         yield define("sample_times", *experiment.samples)
     elif experiment.samples is not None:

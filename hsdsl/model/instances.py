@@ -15,7 +15,7 @@ import numpy as np
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
-from hsdsl.model.requests import FILE, Request
+from hsdsl.model.requests import FILE, SCALE, Request
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate import Settings
@@ -174,6 +174,7 @@ def settings_rows(columns: Columns, base: Settings, request: Request) -> list[Se
         The step or the tolerance is not the same for all.
     """
     numbers = {key: _setting(columns, request, key) for key in ("until", "relaxation", "max_transitions", request.size)}
+    scales = _scale_columns(columns, request)
     found: list[Settings] = []
     for k, (until, relaxation, most, size) in enumerate(zip(*numbers.values(), strict=True)):
         if k in columns.refused:
@@ -185,12 +186,26 @@ def settings_rows(columns: Columns, base: Settings, request: Request) -> list[Se
             columns.refused[k] = f"until = {until}, relaxation = {relaxation}, max_transitions = {most} cannot be"
             found.append(base)
         else:
-            found.append(replace(base, until=until, relaxation=relaxation, max_transitions=int(most)))
+            scale = {name: sizes[k] for name, sizes in scales.items()}
+            found.append(replace(base, until=until, relaxation=relaxation, max_transitions=int(most), scale=scale))
     return found
+
+
+def _scale_columns(columns: Columns, request: Request) -> dict[str, list[float]]:
+    """The given sizes of states, of every instance."""
+    keys = [key for key in request.values if key.startswith(SCALE)]
+    sizes = {key.removeprefix(SCALE): _setting(columns, request, key) for key in keys}
+    for name, column in sizes.items():
+        for k in (k for k, size in enumerate(column) if not size > 0):
+            columns.refused.setdefault(k, f"{SCALE}{name} must be positive, not {column[k]}")
+    return sizes
 
 
 def _setting(columns: Columns, request: Request, key: str) -> list[float]:
     asked, values = request.values[key], columns.values
+    if asked.place == FILE and key.startswith(SCALE):
+        k = values.program.scaled_states.index(key.removeprefix(SCALE))
+        return [row[k] for row in columns.constant("scale", key)]
     if asked.place == FILE:
         return [row[0] for row in columns.constant(key, key)]
     return [row[0] for row in columns.of(values.routine(asked.value, key, len(values.program.parameters)), key)]

@@ -118,6 +118,7 @@ class Model:
         step: Any = None,
         tolerance: Any = None,
         relaxation: Any = None,
+        scale: Mapping[str, Any] | None = None,
         samples: Any = None,
         max_transitions: Any = None,
         parameters: Mapping[str, Any] | None = None,
@@ -143,6 +144,8 @@ class Model:
             other.
         relaxation : number or str, optional
             The paper's epsilon: a depth in the model's own units, and a time.
+        scale : mapping, optional
+            Sizes of states by name: the scale of a state is this size until the state has been larger.
         samples : int, str or sequence, optional
             How many equally spaced samples, or their times; what files are written at.
         max_transitions : int or str, optional
@@ -172,16 +175,20 @@ class Model:
         """
         if outputs is not None:
             smaller = self.only(outputs)
-            given = {
-                k: v for k, v in (initial or {}).items() if k in ("mode", *smaller.columns) or k not in self.columns
-            }
+
+            def known(given: Mapping[str, Any] | None) -> dict[str, Any]:
+                """Values of states that are left."""
+                gone = set(self.columns) - {"mode", *smaller.columns}
+                return {name: value for name, value in (given or {}).items() if name not in gone}
+
             return smaller.simulate(
                 until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
-                samples=samples, max_transitions=max_transitions, parameters=parameters, initial=given,
+                scale=known(scale),
+                samples=samples, max_transitions=max_transitions, parameters=parameters, initial=known(initial),
                 settings=settings, engine=engine, precision=precision, watch=watch,
             )  # fmt: skip
         key = key_of(
-            until, scheme, method, step, tolerance, relaxation, samples, max_transitions,
+            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions,
             parameters, initial, settings, engine, precision,
         )  # fmt: skip
         ready = self._prepared.find(key)
@@ -193,6 +200,7 @@ class Model:
                 step=step,
                 tolerance=tolerance,
                 relaxation=relaxation,
+                scale=scale,
                 samples=samples,
                 max_transitions=max_transitions,
             )

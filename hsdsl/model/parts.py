@@ -111,7 +111,8 @@ class Parts:
         """Resolve what the file, ``settings`` and a call ask for."""
         program, given = self.program, self.program.constants.names
         in_file: dict[str, Any] = {"scheme": program.scheme, "method": program.method}
-        in_file |= {key: key for key in KEYS if key in given}  # their values are routines
+        in_file |= {key: key for key in KEYS if key in given and key != "scale"}  # their values are routines
+        in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
         if "sample_times" in given or "sample_count" in given:
             in_file["samples"] = "samples"
         return resolve((Source(FILE, in_file), Source("--set", settings or {}), Source("the call", asked or {})))

@@ -7,9 +7,9 @@ its own formula (:data:`OWN_FORMULA`) takes a step, and neither a method nor a r
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
@@ -19,8 +19,9 @@ from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate import SCHEMES
 
-KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "samples", "max_transitions")
+KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "scale", "samples", "max_transitions")
 OWN_FORMULA = ("paoli-schatzman",)
+SCALE = "scale."  # and a state: its given size
 FILE, DEFAULT = "the file", "default"
 # what other tools call methods of this order
 ELSEWHERE = {
@@ -73,9 +74,9 @@ def resolve(sources: Sequence[Source]) -> Request:
     """
     values = {key: Asked(value, DEFAULT) for key, value in DEFAULTS.items()}
     for source in sources:
-        given = {key: value for key, value in source.values.items() if value is not None}
+        given = {key: value for key, value in _with_scales(source) if value is not None}
         for key in given:
-            if key not in KEYS:
+            if key not in KEYS and not key.startswith(SCALE):
                 raise UsageError(f"{source.place}: the experiment has no setting '{key}'", did_you_mean(key, KEYS))
         if "step" in given and "tolerance" in given:
             raise UsageError(
@@ -95,6 +96,19 @@ def resolve(sources: Sequence[Source]) -> Request:
         return Request(scheme, None, size, values)
     method = _method(values["method"], values[size], size)
     return Request(scheme, method or METHODS[AUTO], size, values, automatic=method is None)
+
+
+def _with_scales(source: Source) -> Iterator[tuple[str, Any]]:
+    """The settings of a source, the size of each state under a key of its own."""
+    for key, value in source.values.items():
+        if key != "scale" or value is None:
+            yield key, value
+        elif isinstance(value, Mapping):
+            yield from ((f"{SCALE}{name}", size) for name, size in cast("Mapping[str, Any]", value).items())
+        else:
+            raise UsageError(
+                f"scale ({source.place}): expected a mapping from states to sizes", "set experiment.scale.NAME"
+            )
 
 
 def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:

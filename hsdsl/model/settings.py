@@ -12,8 +12,9 @@ from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
 from hsdsl.limits import current
-from hsdsl.model.requests import DEFAULT, FILE, Asked, Request, check_digits, check_smooth, check_tolerance
+from hsdsl.model.requests import DEFAULT, FILE, SCALE, Asked, Request, check_digits, check_smooth, check_tolerance
 from hsdsl.model.values import Values, samples
+from hsdsl.names import did_you_mean
 from hsdsl.simulate import Settings
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
@@ -67,9 +68,29 @@ def settings_of(request: Request, values: Values) -> Settings:
         relaxation=relaxation,
         until=until,
         max_transitions=int(most),
+        scale=_scale(request, values),
         samples=_samples(request, values),
         memory=current().memory,
     )
+
+
+def _scale(request: Request, values: Values) -> dict[str, Number]:
+    """The given sizes of states."""
+    program = values.program
+    states = dict.fromkeys((*(s for mode in program.modes for s in mode.states), *program.initial_states))
+    in_file = dict(zip(program.scaled_states, values.constant("scale") if values.has("scale") else (), strict=True))
+    sizes: dict[str, Number] = {}
+    for key, asked in request.values.items():
+        name = key.removeprefix(SCALE)
+        if name == key:
+            continue
+        if name not in states:
+            raise UsageError(f"{key}: the model has no state '{name}'", did_you_mean(name, [*states]))
+        size = in_file[name] if asked.place == FILE else values.number(asked.value, key)
+        if not size > 0:
+            raise UsageError(f"{key} must be positive, not {size}")
+        sizes[name] = size
+    return sizes
 
 
 def following_digits(settings: Settings, request: Request, arithmetic: Arithmetic) -> Settings:

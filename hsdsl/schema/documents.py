@@ -161,6 +161,12 @@ class Experiment(Document):
         "or 1e-6 of a run that is shorter than 1.",
         examples=["1e-6"],
     )
+    scale: OpenTable[Expression] = Field(
+        default_factory=empty,
+        description="State: its typical size, positive. The scale of a state is this size until the state has been "
+        "larger.",
+        examples=[{"x": "1e-3", "v": 1}],
+    )
     samples: Samples | None = Field(
         None, description="How many samples to record, or a list of their times.", examples=[201, [0, "1/2", 1]]
     )

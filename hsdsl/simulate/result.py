@@ -176,6 +176,7 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
         **size,
         **({"relaxation": settings.relaxation} if settings.method else {}),
         "max_transitions": settings.max_transitions,
+        **({"scale": dict(settings.scale)} if settings.scale else {}),
         **({} if samples is None else {"samples": samples}),
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
         **({"left_out": {"states": list(left_out), "reason": notes.LEFT_OUT}} if left_out else {}),

@@ -35,6 +35,7 @@ class Settings:
     size that each state has had) is given.
     ``relaxation`` is the paper's epsilon: a depth in the model's own units, and a time. ``samples`` (how many equally
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
+    ``scale`` has the given sizes of states: the scale of a state is this size until the state has been larger.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
     ``memory`` is how many bytes of rows a run may keep.
@@ -48,6 +49,7 @@ class Settings:
     relaxation: Number
     until: Number
     max_transitions: int
+    scale: Mapping[str, Number] = field(default_factory=dict[str, Number])
     samples: int | tuple[Number, ...] | None = None
     one_stop: OneStop | None = None
     method_chosen: str | None = None

@@ -49,6 +49,7 @@ from hsdsl.lint.units.unit import Unit
 _WHAT = {
     "reset": "the new value of",
     "initial": "the initial value of",
+    "scale": "the scale of",
     "parameter": "the parameter",
     "input": "the input",
     "output": "the output",

@@ -12,7 +12,7 @@ from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
 from hsdsl.schema import Model, ParameterEntry
 from hsdsl.source import Scalar
 
-_VALUES = ("parameter", "input", "initial", "output")
+_VALUES = ("parameter", "input", "initial", "scale", "output")
 
 
 @dataclass(frozen=True)
