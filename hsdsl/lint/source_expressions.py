@@ -95,7 +95,7 @@ def written(document: Model) -> Iterator[SourceExpression]:
     for name in ("until", "step", "tolerance", "relaxation", "max_transitions"):
         yield from _each("experiment", (getattr(experiment, name),), name)
     for name, scalar in experiment.scale.items():
-        yield Written("scale", scalar, name)
+        yield SourceExpression("scale", scalar, name)
     samples = experiment.samples
     yield from _each("experiment", samples if isinstance(samples, list) else (samples,), "samples")
     for reference in document.reference:
