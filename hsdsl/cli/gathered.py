@@ -39,6 +39,7 @@ class Gathered:
     findings: list[Diagnostic] = field(default_factory=list[Diagnostic])
     ignored: list[Ignored] = field(default_factory=list["Ignored"])
     code: int = 0
+    notes: bool = True  # whether text shows notes in full
 
     def wrong(self, entry: dict[str, Any], error: ModelError | UsageError) -> None:
         """Take note of a model that has errors or cannot be read."""
@@ -75,9 +76,17 @@ class Gathered:
         if self.errors:
             say_lines("\n\n".join(map(render, self.errors)))
             say_lines(f"\n{counted(len(self.errors), 'error')}")
-        if self.findings:
-            print("\n\n".join(map(render, self.findings)))
-            print(f"\n{counted(len(self.findings), 'finding')}")
+        shown = [finding for finding in self.findings if self.notes or finding.severity == "warning"]
+        if shown:
+            print("\n\n".join(map(render, shown)))
+            print(f"\n{counted(len(shown), 'finding')}")
+
+    def count_hidden(self) -> None:
+        """Print the number of notes that text does not show."""
+        hidden = [found.code for found in self.findings if found.severity == "note" and not self.notes]
+        if hidden:
+            about = " on the mathematics" if all(code.startswith("HS5") for code in hidden) else ""
+            print(f"{counted(len(hidden), 'note')}{about}: hsdsl lint --notes")
 
     def _json(self, lint: bool) -> None:
         from hsdsl.report import dumps

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     "--select", metavar="RULE,...", help="Use these rules alone: codes, beginnings of codes, families or names."
 )
 @click.option("--ignore", metavar="RULE,...", help="Do not use these rules.")
+@click.option("--notes", is_flag=True, help="Show notes in full; with --select they always are.")
 @click.option("--fix", is_flag=True, help="Remedy in the files what can be remedied safely.")
 @click.option("--quiet", "-q", is_flag=True, help="Say only what is found.")
 @limited
@@ -35,11 +36,12 @@ def lint(
     json: bool,
     select: str | None,
     ignore: str | None,
+    notes: bool,
     fix: bool,
     quiet: bool,
 ) -> None:
     """Look for what is legal in a model and still probably not meant."""
-    gathered = Gathered()
+    gathered = Gathered(notes=notes or select is not None)
     format = Format.json if json else format
     for path in models:
         try:
@@ -50,8 +52,10 @@ def lint(
             entry = {"path": str(path), "clean": not report.findings, "fixed": remedied}
             gathered.looked(entry, report.findings, report.ignored)
             if format is Format.text and not quiet:
-                _sum_up(path, report, remedied)
+                _sum_up(path, report, remedied, gathered.notes)
     gathered.say(format, lint=True)
+    if format is Format.text and not quiet:
+        gathered.count_hidden()
     raise Exit(gathered.code)
 
 
@@ -73,9 +77,10 @@ def _look(path: Path, selection: Selection, fix: bool) -> tuple[Report, int]:
     return look(path, selection), 0
 
 
-def _sum_up(path: Path, report: Report, remedied: int) -> None:
-    """Say in a line what became of a model without findings left, or with something remedied or ignored."""
+def _sum_up(path: Path, report: Report, remedied: int, notes: bool) -> None:
+    """Say in a line what became of a model without findings to show, or with something remedied or ignored."""
+    shown = [finding for finding in report.findings if notes or finding.severity == "warning"]
     parts = [f"{remedied} fixed"] * bool(remedied) + [f"{len(report.ignored)} ignored"] * bool(report.ignored)
-    found = counted(len(report.findings), "finding") if report.findings else "clean"
-    if parts or not report.findings:
+    found = counted(len(shown), "finding") if shown else "clean"
+    if parts or not shown:
         print(", ".join([f"{visible(str(path))}: {found}", *parts]))

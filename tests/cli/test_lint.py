@@ -42,6 +42,18 @@ def test_text(command, bad):
     )
 
 
+def test_notes_are_counted_unless_selected(command, model):
+    path = model(BAD.replace("reset: {h: h, v: -v}", "reset: {v: -v}").replace(", drag: 0.1", ""))
+    hidden = command("lint", path)
+    assert hidden.code == 0
+    assert hidden.out == f"{path}: clean, 1 ignored\n2 notes on the mathematics: hsdsl lint --notes\n"
+    assert command("lint", path, "--quiet").out == ""
+    for option in (["--notes"], ["--select", "HS505,HS507"]):
+        shown = command("lint", path, *option)
+        assert shown.code == 0 and shown.out.count(": note HS50") == 2 and "2 findings" in shown.out
+    assert len(command("lint", path, "--json").json["findings"]) == 2
+
+
 def test_clean(command, bad):
     answer = command("lint", bad, "--select", "HS406")
     assert (answer.code, answer.out) == (0, f"{bad}: clean\n")
