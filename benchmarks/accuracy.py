@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 import hsdsl
-from hsdsl.exact.stop import exact_example_1, exact_example_2
 from hsdsl.model.estimate import corrected_times
 
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "tests"))  # the independent integrations live with the tests
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "models")]  # independent integrations and closed forms
 
 from exact.pendulum import exact_pendulum  # noqa: E402
+from references.impact_oscillator import exact_example_1, exact_example_2  # noqa: E402
 
 RUNNER = {
     "A": ("0", [0.2435646781063, 0.2435646781063, 0.6755930236353, 0.6755930236353, 0.9259377788821]),

@@ -1,24 +1,83 @@
-"""A stretch of a formula as polynomial pieces, and a bound on what they are off by.
+"""Closed forms between jumps in eighty digits, as polynomial pieces with a bound on their error.
 
-On a piece of length h the formula is interpolated at K + 1 Chebyshev-Lobatto points, so that the pieces of a stretch
-join, and the error is at most h^(K+1) M / ((K+1)! 4^K), M a bound on the derivative of order K + 1. What is stated adds
-the round-off of coefficients and of Horner's rule (to first order), and what half a unit in the last place of a
-transition's time makes.
+A piece of length h interpolates the formula at K + 1 Chebyshev-Lobatto points, so that the pieces of a stretch join.
+Its error is at most h^(K+1) M / ((K+1)! 4^K), M a bound on the derivative of order K + 1. The stated error adds
+round-off of coefficients and of Horner's rule (to first order), and the effect of rounding transition times to floats.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from math import ceil, factorial, nextafter
+from typing import Any
 
 import numpy as np
+from mpmath import MPContext  # pyright: ignore[reportMissingTypeStubs]
 
-from hsdsl.exact.numbers import Number, Vector, mp
-from hsdsl.exact.scene import Stretch
+from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 
+Number = Any  # mpmath.mpf of the context below
+Vector = tuple[Number, ...]
+
+DIGITS = 80
+mp: Any = MPContext()  # mpmath's global context stays as it is
+mp.dps = DIGITS
 TOLERANCE = 1e-14  # of the interpolation
 UNIT = 2.0**-53
+
+
+def number(value: Any, name: str = "the number") -> Number:
+    """Turn an int, a float (its binary value), decimal text, a fraction or an mpmath number into a finite number.
+
+    Raises
+    ------
+    UsageError
+        It is none of these.
+    """
+    try:
+        exact = Fraction(value) if isinstance(value, (int, float, str, Fraction)) else None
+        converted = mp.mpf(exact.numerator) / exact.denominator if exact is not None else mp.convert(value)
+    except (TypeError, ValueError, OverflowError, ZeroDivisionError):
+        converted = mp.nan
+    if not mp.isfinite(converted):
+        raise UsageError(f"{name}: expected a finite number, got {value!r}")
+    return converted
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """The closed form between two jumps, over [start, end] in one mode.
+
+    Attributes
+    ----------
+    first, last : Vector
+        The one-sided values at start and end.
+    at : callable or None
+        The state at a time; None: the line from ``first`` to ``last``.
+    derivative : callable
+        ``derivative(n)``: bounds on the absolute n-th derivatives of the states over the stretch.
+    edge : str or None
+        The transition that ends it; None where the state goes on, or the run ends.
+    alternatives : tuple of str
+        Edges reached at the same time and not taken.
+    slack : float
+        Bound on the distance to the true execution (a Zeno tail replaced by a line).
+    """
+
+    mode: str
+    start: Number
+    end: Number
+    first: Vector
+    last: Vector
+    at: Callable[[Number], Vector] | None
+    derivative: Callable[[int], Vector]
+    edge: str | None = None
+    alternatives: tuple[str, ...] = ()
+    slack: float = 0.0
 
 
 def breakpoints(stretch: Stretch, degree: int) -> list[Number]:

@@ -1,56 +1,29 @@
-"""The exact execution of a model: a closed form where there is one, else what is stored beside the model.
+"""The exact execution of a model: a stored one that solves it, found by content.
 
-Stored executions lie in ``references/NAME-K.npz`` in the folder of ``NAME.yaml``, K counting the blocks of its
-``reference:`` section from 0. Whichever it is, it is held against the model as it reads now before it is given out.
+Stored executions are the files of ``stored/`` (written by ``models/references/build.py``) and of the folder
+``references`` next to the model. The one that starts where the model does and satisfies its flow, guards, resets and
+domains is the model's reference, whatever the name of its file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from hsdsl.errors import UsageError
-from hsdsl.exact.ball import bouncing_ball
-from hsdsl.exact.heater import thermostat
-from hsdsl.exact.oscillators import oscillator
-from hsdsl.exact.pendulum import constrained_pendulum
-from hsdsl.exact.quadrants import digital_control
 from hsdsl.exact.residual import residual
-from hsdsl.exact.runner import pronking_runner
-from hsdsl.exact.stiff_switch import stiff_switch
-from hsdsl.execution import Execution
+from hsdsl.execution import Execution, Point
 from hsdsl.program import Program
 from hsdsl.store import load
 
-Solution = Callable[[], Execution]
-
-CLOSED_FORMS: dict[str, tuple[Solution, ...]] = {
-    "bouncing-ball": (bouncing_ball,),
-    "digital-control": (
-        digital_control,
-        lambda: digital_control("-1.1", -1),
-        lambda: digital_control(-1, "-1.1"),
-    ),
-    "oscillator-with-stop-1": (lambda: oscillator(1),),
-    "oscillator-with-stop-2": (lambda: oscillator(2),),
-    "stiff-switch": (stiff_switch,),
-    "thermostat": (thermostat,),
-}
-"""By a model's name, for each block of its ``reference:``: solved by formula, when asked for."""
-
-STORED: dict[str, tuple[Solution, ...]] = {
-    "constrained-pendulum": (constrained_pendulum,),
-    "pronking-runner": (pronking_runner, lambda: pronking_runner("-0.4")),
-}
-"""The same, solved by series, which takes seconds: ``python models/references/build.py`` writes them down."""
-
+STORED = Path(__file__).with_name("stored")
 LARGEST_DEFECT = 1e-9  # of slopes, guards and resets, relative
 
 
 class Referenced(Protocol):
-    """A model, as far as its reference needs one."""
+    """The part of a model that its reference needs."""
 
     @property
     def program(self) -> Program: ...
@@ -62,66 +35,73 @@ class Referenced(Protocol):
 
 
 def reference(model: Referenced, block: int = 0) -> Execution:
-    """Return the exact execution that belongs to a model.
+    """Return the exact execution of a model.
 
     Parameters
     ----------
     model : Model
-        One with a closed form in `CLOSED_FORMS`, or with an execution stored beside it.
+        A model that a stored execution solves.
     block : int
-        Which block of its ``reference:``, where it has several (other initial values).
+        Index in the model's ``reference:`` section, where it has several blocks (other initial values).
 
     Returns
     -------
     Execution
-        ``settings["error"]`` says what it is off by at most at any time, ``settings["source"]`` where it comes from.
+        ``settings["error"]`` bounds its error at any time, ``settings["source"]`` names its origin.
 
     Raises
     ------
     UsageError
-        Nothing exact is known of the model, or what is known does not solve it (it was edited since).
+        No stored execution solves the model.
     """
-    path = Path(model.program.path)
-    known, stored = CLOSED_FORMS.get(path.stem, ()), path.parent / "references" / file_name(path.stem, block)
-    if 0 <= block < len(known):
-        found = known[block]()
-    elif block >= 0 and stored.is_file():
-        found = load(stored)
-    else:
-        raise UsageError(
-            f"no exact execution is known for block {block} of {path.name}, and {stored} is not there",
-            "hsdsl.exact.precise(model, digits) refines a run until so many digits stay",
-        )
-    _check(model, block, found)
-    return replace(found, model=model.program.path, digest=model.program.digest)
+    program = model.program
+    defects: dict[str, str] = {}
+    if 0 <= block < max(1, len(references_of(model))):
+        start = _start(model, block)
+        for run in _candidates(program):
+            defect = _defect(program, start, run)
+            if not defect:
+                return replace(run, model=program.path, digest=program.digest)
+            defects[defect] = f"; that of '{run.title}' {defect}"
+    nearest = defects[max(defects, key=len)] if defects else ""
+    raise UsageError(
+        f"no exact execution is known for block {block} of {Path(program.path).name}{nearest}",
+        "hsdsl.exact.precise(model, digits) refines a run until so many digits stay",
+    )
 
 
 def references_of(model: Referenced) -> list[Mapping[str, str]]:
-    """What each block of a model's ``reference:`` sets, by names such as ``initial.w``."""
+    """The overrides of each block of a model's ``reference:`` section, by names such as ``initial.w``."""
     return [block.get("set", {}) for block in model.system.reference]
 
 
-def file_name(stem: str, block: int) -> str:
-    """The name of a stored reference."""
-    return f"{stem}-{block}.npz"
-
-
-def _check(model: Referenced, block: int, found: Execution) -> None:
-    """Refuse an execution that does not begin where the block says, or does not follow the model's equations."""
-    what = f"the exact execution known as {Path(model.program.path).stem}, block {block},"
-    settings: Mapping[str, str] = references_of(model)[block] if block < len(references_of(model)) else {}
+def _start(model: Referenced, block: int) -> Point:
+    settings: Mapping[str, str] = dict(enumerate(references_of(model))).get(block, {})
     if any(not name.startswith("initial.") for name in settings):
-        raise UsageError(f"{what} is of other parameters or settings than the model's own, which is not supported")
+        raise UsageError(f"block {block} of the reference overrides more than initial values, which is not supported")
     initial = {name.removeprefix("initial."): text for name, text in settings.items()}
-    start = model.simulate(until=0, initial=initial)(0.0, side="left")
-    first = found(0.0, side="left")
-    if first.mode != start.mode or set(first.state) != set(start.state):
-        raise UsageError(f"{what} starts in another mode than the model")
+    return model.simulate(until=0, initial=initial)(0.0, side="left")
+
+
+def _candidates(program: Program) -> Iterator[Execution]:
+    """Stored executions whose first mode is a mode of the model, with the same states."""
+    modes = {mode.name: mode.states for mode in program.modes}
+    for folder in (Path(program.path).parent / "references", STORED):
+        for path in sorted(folder.glob("*.npz")):
+            run = load(path)
+            if run.arcs[0].states == modes.get(run.arcs[0].mode):
+                yield run
+
+
+def _defect(program: Program, start: Point, run: Execution) -> str:
+    """Why an execution is not the model's own from a start; empty where it is."""
+    first = run(0.0, side="left")
+    if first.mode != start.mode:
+        return "starts in another mode"
     if any(abs(first.state[name] - value) > LARGEST_DEFECT for name, value in start.state.items()):
-        raise UsageError(f"{what} starts elsewhere than the model")
+        return "starts elsewhere"
     try:
-        defect = residual(model.program, found)
+        defect = residual(program, run)
     except ValueError as error:
-        raise UsageError(f"{what} does not fit the model: {error}") from None
-    if not defect <= LARGEST_DEFECT:
-        raise UsageError(f"{what} does not solve the model as it is written: off by {defect:.2g}")
+        return f"does not fit the model: {error}"
+    return "" if defect <= LARGEST_DEFECT else f"does not solve the model as it is written: off by {defect:.2g}"

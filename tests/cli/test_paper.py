@@ -1,4 +1,4 @@
-"""``python -m hsdsl.paper``: the quick mode from end to end, its numbers against known ones, and its page."""
+"""``python examples/paper``: the quick mode from end to end, its numbers against known ones, and its page."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from paper.__main__ import main
+from paper.accuracy import findings, measure, measure_rival, velocity_reversed
+from paper.parts import PARTS
+from paper.runner import CAPTION, KNOWN, guard_curves, snapshots
 
 from hsdsl import load
-from hsdsl.exact import oscillator
-from hsdsl.paper.__main__ import main
-from hsdsl.paper.accuracy import findings, measure, measure_rival, velocity_reversed
-from hsdsl.paper.parts import PARTS
-from hsdsl.paper.runner import CAPTION, KNOWN, guard_curves, snapshots
+from hsdsl.exact import reference
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "paper.md"
@@ -150,7 +150,7 @@ def test_reversing_the_velocity_mirrors_it_inside_each_step():
 def test_the_finest_step_against_what_others_recorded():
     """Example 1 at h = 5e-4: rho-hat as the authors' program has it, and what their reversed velocity makes of rho."""
     model = load(ROOT / "models" / "oscillator-with-stop-1.yaml")
-    truth = oscillator(1, model)
+    truth = reference(model)
     fine = measure(1, model, truth, 5e-4, 2e-5)
     assert fine.rho_upper <= 2.5e-4 and fine.rho_upper - fine.rho_lower <= 1e-5
     assert fine.rho_hat <= 8.7e-5
@@ -165,7 +165,7 @@ def test_the_finest_step_against_what_others_recorded():
 def test_the_finest_step_with_the_largest_relaxation():
     for example, recorded in ((1, 2.03e-3), (2, 1.28e-5)):
         model = load(ROOT / "models" / f"oscillator-with-stop-{example}.yaml")
-        point = measure(example, model, oscillator(example, model), 5e-4, 2e-2)
+        point = measure(example, model, reference(model), 5e-4, 2e-2)
         assert recorded / 2 < point.rho_hat < 1.1 * recorded
         for finding in findings([point], []):
             on_page(finding.cells)
@@ -174,7 +174,7 @@ def test_the_finest_step_with_the_largest_relaxation():
 @pytest.mark.slow
 def test_the_finest_step_of_example_2():
     model = load(ROOT / "models" / "oscillator-with-stop-2.yaml")
-    truth = oscillator(2, model)
+    truth = reference(model)
     fine = measure(2, model, truth, 5e-4, 2e-5)
     assert fine.rho_upper <= 1.2e-4
     assert fine.rho_hat <= 5e-8

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from references.impact_oscillator import Motion, exact_example_1, exact_example_2
 
 import hsdsl
-from hsdsl.exact.stop import Motion, exact_example_1, exact_example_2
 
 MODELS = Path(__file__).parents[2] / "models"
 

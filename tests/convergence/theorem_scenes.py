@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from exact.dimensions import dimensions
 from exact.relaxed import delayed, relaxed_oscillator
+from references.impact_oscillator import exact_example_1, exact_example_2
 
 import hsdsl
 from hsdsl.exact.references import reference
-from hsdsl.exact.stop import exact_example_1, exact_example_2
 from hsdsl.model.between_runs import distance
 
 ROOT = Path(__file__).parents[2]
@@ -92,9 +92,7 @@ OSCILLATOR, OTHER = "oscillator-with-stop-1", "oscillator-with-stop-2"
 SCENES = {
     "thermostat": known("thermostat", 10, 2, o1=0.4, o2=0.4, o4=0.8),
     "oscillator 1, 2 impacts": known(OSCILLATOR, 3, 2, waits(exact_example_1), o1=1e-3, o2=4e-3, o4=1.6e-2),
-    "one state to three": Scene(
-        HERE / "dimensions.yaml", 3, 3, lambda model: dimensions(of=model), shift, {1: 2e-2, 2: 4e-2, 4: 8e-2}
-    ),
+    "one state to three": Scene(HERE / "dimensions.yaml", 3, 3, dimensions, shift, {1: 2e-2, 2: 4e-2, 4: 8e-2}),
 }
 LONG = {
     "pendulum": known("constrained-pendulum", 4, 4, o1=5e-3, o2=1e-2, o4=2e-2),

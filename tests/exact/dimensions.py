@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from hsdsl.exact.numbers import Number, Vector, mp
-from hsdsl.exact.pieces import as_execution
-from hsdsl.exact.scene import Scene, Stretch
+from hsdsl.exact.closed_form import ClosedForm, as_execution
+from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.execution import Verdict
 
 STATES = {"line": ("x",), "plane": ("x", "y"), "space": ("x", "y", "z"), "last": ("x",)}
 
 
-def dimensions(until: Any = 3, of: Any = None) -> Any:
+def dimensions(of: Any, until: Any = 3) -> Any:
     """The execution from x = 0."""
     verdict = Verdict("holds", ("every surface is crossed at a rate of 1/2 at least",))
     stretches = list(_stretches(mp.mpf(until)))
-    return as_execution(Scene("dimensions.yaml", "Dimensions", "closed form", STATES, stretches, verdict, 8), of)
+    form = ClosedForm("dimensions.yaml", "Dimensions", "closed form", STATES, stretches, verdict, 8)
+    return replace(as_execution(form), digest=of.program.digest)
 
 
 def _stretches(until: Number) -> Iterator[Stretch]:

@@ -6,12 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from references.impact_oscillator import Flight, Motion
+from references.rests import rest
 
-from hsdsl.exact.numbers import mp
-from hsdsl.exact.pieces import as_execution
-from hsdsl.exact.scene import Scene, Stretch
-from hsdsl.exact.stop import Flight, Motion
-from hsdsl.exact.tails import rest
+from hsdsl.exact.closed_form import ClosedForm, as_execution
+from hsdsl.exact.interpolation import Stretch, mp
 from hsdsl.execution import Arc, Verdict
 
 
@@ -63,8 +62,8 @@ def relaxed_oscillator(motion: Motion, eps: float, until: float, of: Any) -> Any
         edge = "impact" if hit <= until else None
         stretches.append(Stretch("free", t, end, (x, v), last, flight.at, flight.derivative, edge))
         t, x, v = hit + wait, stop, -c * last[1]
-    scene = Scene("oscillator.yaml", "relaxed", "closed form", {"free": ("x", "v")}, stretches, UNKNOWN, 8)
-    return as_execution(scene, of)
+    form = ClosedForm("oscillator.yaml", "relaxed", "closed form", {"free": ("x", "v")}, stretches, UNKNOWN, 8)
+    return replace(as_execution(form), digest=of.program.digest)
 
 
 UNKNOWN = Verdict("unknown", ())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -12,13 +13,18 @@ import mpmath
 import numpy as np
 import pytest
 from exact.pendulum import exact_pendulum
+from references.bouncing_ball import bouncing_ball
+from references.digital_control import digital_control
+from references.impact_oscillator import exact_example_1, exact_example_2
+from references.oscillators import oscillator
+from references.stiff_switch import stiff_switch
+from references.thermostat import thermostat
 from scipy.integrate import solve_ivp
 
 import hsdsl
 from hsdsl import exact
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.python import PythonKernel
-from hsdsl.exact.stop import exact_example_1, exact_example_2
 from hsdsl.store import load
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -33,16 +39,16 @@ def model(name: str) -> Any:
 
 # name: (model, the execution of it)
 SCENES: dict[str, tuple[str, Callable[..., Any]]] = {
-    "oscillator 1": ("oscillator-with-stop-1", lambda **of: exact.oscillator(1, **of)),
-    "oscillator 2": ("oscillator-with-stop-2", lambda **of: exact.oscillator(2, **of)),
-    "ball": ("bouncing-ball", exact.bouncing_ball),
-    "ball past its Zeno point": ("bouncing-ball", lambda **of: exact.bouncing_ball(until=15, **of)),
-    "thermostat": ("thermostat", exact.thermostat),
-    "stiff switch": ("stiff-switch", exact.stiff_switch),
-    "digital control": ("digital-control", exact.digital_control),
-    "digital control, x behind": ("digital-control", lambda **of: exact.digital_control("-1.1", -1, **of)),
-    "digital control, y behind": ("digital-control", lambda **of: exact.digital_control(-1, "-1.1", **of)),
-    "digital control, to a guard": ("digital-control", lambda **of: exact.digital_control(until=1, **of)),
+    "oscillator 1": ("oscillator-with-stop-1", lambda: oscillator(1)),
+    "oscillator 2": ("oscillator-with-stop-2", lambda: oscillator(2)),
+    "ball": ("bouncing-ball", bouncing_ball),
+    "ball past its Zeno point": ("bouncing-ball", lambda: bouncing_ball(until=15)),
+    "thermostat": ("thermostat", thermostat),
+    "stiff switch": ("stiff-switch", stiff_switch),
+    "digital control": ("digital-control", digital_control),
+    "digital control, x behind": ("digital-control", lambda: digital_control("-1.1", -1)),
+    "digital control, y behind": ("digital-control", lambda: digital_control(-1, "-1.1")),
+    "digital control, to a guard": ("digital-control", lambda: digital_control(until=1)),
 }
 
 
@@ -50,7 +56,7 @@ SCENES: dict[str, tuple[str, Callable[..., Any]]] = {
 def scene(name: str) -> Any:
     """An exact execution with its model's name on it, made once."""
     of, make = SCENES[name]
-    return make(of=model(of))
+    return replace(make(), digest=model(of).program.digest)
 
 
 FIRST = [
@@ -116,7 +122,7 @@ def test_ball_as_known() -> None:
 @pytest.mark.parametrize("d", ["1e-1", "1e-3", "1e-6", "1e-20"])
 def test_digital_control_beside_the_diagonal(d: str) -> None:
     """The side is right however small d is; at t = 2 (1 - d, 1 - d/5) and (1 - 3 d/10, 1 - d)."""
-    behind_x, behind_y = exact.digital_control(-1 - Fraction(d)), exact.digital_control(-1, -1 - Fraction(d))
+    behind_x, behind_y = digital_control(-1 - Fraction(d)), digital_control(-1, -1 - Fraction(d))
     assert [t.target for t in behind_x.transitions] == ["D1", "D3"]
     assert [t.target for t in behind_y.transitions] == ["D2", "D3"]
     assert behind_x.final.state == {"x": float(1 - Fraction(d)), "y": float(1 - Fraction(d) / 5)}
@@ -319,16 +325,15 @@ def test_the_two_sides_of_a_jump_are_the_rows() -> None:
 
 
 REFUSED: dict[str, Callable[[], Any]] = {
-    "example 3": lambda: exact.oscillator(3),
-    "a start outside": lambda: exact.digital_control("0.1", -1),
-    "no number": lambda: exact.digital_control("east"),
-    "not finite": lambda: exact.bouncing_ball(float("inf")),
-    "restitution 1": lambda: exact.bouncing_ball(e=1),
-    "too hot": lambda: exact.thermostat(23),
-    "until below 0": lambda: exact.thermostat(until=-1),
-    "above the level": lambda: exact.stiff_switch(6),
-    "not stiff": lambda: exact.stiff_switch(fast=3),
-    "another model": lambda: exact.bouncing_ball(of=model("thermostat")),
+    "example 3": lambda: oscillator(3),
+    "a start outside": lambda: digital_control("0.1", -1),
+    "no number": lambda: digital_control("east"),
+    "not finite": lambda: bouncing_ball(float("inf")),
+    "restitution 1": lambda: bouncing_ball(e=1),
+    "too hot": lambda: thermostat(23),
+    "until below 0": lambda: thermostat(until=-1),
+    "above the level": lambda: stiff_switch(6),
+    "not stiff": lambda: stiff_switch(fast=3),
     "too many digits": lambda: exact.precise(model("thermostat"), 20),
     "a run that stops": lambda: exact.precise(model("bouncing-ball"), 4, max_transitions=2),
 }
@@ -355,7 +360,7 @@ def test_refined_pendulum() -> None:
 
 def test_refined_ball_between_its_bounces(tmp_path: Path) -> None:
     run = exact.precise(model("bouncing-ball"), 8, until=4)
-    truth = exact.bouncing_ball(until=4)
+    truth = bouncing_ball(until=4)
     times = np.linspace(0.01, 3.99, 200)
     for name in ("h", "v"):
         assert np.max(np.abs(run.sample(times)[name] - truth.sample(times)[name])) <= run.settings["error"]

@@ -10,9 +10,9 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from references.impact_oscillator import Motion, Oscillator, exact_example_1, exact_example_2
 
 import hsdsl
-from hsdsl.exact.stop import Motion, Oscillator, exact_example_1, exact_example_2
 
 MODELS = Path(__file__).parents[2] / "models"
 METHODS = ["taylor", "dop853", "dopri5"]

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from exact.pendulum import exact_pendulum
+from references.digital_control import digital_control
+from references.impact_oscillator import Motion, exact_example_1, exact_example_2
 
 import hsdsl
-from hsdsl.exact.stop import Motion, exact_example_1, exact_example_2
 
 MODELS = Path(__file__).parents[2] / "models"
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
@@ -131,7 +132,7 @@ def test_digital_control_from_beside_the_diagonal(dx: str, dy: str, path: list[i
     run = default_beside(dx, dy)
     assert [t.source for t in run.transitions] + [run.final.mode] == [f"D{k}" for k in path]
     assert all(not t.alternatives for t in run.transitions)
-    state = hsdsl.exact.digital_control(-1 - float(dx), -1 - float(dy)).final.state
+    state = digital_control(-1 - float(dx), -1 - float(dy)).final.state
     wanted = [state["x"], state["y"]]
     assert np.allclose([run.final.state["x"], run.final.state["y"]], wanted, rtol=0, atol=3e-4)
 

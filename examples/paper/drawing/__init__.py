@@ -1,0 +1,1 @@
+"""What the figures look like: the only part of `paper` that knows Matplotlib."""

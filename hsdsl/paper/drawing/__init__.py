@@ -1,1 +1,0 @@
-"""What the figures look like: the only part of `hsdsl.paper` that knows Matplotlib."""
