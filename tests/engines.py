@@ -27,8 +27,8 @@ needs_compiler = pytest.mark.skipif(not COMPILER, reason="there is no C compiler
 def over_compiled_kernel(model: Model) -> Model:
     """The same model, run by the Python loop over the compiled kernel."""
     other = Model(model.system)
-    other.parts.__dict__["program"] = model.program
-    other.parts.kernels[None] = CompiledKernel(model.program, CompiledModel(model.program))  # type: ignore[assignment]
+    other.pipeline.__dict__["program"] = model.program
+    other.pipeline.kernels[None] = CompiledKernel(model.program, CompiledModel(model.program))  # type: ignore[assignment]
     return other
 
 

@@ -14,17 +14,17 @@ from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.inputs import define_inputs
 from hsdsl.elaborate.modes import elaborate_modes
 from hsdsl.elaborate.outputs import elaborate_outputs
-from hsdsl.elaborate.reader import Reader, understood
 from hsdsl.elaborate.reference import elaborate_reference
+from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.elaborate.units import elaborate_units
-from hsdsl.elaborate.world import World
 from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import digest_of, read_bytes
-from hsdsl.schema import Model, read
+from hsdsl.schema import ModelDocument, read
 from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem
 
@@ -42,7 +42,7 @@ class Reading:
     ----------
     system : HybridSystem
         The mathematics.
-    document : Model
+    document : ModelDocument
         Keys and scalars as they stand in the file, each with its place.
     root : Node
         The nodes of the file, whose mappings and lists have places too.
@@ -55,7 +55,7 @@ class Reading:
     """
 
     system: HybridSystem
-    document: Model
+    document: ModelDocument
     root: Node
     text: Text
     scopes: dict[str, Scope]
@@ -104,49 +104,49 @@ def elaborate_with_places(
     source = decode(shown_path, data)
     root = compose(source, findings)
     document = read(root, findings)
-    reader = Reader(findings)
-    world = World.of(document, reader, shown_path, files)
+    resolver = ExpressionResolver(findings)
+    symbols = SymbolTable.of(document, resolver, shown_path, files)
     try:
-        with deep_stack(), timebox(limits.current().seconds, PARTS) as reader.box:
-            parts = _parts(world)
+        with deep_stack(), timebox(limits.current().seconds, PARTS) as resolver.box:
+            parts = _parts(symbols)
     except OutOfTime:
-        _say_too_long(reader)
+        _say_too_long(resolver)
     findings.raise_if_any()
-    digest = digest_of(data, world.files.values())
-    title, about = world.text(document.title), world.text(document.source)
+    digest = digest_of(data, symbols.files.values())
+    title, about = symbols.text(document.title), symbols.text(document.source)
     try:
-        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=world.files, **parts)
+        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=symbols.files, **parts)
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
-    top = world.scope(("time", "parameters", "inputs", "states", "let"), "")
-    return Reading(system, document, root, source, world.scopes, top)
+    top = symbols.scope(("time", "parameters", "inputs", "states", "let"), "")
+    return Reading(system, document, root, source, symbols.scopes, top)
 
 
-def _say_too_long(reader: Reader) -> NoReturn:
+def _say_too_long(resolver: ExpressionResolver) -> NoReturn:
     message = "working this expression out takes too long"
     hint = "make parts of it states, or allow more time with --limit seconds=600"
-    if reader.at is not None:
-        reader.add(reader.at.place, TOO_LONG, message, hint)
-    reader.findings.raise_if_any()
+    if resolver.at is not None:
+        resolver.add(resolver.at.place, TOO_LONG, message, hint)
+    resolver.findings.raise_if_any()
     raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
 
 
-def _parts(world: World) -> dict[str, Any]:
+def _parts(symbols: SymbolTable) -> dict[str, Any]:
     """Everything of a system, in the order in which its parts build upon each other."""
-    parameters = define_parameters(world)
-    inputs = define_inputs(world)
-    define_lets(world)
-    outputs = elaborate_outputs(world)
-    modes = elaborate_modes(world, outputs)
-    initial = elaborate_initial(world)
-    experiment = elaborate_experiment(world)
-    units = elaborate_units(world)
-    reference = elaborate_reference(world, modes)
+    parameters = define_parameters(symbols)
+    inputs = define_inputs(symbols)
+    define_lets(symbols)
+    outputs = elaborate_outputs(symbols)
+    modes = elaborate_modes(symbols, outputs)
+    initial = elaborate_initial(symbols)
+    experiment = elaborate_experiment(symbols)
+    units = elaborate_units(symbols)
+    reference = elaborate_reference(symbols, modes)
     return dict(
         parameters=parameters,
         inputs=inputs,
         modes=modes,
-        outputs=world.all_outputs,
+        outputs=symbols.all_outputs,
         units=units,
         initial=initial,
         experiment=experiment,
@@ -181,7 +181,7 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
     scope = Scope(_override_values(system, usable), place=where)
     try:
         with deep_stack(), timebox(limits.current().seconds / PARTS):
-            return understood(text, scope).expr
+            return resolved_expression(text, scope).expr
     except ExpressionError as error:
         raise UsageError(f"{where}: {error.message}", error.hint) from None
     except OutOfTime:

@@ -5,24 +5,23 @@ from __future__ import annotations
 
 import re
 
-from hsdsl.elaborate.reader import Reader, all_of
-from hsdsl.elaborate.world import World
+from hsdsl.elaborate.resolver import ExpressionResolver, all_of
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
 from hsdsl.names import did_you_mean, shown
-from hsdsl.schema import Mode as ModeDocument
-from hsdsl.schema import Transition
-from hsdsl.source import ABSENT, Key, Place, Scalar
+from hsdsl.schema import ModeDocument, TransitionDocument
+from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import Edge, Surface
 
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 
-def surface(reader: Reader, scalar: Scalar, scope: Scope, key: str) -> Surface | None:
+def surface(resolver: ExpressionResolver, scalar: Scalar, scope: Scope, key: str) -> Surface | None:
     """The surface of an inequality, its residual negative inside the domain.
 
     ``when: L >= R`` ends the domain where L - R rises through 0; a wall ``L >= R`` where R - L does.
     """
-    found = reader.inequality(scalar, scope, key)
+    found = resolver.inequality(scalar, scope, key)
     if found is None:
         return None
     left, right = found.left.expr, found.right.expr
@@ -31,27 +30,27 @@ def surface(reader: Reader, scalar: Scalar, scope: Scope, key: str) -> Surface |
     return Surface(left, right, residual, scalar.value)
 
 
-def elaborate_edges(world: World, name: Key, document: ModeDocument, scope: Scope) -> list[Edge | None]:
+def elaborate_edges(symbols: SymbolTable, name: Key, document: ModeDocument, scope: Scope) -> list[Edge | None]:
     """The edges that leave a mode, in file order; None for one with faults."""
-    names = _names(world, name, document.transitions)
+    names = _names(symbols, name, document.transitions)
     return [
-        _edge(world, str(name), edge_name, transition, scope)
+        _edge(symbols, str(name), edge_name, transition, scope)
         for edge_name, transition in zip(names, document.transitions, strict=True)
     ]
 
 
-def _names(world: World, source: Key, transitions: list[Transition]) -> list[str]:
+def _names(symbols: SymbolTable, source: Key, transitions: list[TransitionDocument]) -> list[str]:
     """The name of each transition: its own, or `SRC->DST`, `SRC->DST#2` and so on."""
     given: set[str] = set()
     for transition in transitions:
-        name = world.text(transition.name)
+        name = symbols.text(transition.name)
         if name in given and transition.name is not None:
             message = f"the mode '{source}' has a transition '{shown(name)}' already"
-            world.reader.add(transition.name.place, "HS307", message, "give it another name")
+            symbols.resolver.add(transition.name.place, "HS307", message, "give it another name")
         elif name is not None:
             given.add(name)
     counts: dict[str, int] = {}
-    return [world.text(t.name) or _unnamed(f"{source}->{t.to.value}", counts, given) for t in transitions]
+    return [symbols.text(t.name) or _unnamed(f"{source}->{t.to.value}", counts, given) for t in transitions]
 
 
 def _unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
@@ -62,16 +61,16 @@ def _unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
             return name
 
 
-def _edge(world: World, source: str, name: str, transition: Transition, scope: Scope) -> Edge | None:
-    reader = world.reader
-    crossed = surface(reader, transition.when, scope, "when")
-    condition = None if transition.condition is None else reader.condition(transition.condition, scope)
-    values = all_of([reader.number(scalar, scope) for scalar in transition.reset.values()])
-    target = known_mode(world, transition.to)
+def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:
+    resolver = symbols.resolver
+    crossed = surface(resolver, transition.when, scope, "when")
+    condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
+    values = all_of([resolver.number(scalar, scope) for scalar in transition.reset.values()])
+    target = known_mode(symbols, transition.to)
     if target is None:
         return None
-    states = _target_states(world, source, target)
-    complete = _check_reset(world, source, target, states, transition)
+    states = _target_states(symbols, source, target)
+    complete = _check_reset(symbols, source, target, states, transition)
     if crossed is None or values is None or not complete or (transition.condition and condition is None):
         return None
     resets = dict(zip(map(str, transition.reset), values, strict=True))
@@ -89,50 +88,52 @@ def _edge(world: World, source: str, name: str, transition: Transition, scope: S
     )
 
 
-def known_mode(world: World, label: Scalar) -> str | None:
+def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
     """The mode that a label names."""
     if label.value == ABSENT:
         return None
-    if label.value in world.document.modes:
+    if label.value in symbols.document.modes:
         return label.value
     message = f"there is no mode '{shown(label.value)}'"
     guarded = _GUARDED.fullmatch(label.value)
-    hint = did_you_mean(label.value, world.document.modes)
-    if guarded and guarded.group(1) in world.document.modes:
+    hint = did_you_mean(label.value, symbols.document.modes)
+    if guarded and guarded.group(1) in symbols.document.modes:
         hint = f"write {guarded.group(1)} alone, and if: {shown(guarded.group(2))}"
-    world.reader.add(label.place, "HS303", message, hint)
+    symbols.resolver.add(label.place, "HS303", message, hint)
     return None
 
 
-def _target_states(world: World, source: str, target: str) -> tuple[str, ...]:
-    if world.without_states(world.document.modes[target]):  # pyright: ignore[reportArgumentType]
-        return world.states[source]
-    return world.states[target]
+def _target_states(symbols: SymbolTable, source: str, target: str) -> tuple[str, ...]:
+    if symbols.without_states(symbols.document.modes[target]):  # pyright: ignore[reportArgumentType]
+        return symbols.states[source]
+    return symbols.states[target]
 
 
-def _check_reset(world: World, source: str, target: str, states: tuple[str, ...], transition: Transition) -> bool:
-    if world.document.modes[target].flow is None and not world.document.modes[target].final:  # pyright: ignore[reportArgumentType]
+def _check_reset(
+    symbols: SymbolTable, source: str, target: str, states: tuple[str, ...], transition: TransitionDocument
+) -> bool:
+    if symbols.document.modes[target].flow is None and not symbols.document.modes[target].final:  # pyright: ignore[reportArgumentType]
         return False  # that mode is reported, and its states are not known
     complete = True
     for key in transition.reset:
-        if key not in states and key in world.undeclared:
+        if key not in states and key in symbols.undeclared:
             complete = False  # reported under `initial`
         elif key not in states:
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             name, equals, value = (part.strip() for part in key.partition("="))
             written = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
-            world.reader.add(key.place, "HS306", message, written)
+            symbols.resolver.add(key.place, "HS306", message, written)
             complete = False
-    own = world.states[source]
+    own = symbols.states[source]
     for state in states:
         if state not in transition.reset and state not in own:
             message = (
                 f"the transition to '{target}' gives its state '{state}' no value, and '{source}' has no such state"
             )
-            world.reader.add(_place(transition), "HS305", message, f"write reset: {{{state}: ...}}")
+            symbols.resolver.add(_place(transition), "HS305", message, f"write reset: {{{state}: ...}}")
             complete = False
     return complete
 
 
-def _place(transition: Transition) -> Place:
+def _place(transition: TransitionDocument) -> SourceRange:
     return transition.to.place

@@ -7,56 +7,58 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.elaborate.reader import all_of
+from hsdsl.elaborate.resolver import all_of
 from hsdsl.elaborate.samples import read_samples
-from hsdsl.elaborate.world import World
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import Key, Scalar
 from hsdsl.system import SampledInput
 
 
-def define_inputs(world: World) -> tuple[SampledInput, ...]:
-    """The sampled inputs; what the name of every input means goes to ``world.values``."""
+def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
+    """The sampled inputs; what the name of every input means goes to ``symbols.values``."""
     feedback = "what depends on states stands under `let`, or in `flow` itself"
-    timed = world.scope(("time", "parameters"), "an input is an expression of t and parameters", hint=feedback)
-    constant = world.scope(("parameters",), "samples are numbers or expressions of parameters")
+    timed = symbols.scope(("time", "parameters"), "an input is an expression of t and parameters", hint=feedback)
+    constant = symbols.scope(("parameters",), "samples are numbers or expressions of parameters")
     found: list[SampledInput] = []
-    for name, entry in world.document.inputs.items():
+    for name, entry in symbols.document.inputs.items():
         if isinstance(entry, Scalar):
-            world.values[name] = world.reader.number(entry, timed)
+            symbols.values[name] = symbols.resolver.number(entry, timed)
             continue
-        world.values[name] = Value(symbol(name))
-        sampled = _file(world, name, entry) if isinstance(entry, InputFile) else _inline(world, name, entry, constant)
+        symbols.values[name] = Value(symbol(name))
+        sampled = (
+            _file(symbols, name, entry) if isinstance(entry, InputFile) else _inline(symbols, name, entry, constant)
+        )
         if sampled is not None:
             found.append(sampled)
     return tuple(found)
 
 
-def _file(world: World, name: Key, entry: InputFile) -> SampledInput | None:
-    samples = read_samples(world, name, entry.file)
+def _file(symbols: SymbolTable, name: Key, entry: InputFile) -> SampledInput | None:
+    samples = read_samples(symbols, name, entry.file)
     if samples is None:
         return None
-    return SampledInput(name, entry.hold, *samples, unit=world.text(world.document.units.get(name)))
+    return SampledInput(name, entry.hold, *samples, unit=symbols.text(symbols.document.units.get(name)))
 
 
-def _inline(world: World, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
-    times = all_of([world.reader.number(scalar, scope, finite_now=True) for scalar in entry.times])
-    values = all_of([world.reader.number(scalar, scope, finite_now=True) for scalar in entry.values])
+def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
+    times = all_of([symbols.resolver.number(scalar, scope, finite_now=True) for scalar in entry.times])
+    values = all_of([symbols.resolver.number(scalar, scope, finite_now=True) for scalar in entry.values])
     if len(entry.times) != len(entry.values):
         message = f"the input '{name}' has {len(entry.times)} times and {len(entry.values)} values"
-        world.reader.add(name.place, "HS310", message, "give one value for each time")
+        symbols.resolver.add(name.place, "HS310", message, "give one value for each time")
         return None
     if not entry.times:
-        world.reader.add(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
+        symbols.resolver.add(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
         return None
     if times is None or values is None:
         return None
     for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
         if before.constant and after.constant and not before.number < after.number:
             message = f"the times of the input '{name}' do not increase here"
-            world.reader.add(scalar.place, "HS310", message, "give each time once, the earliest first")
-    unit = world.text(world.document.units.get(name))
+            symbols.resolver.add(scalar.place, "HS310", message, "give each time once, the earliest first")
+    unit = symbols.text(symbols.document.units.get(name))
     return SampledInput(name, entry.hold, tuple(map(_exact, times)), tuple(map(_exact, values)), unit)
 
 

@@ -7,42 +7,42 @@ from typing import Any
 
 from hsdsl.elaborate.definitions import parameter_scope
 from hsdsl.elaborate.edges import known_mode
-from hsdsl.elaborate.world import World
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope
 from hsdsl.names import did_you_mean, shown
-from hsdsl.schema import Experiment, Reference
-from hsdsl.source import ABSENT, Key, Place, Scalar
+from hsdsl.schema import ExperimentDocument, ReferenceDocument
+from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import Mode
 
 _WORDS = ("initial.mode", "experiment.scheme", "experiment.method")
 
 
-def elaborate_reference(world: World, modes: tuple[Mode, ...]) -> tuple[dict[str, Any], ...]:
+def elaborate_reference(symbols: SymbolTable, modes: tuple[Mode, ...]) -> tuple[dict[str, Any], ...]:
     """The references, with the keys of the file.
 
     Each is ``{"set": {..}, "source": .., "trust": .., "transitions": [..], "states": [..]}`` with what the file gives;
     a transition is always ``{"time": .., "edge": .., "before": {..}, "after": {..}}``. Numbers are the texts of
     expressions of parameters.
     """
-    checker = _Checker(world, modes)
-    return tuple(checker.reference(document) for document in world.document.reference)
+    checker = _Checker(symbols, modes)
+    return tuple(checker.reference(document) for document in symbols.document.reference)
 
 
 class _Checker:
     """References against one model."""
 
-    def __init__(self, world: World, modes: tuple[Mode, ...]) -> None:
-        self.world = world
-        self.scope: Scope = parameter_scope(world, "a reference has numbers or expressions of parameters")
-        self.columns = [*world.all_states(), *world.all_outputs]
+    def __init__(self, symbols: SymbolTable, modes: tuple[Mode, ...]) -> None:
+        self.symbols = symbols
+        self.scope: Scope = parameter_scope(symbols, "a reference has numbers or expressions of parameters")
+        self.columns = [*symbols.all_states(), *symbols.all_outputs]
         self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
-        self.complete = len(modes) == len(world.document.modes)
+        self.complete = len(modes) == len(symbols.document.modes)
 
-    def reference(self, document: Reference) -> dict[str, Any]:
+    def reference(self, document: ReferenceDocument) -> dict[str, Any]:
         """One reference."""
         made: dict[str, Any] = {"set": self.settings(document.settings)}
-        if self.world.text(document.source) is not None:
-            made["source"] = self.world.text(document.source)
+        if self.symbols.text(document.source) is not None:
+            made["source"] = self.symbols.text(document.source)
         if document.trust is not None:
             made["trust"] = self.number(document.trust)
         made["transitions"] = [self.transition(event) for event in document.transitions]
@@ -54,17 +54,17 @@ class _Checker:
         for key, scalar in given.items():
             group, dot, rest = key.partition(".")
             if key == "initial.mode":
-                known_mode(self.world, scalar)
+                known_mode(self.symbols, scalar)
             elif key not in _WORDS:
                 self.number(scalar)
             if not dot:
-                self.known(group, key.place, "parameter", [n for n in self.world.document.parameters])
+                self.known(group, key.place, "parameter", [n for n in self.symbols.document.parameters])
             elif group == "initial":
-                self.known(rest, key.place, "state", ["mode", *self.world.all_states()])
+                self.known(rest, key.place, "state", ["mode", *self.symbols.all_states()])
             elif group == "experiment" and rest.startswith("scale."):
-                self.known(rest.removeprefix("scale."), key.place, "state", [*self.world.all_states()])
+                self.known(rest.removeprefix("scale."), key.place, "state", [*self.symbols.all_states()])
             elif group == "experiment":
-                self.known(rest, key.place, "setting", list(Experiment.model_fields))
+                self.known(rest, key.place, "setting", list(ExperimentDocument.model_fields))
             else:
                 self.known(group, key.place, "group", ["initial", "experiment"])
         return {str(key): scalar.value for key, scalar in given.items()}
@@ -87,7 +87,7 @@ class _Checker:
         """A state at a time."""
         made: dict[str, Any] = {"time": self.number(state.time)}
         if state.mode is not None:
-            known_mode(self.world, state.mode)
+            known_mode(self.symbols, state.mode)
             made["mode"] = state.mode.value
         return {**made, **self.columns_of(state.__pydantic_extra__)}
 
@@ -99,11 +99,11 @@ class _Checker:
 
     def number(self, scalar: Scalar) -> str:
         """The text of an expression of parameters."""
-        self.world.reader.number(scalar, self.scope)
+        self.symbols.resolver.number(scalar, self.scope)
         return scalar.value
 
-    def known(self, name: str, place: Place, kind: str, names: list[str]) -> None:
+    def known(self, name: str, place: SourceRange, kind: str, names: list[str]) -> None:
         """Report a name that nothing has."""
         if name not in names:
             message = f"there is no {kind} '{shown(name)}'"
-            self.world.reader.add(place, "HS314", message, did_you_mean(name, names))
+            self.symbols.resolver.add(place, "HS314", message, did_you_mean(name, names))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
-from hsdsl.elaborate.world import World
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.files import DataRefused
 from hsdsl.names import did_you_mean, shown
@@ -17,24 +17,24 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE
 Samples = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 
 
-def read_samples(world: World, name: Key, file: Scalar) -> Samples | None:
+def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | None:
     """Times and values of the column ``name``; None where the file has faults, which are reported."""
     if file.value == ABSENT:
         return None
     try:
-        data = world.data(file.value)
+        data = symbols.data(file.value)
     except DataRefused as refusal:
-        world.reader.add(file.place, refusal.code, refusal.message, refusal.hint)
+        symbols.resolver.add(file.place, refusal.code, refusal.message, refusal.hint)
         return None
     try:
         lines = data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        world.reader.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
+        symbols.resolver.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
-    table = _Table(str(world.folder / file.value), lines)
+    table = _Table(str(symbols.folder / file.value), lines)
     samples = table.samples(name)
     for diagnostic in table.faults:
-        world.reader.findings.add(diagnostic)
+        symbols.resolver.findings.add(diagnostic)
     return None if table.faults else samples
 
 

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
-from hsdsl.expression.foreign import CASES, compared, power_of, side_by_side, timed
+from hsdsl.expression.expression_hints import CASES, compared, power_of, side_by_side, timed
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import (
     Call,

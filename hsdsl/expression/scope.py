@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.expression.foreign import NAMES, derivative_of, timed, unit
+from hsdsl.expression.expression_hints import NAMES, derivative_of, timed, unit
 from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Tree, walk
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import WORDS, closest, did_you_mean, shown

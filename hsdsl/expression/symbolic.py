@@ -9,7 +9,7 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.expression import bounds, numeric
-from hsdsl.expression.foreign import CASES
+from hsdsl.expression.expression_hints import CASES
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import (
     CONDITIONS,

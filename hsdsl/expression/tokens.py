@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from hsdsl.expression.foreign import SIGNS, better
+from hsdsl.expression.expression_hints import SIGNS, better
 from hsdsl.expression.syntax import ExpressionError, Wanted
 from hsdsl.names import LOOKALIKES, normalised, shown
 

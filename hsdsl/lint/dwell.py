@@ -14,7 +14,7 @@ import sympy as sp
 from hsdsl.expression import numeric
 from hsdsl.lint.numbers import Number, evaluate
 from hsdsl.lint.subject import Subject
-from hsdsl.schema import Reference
+from hsdsl.schema import ReferenceDocument
 from hsdsl.source import Scalar
 from hsdsl.system import Edge
 
@@ -61,7 +61,7 @@ def pace(subject: Subject) -> Pace | None:
     return Pace(min(stays), until * len(stays) / sum(stays), False)
 
 
-def _of_reference(subject: Subject, reference: Reference, until: Number) -> Pace | None:
+def _of_reference(subject: Subject, reference: ReferenceDocument, until: Number) -> Pace | None:
     events = [event if isinstance(event, Scalar) else event.time for event in reference.transitions]
     times = [time for time in map(subject.read, events) if numeric.finite(time)]
     gaps = [after - before for before, after in pairwise(times) if after - before > _TIE * max(until, abs(after))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence as Items
 
 from hsdsl.errors import Edit
-from hsdsl.source import Mapping, Node, Place, Sequence
+from hsdsl.source import Mapping, Node, Sequence, SourceRange
 
 _Range = tuple[int, int]
 
@@ -27,7 +27,7 @@ def without_item(items: Node | None, index: int) -> tuple[Edit, ...]:
     return _removed(items.place, ranges, index) if content[items.place.start[0]] == "[" else ()
 
 
-def _end(value: Node, key: Place) -> int:
+def _end(value: Node, key: SourceRange) -> int:
     """Behind the value; a value that is left out ends with the colon of its key."""
     if value.place.end[0] > value.place.start[0]:
         return _trimmed(value.place.text.content, value.place.end[0])
@@ -44,7 +44,7 @@ def _trimmed(content: str, end: int) -> int:
         end = line
 
 
-def _removed(whole: Place, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
+def _removed(whole: SourceRange, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
     content = whole.text.content
     if content[whole.start[0]] in "{[":
         return _from_flow(ranges, index)

@@ -10,7 +10,7 @@ from typing import Literal
 from hsdsl.errors import Span
 from hsdsl.expression import Wanted, parse
 from hsdsl.expression.syntax import Name, Tree, walk
-from hsdsl.schema import InputFile, InputSamples, Mode, Model, ParameterEntry, Reference
+from hsdsl.schema import InputFile, InputSamples, ModeDocument, ModelDocument, ParameterEntry, ReferenceDocument
 from hsdsl.source import Scalar
 
 Role = Literal[
@@ -73,7 +73,7 @@ class SourceExpression:
         return self.scalar.span(node.start, node.end)
 
 
-def written(document: Model) -> Iterator[SourceExpression]:
+def written(document: ModelDocument) -> Iterator[SourceExpression]:
     """Every expression of a model, in the order of the language's sections."""
     for name, entry in document.parameters.items():
         values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
@@ -106,7 +106,7 @@ def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[S
     return (SourceExpression(role, scalar, name) for scalar in scalars if scalar is not None)
 
 
-def _of_mode(name: str, mode: Mode) -> Iterator[SourceExpression]:
+def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
     for key, scalar in mode.let.items():
         yield SourceExpression("let", scalar, key, name)
     for key, scalar in (mode.flow or {}).items():
@@ -123,7 +123,7 @@ def _of_mode(name: str, mode: Mode) -> Iterator[SourceExpression]:
         yield SourceExpression("output", scalar, key, name)
 
 
-def _of_reference(reference: Reference) -> Iterator[Scalar | None]:
+def _of_reference(reference: ReferenceDocument) -> Iterator[Scalar | None]:
     words = ("initial.mode", "experiment.scheme", "experiment.method")
     yield from (scalar for key, scalar in reference.settings.items() if key not in words)
     yield reference.trust

@@ -28,7 +28,7 @@ class EdgePart:
     """A transition as mathematics and as written; ``index`` is its position in its mode."""
 
     edge: Edge
-    document: schema.Transition
+    document: schema.TransitionDocument
     index: int
 
 
@@ -37,7 +37,7 @@ class ModePart:
     """A mode as mathematics and as written; ``key`` is its name in the file, with its place."""
 
     mode: Mode
-    document: schema.Mode
+    document: schema.ModeDocument
     key: Key
     edges: tuple[EdgePart, ...]
 
@@ -58,7 +58,7 @@ class Subject:
     def __init__(self, reading: Reading) -> None:
         self.reading = reading
         self.system: HybridSystem = reading.system
-        self.document: schema.Model = reading.document
+        self.document: schema.ModelDocument = reading.document
         self.root: Node = reading.root
 
     @cached_property

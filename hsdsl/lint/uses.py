@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from hsdsl.lint.source_expressions import SourceExpression
-from hsdsl.schema import Model
+from hsdsl.schema import ModelDocument
 
 _DEFINING = ("parameter", "input", "let")
 
@@ -22,7 +22,7 @@ class Definition(NamedTuple):
 class Names:
     """What every name of a model means."""
 
-    def __init__(self, document: Model) -> None:
+    def __init__(self, document: ModelDocument) -> None:
         states = dict.fromkeys(str(key) for mode in document.modes.values() for key in mode.flow or ())
         kinds = {"state": states, "input": document.inputs, "parameter": document.parameters, "let": document.let}
         self.top = {str(name): Definition(kind, None, str(name)) for kind, names in kinds.items() for name in names}
@@ -42,7 +42,7 @@ class Names:
             yield from own
 
 
-def unused(document: Model, expressions: Iterable[SourceExpression]) -> frozenset[Definition]:
+def unused(document: ModelDocument, expressions: Iterable[SourceExpression]) -> frozenset[Definition]:
     """The parameters, inputs and `let` names that nothing depends on but, at most, other unused ones."""
     names = Names(document)
     tables = (names.top, *names.own.values())

@@ -2,7 +2,7 @@
 
 ============= ===========================================================================================
 ``model``     :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
-``parts``     what it is made of, each part made once: the pipeline in one place
+``pipeline``     what it is made of, each part made once: the pipeline in one place
 ``written``   the bytes that a model is made of, read once
 ``seen``      programs of models read before, so that to run one again needs no SymPy
 ``requests``  what a run is asked, from four places: the file, ``--set``, options and a call

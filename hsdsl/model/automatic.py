@@ -17,7 +17,7 @@ A mode is called stiff where both hold at all of the last points of a short way 
 
 The way is one of linearly implicit steps of order 2, each no longer than twice the fast decay and than the curve is
 straight: what decays fast decays on it, and what oscillates goes on. Guards do not count, and what lies far from the
-start is not seen. With a precision asked for nothing is looked at, and no stiffness is found.
+start is not program_cache. With a precision asked for nothing is looked at, and no stiffness is found.
 """
 
 from __future__ import annotations

@@ -133,7 +133,7 @@ class _Source:
                 "run it again, or give the model as it was",
             )
         first, second = (parameters_of(run.overrides) | dict(self.parameters) for run in (self.run, self.other))
-        plain = given.parts.values(FLOAT64)
+        plain = given.pipeline.values(FLOAT64)
         values = with_parameters(plain, first)
         if first != second:
             self.note = _differ(values, with_parameters(plain, second))

@@ -22,7 +22,7 @@ from hsdsl.model.instances import (
     settings_rows,
     split,
 )
-from hsdsl.model.requests import KEYS
+from hsdsl.model.options import KEYS
 from hsdsl.model.settings import check_memory, whole
 from hsdsl.model.values import Values
 from hsdsl.model.workers import Progress, run_compiled, run_in_turn
@@ -38,7 +38,7 @@ INITIAL = "initial."
 
 
 @dataclass(frozen=True)
-class Asked:
+class EnsembleRequest:
     """What an ensemble is asked for: ``call`` is what every single run of it is asked for."""
 
     parameters: dict[str, Any]
@@ -51,7 +51,7 @@ class Asked:
     @staticmethod
     def of(
         parameters: Mapping[str, Any], initial: Mapping[str, Any], samples: Any, crossings: int, call: dict[str, Any]
-    ) -> Asked:
+    ) -> EnsembleRequest:
         """Sort out what the instances share and what is varied.
 
         Raises
@@ -62,7 +62,7 @@ class Asked:
         shared, by_parameter = split(parameters)
         shared_initial, by_state = split(initial)
         varied = broadcast(by_parameter | {INITIAL + name: array for name, array in by_state.items()})
-        return Asked(shared, shared_initial, varied, _samples(samples), crossings, call)
+        return EnsembleRequest(shared, shared_initial, varied, _samples(samples), crossings, call)
 
     def arrays(self, initial: bool) -> dict[str, Array]:
         """What is varied, of initial states or of parameters, by name."""
@@ -106,7 +106,7 @@ class Again:
     """Single runs of the instances of an ensemble, by their places."""
 
     model: Model
-    asked: Asked
+    asked: EnsembleRequest
 
     def __call__(self, place: tuple[int, ...]) -> Execution:
         """Run one."""
@@ -123,7 +123,7 @@ class Ready:
     """An ensemble that can start. ``places`` are the numbers of the instances that are not refused."""
 
     model: Model
-    asked: Asked
+    asked: EnsembleRequest
     base: Prepared
     columns: Columns
     places: list[int]
@@ -209,7 +209,7 @@ class Ready:
         return kept.stop
 
 
-def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Prepared]) -> Ready:
+def ready(model: Model, values: Values, asked: EnsembleRequest, prepare: Callable[..., Prepared]) -> Ready:
     """Compute the numbers of every instance.
 
     Raises
@@ -229,7 +229,7 @@ def ready(model: Model, values: Values, asked: Asked, prepare: Callable[..., Pre
     start = initial_rows(columns, base.states, asked.initial, asked.arrays(initial=True))
     settings = settings_rows(columns, base.settings, request)
     places = [k for k in range(columns.count) if k not in columns.refused]
-    timeline = partial(model.parts.timeline, values)
+    timeline = partial(model.pipeline.timeline, values)
     instances = Instances(
         settings=[settings[k] for k in places],
         timelines=[timeline(columns.rows[k], settings[k].until) for k in places],

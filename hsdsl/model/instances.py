@@ -15,7 +15,7 @@ import numpy as np
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
-from hsdsl.model.requests import FILE, SCALE, Request
+from hsdsl.model.options import FILE, SCALE, Options
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate import Settings
@@ -165,7 +165,7 @@ def initial_rows(
     return np.array([given[name] for name in states], dtype=float).reshape(len(states), columns.count).T
 
 
-def settings_rows(columns: Columns, base: Settings, request: Request) -> list[Settings]:
+def settings_rows(columns: Columns, base: Settings, request: Options) -> list[Settings]:
     """Evaluate the settings of every instance; ``base`` are those of one that is not refused.
 
     Raises
@@ -191,7 +191,7 @@ def settings_rows(columns: Columns, base: Settings, request: Request) -> list[Se
     return found
 
 
-def _scale_columns(columns: Columns, request: Request) -> dict[str, list[float]]:
+def _scale_columns(columns: Columns, request: Options) -> dict[str, list[float]]:
     """The given sizes of states, of every instance."""
     keys = [key for key in request.values if key.startswith(SCALE)]
     sizes = {key.removeprefix(SCALE): _setting(columns, request, key) for key in keys}
@@ -201,11 +201,11 @@ def _scale_columns(columns: Columns, request: Request) -> dict[str, list[float]]
     return sizes
 
 
-def _setting(columns: Columns, request: Request, key: str) -> list[float]:
+def _setting(columns: Columns, request: Options, key: str) -> list[float]:
     asked, values = request.values[key], columns.values
-    if asked.place == FILE and key.startswith(SCALE):
+    if asked.origin == FILE and key.startswith(SCALE):
         k = values.program.scaled_states.index(key.removeprefix(SCALE))
         return [row[k] for row in columns.constant("scale", key)]
-    if asked.place == FILE:
+    if asked.origin == FILE:
         return [row[0] for row in columns.constant(key, key)]
     return [row[0] for row in columns.of(values.routine(asked.value, key, len(values.program.parameters)), key)]

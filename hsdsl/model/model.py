@@ -1,4 +1,4 @@
-"""``Model``: what can be done with a model, by name; what it is made of is in `hsdsl.model.parts`."""
+"""``Model``: what can be done with a model, by name; what it is made of is in `hsdsl.model.pipeline`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
-from hsdsl.model.parts import Parts, parts_of
-from hsdsl.model.remembered import Remembered, key_of
-from hsdsl.model.requests import Request
+from hsdsl.model.call_cache import CallCache, call_key
+from hsdsl.model.options import Options
+from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean, visible
 from hsdsl.program import Program
@@ -49,7 +49,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
     UsageError
         The file cannot be read.
     """
-    return Model(parts_of(path, limits, text))
+    return Model(pipeline_of(path, limits, text))
 
 
 def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
@@ -69,22 +69,22 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
     ModelError
         The model has errors; all of them are carried.
     """
-    return Model(parts_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
+    return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
 
 class Model:
-    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``parts`` holds both.
+    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``pipeline`` holds both.
 
     It is what was read when it was loaded, also where its file changes later, and it can be pickled.
     """
 
-    def __init__(self, of: HybridSystem | Parts) -> None:
-        self.parts = of if isinstance(of, Parts) else Parts(of)
+    def __init__(self, of: HybridSystem | Pipeline) -> None:
+        self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
         self._smaller: dict[tuple[str, ...], Model] = {}
-        self._prepared: Remembered[Prepared] = Remembered(MOST_PREPARED)
+        self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
 
-    def __reduce__(self) -> tuple[type[Model], tuple[Parts]]:
-        return type(self), (self.parts,)
+    def __reduce__(self) -> tuple[type[Model], tuple[Pipeline]]:
+        return type(self), (self.pipeline,)
 
     def __repr__(self) -> str:
         modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
@@ -93,21 +93,21 @@ class Model:
     @property
     def system(self) -> HybridSystem:
         """The mathematics; of a model seen before it is elaborated when it is asked for."""
-        return self.parts.system
+        return self.pipeline.system
 
     @property
     def program(self) -> Program:
         """The model lowered to routines, free of SymPy."""
-        return self.parts.program
+        return self.pipeline.program
 
     @property
     def columns(self) -> list[str]:
         """Names of all states and outputs."""
-        return self.parts.columns
+        return self.pipeline.columns
 
-    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
-        """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.requests`)."""
-        return self.parts.resolve(settings, asked)
+    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Options:
+        """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.options`)."""
+        return self.pipeline.resolve(settings, asked)
 
     def simulate(
         self,
@@ -187,7 +187,7 @@ class Model:
                 samples=samples, max_transitions=max_transitions, parameters=parameters, initial=known(initial),
                 settings=settings, engine=engine, precision=precision, watch=watch,
             )  # fmt: skip
-        key = key_of(
+        key = call_key(
             until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions,
             parameters, initial, settings, engine, precision,
         )  # fmt: skip
@@ -204,9 +204,9 @@ class Model:
                 samples=samples,
                 max_transitions=max_transitions,
             )
-            ready = self.parts.prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
+            ready = self.pipeline.prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
             self._prepared.keep(key, ready)
-        return ready.simulate(watch, self.parts.seconds)
+        return ready.simulate(watch, self.pipeline.seconds)
 
     def stream(
         self,
@@ -244,7 +244,7 @@ class Model:
 
         target = check(path, every, columns, asked, self)
         plain: dict[str, Any] = {"parameters": {}, "initial": {}}
-        return stream(self.parts.prepare_single(plain | asked | {"engine": "c"}), target, every, columns, watch)
+        return stream(self.pipeline.prepare_single(plain | asked | {"engine": "c"}), target, every, columns, watch)
 
     def ensemble(
         self,
@@ -283,12 +283,12 @@ class Model:
         UsageError
             What cannot be served: a name, arrays of different shapes, no instance that can be run.
         """
-        from hsdsl.model.ensemble import Asked, check, cores, ready
+        from hsdsl.model.ensemble import EnsembleRequest, check, cores, ready
 
         check(asked, threads, transition_times)
-        sorted_out = Asked.of(parameters or {}, initial or {}, samples, transition_times, asked)
-        values = self.parts.values(FLOAT64)
-        return ready(self, values, sorted_out, self.parts.prepare_single).run(threads or cores(), progress)
+        sorted_out = EnsembleRequest.of(parameters or {}, initial or {}, samples, transition_times, asked)
+        values = self.pipeline.values(FLOAT64)
+        return ready(self, values, sorted_out, self.pipeline.prepare_single).run(threads or cores(), progress)
 
     def only(self, asked: Sequence[str]) -> Model:
         """Return the model with the states and outputs asked for and those they, or any transition, depend on.
@@ -311,8 +311,8 @@ class Model:
             if name not in self.columns:
                 raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))
         if names not in self._smaller:
-            smaller = self.parts.only(names)
-            self._smaller[names] = self if smaller is self.parts else Model(smaller)
+            smaller = self.pipeline.only(names)
+            self._smaller[names] = self if smaller is self.pipeline else Model(smaller)
         return self._smaller[names]
 
     def estimate(self, execution: Execution) -> Estimate:
@@ -338,7 +338,7 @@ class Model:
         from hsdsl.model.guards import guard_lines
         from hsdsl.plot import plot
 
-        values = with_parameters(self.parts.values(FLOAT64), parameters or {})
+        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
         plot(execution, path, guards=guard_lines(values), units=self.program.units)
 
     def distance(
@@ -381,5 +381,5 @@ class Model:
         from hsdsl.model.between_runs import budget_of
         from hsdsl.model.places import distance_of_points
 
-        values = with_parameters(self.parts.values(FLOAT64), parameters or {})
+        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
         return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from hsdsl import decimals
 from hsdsl.errors import UsageError
-from hsdsl.model.requests import DEFAULT, FILE, Request
+from hsdsl.model.options import DEFAULT, FILE, Options
 from hsdsl.names import did_you_mean
 
 
@@ -39,9 +39,9 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
     return parameters, initial, settings
 
 
-def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], request: Request) -> dict[str, Any]:
+def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], request: Options) -> dict[str, Any]:
     """Gather what a run is asked beyond its file, by the names of `--set`, each value as it was written."""
-    asked = {key: given.value for key, given in request.values.items() if given.place not in (FILE, DEFAULT)}
+    asked = {key: given.value for key, given in request.values.items() if given.origin not in (FILE, DEFAULT)}
     found = {**parameters, **_below("initial", initial), **_below("experiment", asked)}
     return {name: _written(value) for name, value in found.items()}
 

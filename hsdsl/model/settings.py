@@ -12,7 +12,7 @@ from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.integrators import TaylorMethod
 from hsdsl.limits import current
-from hsdsl.model.requests import DEFAULT, FILE, SCALE, Asked, Request, check_digits, check_smooth, check_tolerance
+from hsdsl.model.options import DEFAULT, FILE, SCALE, Option, Options, check_digits, check_smooth, check_tolerance
 from hsdsl.model.values import Values, samples
 from hsdsl.names import did_you_mean
 from hsdsl.simulate import Settings
@@ -20,7 +20,7 @@ from hsdsl.simulate import Settings
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
 
-def settings_of(request: Request, values: Values) -> Settings:
+def settings_of(request: Options, values: Values) -> Settings:
     """Turn what a run is asked into numbers, and refuse those that make no run.
 
     Raises
@@ -31,7 +31,7 @@ def settings_of(request: Request, values: Values) -> Settings:
 
     def number(key: str) -> Number:
         asked = request.values[key]
-        if asked.place == FILE:
+        if asked.origin == FILE:
             return values.constant(key)[0]
         return values.number(asked.value, key)
 
@@ -55,7 +55,7 @@ def settings_of(request: Request, values: Values) -> Settings:
     tolerance = positive("tolerance") if request.size == "tolerance" else None
     check_tolerance(tolerance, values.kernel.arithmetic)
     relaxation = positive("relaxation")
-    if request.values["relaxation"].place == "default":
+    if request.values["relaxation"].origin == "default":
         relaxation = least_relaxation(relaxation, until)
     method = request.method
     if isinstance(method, TaylorMethod):
@@ -74,7 +74,7 @@ def settings_of(request: Request, values: Values) -> Settings:
     )
 
 
-def _scale(request: Request, values: Values) -> dict[str, Number]:
+def _scale(request: Options, values: Values) -> dict[str, Number]:
     """The given sizes of states."""
     program = values.program
     states = dict.fromkeys((*(s for mode in program.modes for s in mode.states), *program.initial_states))
@@ -86,26 +86,26 @@ def _scale(request: Request, values: Values) -> dict[str, Number]:
             continue
         if name not in states:
             raise UsageError(f"{key}: the model has no state '{name}'", did_you_mean(name, [*states]))
-        size = in_file[name] if asked.place == FILE else values.number(asked.value, key)
+        size = in_file[name] if asked.origin == FILE else values.number(asked.value, key)
         if not size > 0:
             raise UsageError(f"{key} must be positive, not {size}")
         sizes[name] = size
     return sizes
 
 
-def following_digits(settings: Settings, request: Request, arithmetic: Arithmetic) -> Settings:
+def following_digits(settings: Settings, request: Options, arithmetic: Arithmetic) -> Settings:
     """Return the settings with a default tolerance that follows the digits of the numbers.
 
     A method of fixed order would need steps shorter by as many orders of magnitude: with one the tolerance stays.
     """
-    left_open = request.size == "tolerance" and request.values["tolerance"].place == DEFAULT
+    left_open = request.size == "tolerance" and request.values["tolerance"].origin == DEFAULT
     if not left_open or arithmetic.digits is None or not isinstance(settings.method, TaylorMethod):
         return settings
     tolerance = arithmetic.constant(Fraction(1, 10 ** kept_digits(arithmetic.digits)))
     return replace(settings, tolerance=tolerance, method=settings.method.for_tolerance(tolerance, arithmetic))
 
 
-def _samples(request: Request, values: Values) -> int | tuple[Number, ...] | None:
+def _samples(request: Options, values: Values) -> int | tuple[Number, ...] | None:
     asked = request.values.get("samples")
     if asked is None:
         return None
@@ -116,8 +116,8 @@ def _samples(request: Request, values: Values) -> int | tuple[Number, ...] | Non
     return found
 
 
-def _sampled(asked: Asked, values: Values) -> int | tuple[Number, ...]:
-    if asked.place != FILE:
+def _sampled(asked: Option, values: Values) -> int | tuple[Number, ...]:
+    if asked.origin != FILE:
         return samples(values, asked.value)
     if values.has("sample_times"):
         return values.constant("sample_times")

@@ -15,7 +15,7 @@ import numpy as np
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Samples, Stop
 from hsdsl.execution.samples import split
-from hsdsl.model.requests import KEYS
+from hsdsl.model.options import KEYS
 from hsdsl.model.settings import whole
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program

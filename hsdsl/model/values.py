@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.backends.python import PythonKernel, compile_routines
 from hsdsl.errors import UsageError
-from hsdsl.model.requests import KEYS
+from hsdsl.model.options import KEYS
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
-from hsdsl.schema.inputs import Input, InputFile, InputSamples
-from hsdsl.schema.leaves import (
+from hsdsl.schema.fields import (
     AnyKey,
     Condition,
     Document,
@@ -30,6 +29,7 @@ from hsdsl.schema.leaves import (
     Word,
     empty,
 )
+from hsdsl.schema.inputs import Input, InputFile, InputSamples
 from hsdsl.source import Scalar
 
 
@@ -55,7 +55,7 @@ Parameter = Annotated[
 ]
 
 
-class Transition(Document):
+class TransitionDocument(Document):
     """An edge that leaves a mode."""
 
     when: Inequality = Field(
@@ -85,7 +85,7 @@ class Transition(Document):
     )
 
 
-class Mode(Document):
+class ModeDocument(Document):
     """A mode: how the state flows, where it may be, and how it is left."""
 
     flow: StateTable[Expression] | None = Field(
@@ -112,14 +112,14 @@ class Mode(Document):
         "modes that do not define them.",
         examples=[{"power": "k*v**2"}],
     )
-    transitions: Items[Transition] = Field(
+    transitions: Items[TransitionDocument] = Field(
         default_factory=list[Any],
         description="The edges that leave the mode.",
         examples=[[{"when": "x >= 1", "to": "free", "reset": {"v": "-v"}}]],
     )
 
 
-class Initial(Document):
+class InitialDocument(Document):
     """Where a run starts."""
 
     model_config = ConfigDict(extra="allow")
@@ -138,7 +138,7 @@ Samples = Annotated[
 ]
 
 
-class Experiment(Document):
+class ExperimentDocument(Document):
     """How to run the model unless told otherwise. Numbers are expressions of parameters."""
 
     until: Expression = Field(description="The time at which a run ends; it starts at 0.", examples=["40*pi"])
@@ -175,7 +175,7 @@ class Experiment(Document):
     )
 
 
-class ReferenceTransition(Document):
+class ReferenceTransitionDocument(Document):
     """A transition known exactly."""
 
     time: Expression = Field(description="When the guard is reached.", examples=["1.25"])
@@ -187,12 +187,12 @@ class ReferenceTransition(Document):
 
 
 ReferenceEvent = Annotated[
-    Annotated[Expression, Tag("<expression>")] | Annotated[ReferenceTransition, Tag("<mapping>")],
+    Annotated[Expression, Tag("<expression>")] | Annotated[ReferenceTransitionDocument, Tag("<mapping>")],
     Discriminator(_mapping_or_not),
 ]
 
 
-class ReferenceState(Document):
+class ReferenceStateDocument(Document):
     """A state known exactly: further keys are names of states or outputs."""
 
     model_config = ConfigDict(extra="allow")
@@ -202,7 +202,7 @@ class ReferenceState(Document):
     mode: OptionalLabel = Field(None, description="In which mode.", examples=["free"])
 
 
-class Reference(Document):
+class ReferenceDocument(Document):
     """What is known exactly of a run. Numbers are expressions of parameters."""
 
     settings: OpenTable[Expression] = Field(
@@ -218,7 +218,7 @@ class Reference(Document):
         description="The first transitions: their times, or mappings.",
         examples=[[1, {"time": 2, "edge": "impact"}]],
     )
-    states: Items[ReferenceState] = Field(
+    states: Items[ReferenceStateDocument] = Field(
         default_factory=list[Any], description="States at times.", examples=[[{"time": 1, "mode": "free", "x": "1/2"}]]
     )
 
@@ -229,7 +229,7 @@ def _one_or_many(value: Any) -> Any:
     return value if isinstance(value, list) else [value]  # pyright: ignore[reportUnknownVariableType]
 
 
-class Model(Document):
+class ModelDocument(Document):
     """A controlled hybrid system."""
 
     hsdsl: Version = Field(description="The version of the language.", examples=[1])
@@ -250,7 +250,9 @@ class Model(Document):
         description="Named subexpressions, each of earlier ones.",
         examples=[{"energy": "v**2/2"}],
     )
-    modes: ModeTable[Mode] = Field(description="The modes.", examples=[{"fall": {"flow": {"h": "v", "v": "-g"}}}])
+    modes: ModeTable[ModeDocument] = Field(
+        description="The modes.", examples=[{"fall": {"flow": {"h": "v", "v": "-g"}}}]
+    )
     outputs: Table[Expression] = Field(
         default_factory=empty,
         description="Name: expression, recorded beside the states. Each mode reads it with its own `let`; it has no "
@@ -262,12 +264,14 @@ class Model(Document):
         description="Unit of a state, parameter, input or output, or of `t`.",
         examples=[{"h": "m", "v": "m/s"}],
     )
-    initial: Initial = Field(
+    initial: InitialDocument = Field(
         description="Where a run starts: `mode`, and a value for each of its states.",
         examples=[{"mode": "fall", "h": 10, "v": 0}],
     )
-    experiment: Experiment = Field(description="How to run the model unless told otherwise.", examples=[{"until": 12}])
-    reference: Annotated[list[Reference], BeforeValidator(_one_or_many)] = Field(
+    experiment: ExperimentDocument = Field(
+        description="How to run the model unless told otherwise.", examples=[{"until": 12}]
+    )
+    reference: Annotated[list[ReferenceDocument], BeforeValidator(_one_or_many)] = Field(
         default_factory=list[Any],
         description="What is known exactly: one mapping, or a list of them.",
         json_schema_extra={},
@@ -277,29 +281,29 @@ class Model(Document):
 
 # the document at each kind of place; `*` is any key or index
 SHAPES: dict[tuple[str, ...], type[Document]] = {
-    (): Model,
+    (): ModelDocument,
     ("parameters", "*"): ParameterEntry,
     ("inputs", "*", "<samples>"): InputSamples,
     ("inputs", "*", "<file>"): InputFile,
-    ("modes", "*"): Mode,
-    ("modes", "*", "transitions", "*"): Transition,
-    ("initial",): Initial,
-    ("experiment",): Experiment,
-    ("reference", "*"): Reference,
-    ("reference", "*", "transitions", "*"): ReferenceTransition,
-    ("reference", "*", "states", "*"): ReferenceState,
+    ("modes", "*"): ModeDocument,
+    ("modes", "*", "transitions", "*"): TransitionDocument,
+    ("initial",): InitialDocument,
+    ("experiment",): ExperimentDocument,
+    ("reference", "*"): ReferenceDocument,
+    ("reference", "*", "transitions", "*"): ReferenceTransitionDocument,
+    ("reference", "*", "states", "*"): ReferenceStateDocument,
 }
 __all__ = [
     "SHAPES",
     "Condition",
-    "Experiment",
-    "Initial",
-    "Mode",
-    "Model",
+    "ExperimentDocument",
+    "InitialDocument",
+    "ModeDocument",
+    "ModelDocument",
     "Parameter",
     "ParameterEntry",
-    "Reference",
-    "ReferenceState",
-    "ReferenceTransition",
-    "Transition",
+    "ReferenceDocument",
+    "ReferenceStateDocument",
+    "ReferenceTransitionDocument",
+    "TransitionDocument",
 ]

@@ -8,7 +8,7 @@ from hsdsl.errors import Findings
 from hsdsl.names import closest, shown
 from hsdsl.schema.documents import SHAPES
 from hsdsl.schema.habits import under
-from hsdsl.schema.meant import named_elsewhere
+from hsdsl.schema.suggestions import named_elsewhere
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
 
 _OF_MAPPINGS = ("parameters", "inputs", "experiment")

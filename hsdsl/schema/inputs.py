@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag
 
-from hsdsl.schema.leaves import Document, Expression, Hold, Items, Label
+from hsdsl.schema.fields import Document, Expression, Hold, Items, Label
 
 
 class InputSamples(Document):

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsdsl.schema.documents import Model
+from hsdsl.schema.documents import ModelDocument
 
 _DRAFT = "http://json-schema.org/draft-07/schema#"
 
@@ -27,8 +27,10 @@ def json_schema() -> dict[str, Any]:
     dict
         A draft-7 schema: shared parts stand under ``definitions``, and nothing stands beside a ``$ref``.
     """
-    made = Model.model_json_schema(by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator)
-    definitions = {name: _draft_7(part) for name, part in sorted(made.pop("$defs").items())}
+    made = ModelDocument.model_json_schema(
+        by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
+    )
+    definitions = {_short(name): _draft_7(part) for name, part in sorted(made.pop("$defs").items())}
     root = _draft_7(made)
     reference = root["properties"]["reference"]
     item = reference.pop("items")
@@ -38,6 +40,11 @@ def json_schema() -> dict[str, Any]:
         "anyOf": [item, {"type": ["array", "null"], "items": item}],
     }
     return {"$schema": _DRAFT, **root, "definitions": definitions}
+
+
+def _short(name: str) -> str:
+    """The name of a definition: that of its class without its ending."""
+    return name.removesuffix("Document")
 
 
 def _draft_7(part: Any) -> Any:
@@ -52,6 +59,9 @@ def _draft_7(part: Any) -> Any:
     if made.get("default", ...) is None:
         del made["default"]
     made.pop("propertyNames", None)
+    for key in ("title", "$ref"):
+        if isinstance(made.get(key), str):
+            made[key] = _short(made[key])
     if "$ref" in made and len(made) > 1:
         made["allOf"] = [{"$ref": made.pop("$ref")}]
     return made

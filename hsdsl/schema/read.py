@@ -10,15 +10,15 @@ from pydantic_core import ErrorDetails
 
 from hsdsl.errors import Diagnostic, Findings, Span
 from hsdsl.names import shown
-from hsdsl.schema.documents import SHAPES, Model
+from hsdsl.schema.documents import SHAPES, ModelDocument
+from hsdsl.schema.fields import described
 from hsdsl.schema.forms import assigned, undifferentiated
 from hsdsl.schema.habits import reread
 from hsdsl.schema.indents import reindent
-from hsdsl.schema.leaves import described
-from hsdsl.schema.meant import Location, advice, key_meant, moves_to, to_add, torn
 from hsdsl.schema.misspelt import respell
-from hsdsl.schema.repair import descend, repair
-from hsdsl.source import Mapping, Node, Place, Scalar, Sequence
+from hsdsl.schema.recovery import descend, repair
+from hsdsl.schema.suggestions import Location, advice, key_meant, moves_to, to_add, torn
+from hsdsl.source import Mapping, Node, Scalar, Sequence, SourceRange
 
 _MOST_REPAIRS = 8
 _TAG = re.compile(r"<(?:expression|mapping|list|samples|file)>|function-\w+\[.*")  # of a union; no key in the file
@@ -36,7 +36,7 @@ _PLACE: dict[tuple[str, ...], str] = {
 }
 
 
-def read(root: Node, findings: Findings) -> Model:
+def read(root: Node, findings: Findings) -> ModelDocument:
     """The document that a YAML file holds.
 
     Faults go to ``findings``. What is beside the point of a fault is still read: a misspelt key is taken for the one
@@ -52,7 +52,7 @@ def read(root: Node, findings: Findings) -> Model:
     respell(root, findings)
     for _ in range(_MOST_REPAIRS):
         try:
-            return Model.model_validate(_plain(root))
+            return ModelDocument.model_validate(_plain(root))
         except ValidationError as error:
             details = _first(error.errors(include_url=False))
         meant = [_meant(root, fault) for fault in details]
@@ -203,7 +203,7 @@ def _fits(pattern: tuple[str, ...], location: Location) -> bool:
     return len(pattern) == len(location) and all(p in ("*", step) for p, step in zip(pattern, location, strict=True))
 
 
-def _find(root: Node, location: Location, key: bool = False) -> Place:
+def _find(root: Node, location: Location, key: bool = False) -> SourceRange:
     """The place of a value, or of its key; of the nearest thing above it that exists."""
     node, place = root, root.place
     for number, step in enumerate(location):

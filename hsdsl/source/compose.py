@@ -13,10 +13,10 @@ import yaml
 from hsdsl import limits
 from hsdsl.errors import Diagnostic, Findings, ModelError, Span
 from hsdsl.names import INVISIBLE, normalised, shown
-from hsdsl.source.commas import rejoined_entries, rejoined_items, spaced_entries
-from hsdsl.source.faults import explain, quote
-from hsdsl.source.nodes import Key, Mapping, Node, Place, Scalar, Sequence, absent
+from hsdsl.source.nodes import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
+from hsdsl.source.split_expressions import rejoined_entries, rejoined_items, spaced_entries
 from hsdsl.source.text import Text
+from hsdsl.source.yaml_errors import explain, quote
 
 DEEPEST = 64
 
@@ -181,9 +181,9 @@ class _Composer:
             message = f"mappings and lists are nested more than {DEEPEST} deep here"
             self._stop(self._place(event).diagnostic("HS014", message))
 
-    def _place(self, event: Any, last: Any = None) -> Place:
+    def _place(self, event: Any, last: Any = None) -> SourceRange:
         start, end = event.start_mark, (last or event).end_mark
-        return Place(self.text, (start.index, start.line, start.column), (end.index, end.line, end.column))
+        return SourceRange(self.text, (start.index, start.line, start.column), (end.index, end.line, end.column))
 
     def _stop(self, diagnostic: Diagnostic) -> None:
         self.findings.add(diagnostic)

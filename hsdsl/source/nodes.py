@@ -23,7 +23,7 @@ _NUMBER = re.compile(
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SourceRange:
     """Where a node stands in its text: 0-based index, line and column of its first character and behind its last."""
 
     text: Text = field(repr=False)
@@ -48,7 +48,7 @@ class Scalar:
 
     value: str
     plain: bool
-    place: Place
+    place: SourceRange
 
     @property
     def kind(self) -> Kind:
@@ -83,17 +83,17 @@ class Sequence:
     """A list."""
 
     items: tuple[Node, ...]
-    place: Place
+    place: SourceRange
 
 
 class Key(str):
     """A key of a mapping: a text that knows its place."""
 
     __slots__ = ("place",)
-    place: Place
+    place: SourceRange
 
     @classmethod
-    def at(cls, text: str, place: Place) -> Key:
+    def at(cls, text: str, place: SourceRange) -> Key:
         """A key with its place."""
         key = cls(text)
         key.place = place
@@ -105,7 +105,7 @@ class Mapping:
     """A mapping, in file order."""
 
     entries: dict[str, tuple[Key, Node]]
-    place: Place
+    place: SourceRange
 
     def __iter__(self) -> Iterator[tuple[Key, Node]]:
         return iter(self.entries.values())
@@ -115,6 +115,6 @@ Node = Scalar | Sequence | Mapping
 ABSENT = "\0"  # the value of a scalar that stands for one already reported; no text can contain it, written or escaped
 
 
-def absent(place: Place) -> Scalar:
+def absent(place: SourceRange) -> Scalar:
     """A scalar in the place of something already reported, which nothing more is to be said about."""
     return Scalar(ABSENT, False, place)

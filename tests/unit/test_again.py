@@ -13,7 +13,7 @@ from engines import COMPILER, alike, needs_compiler
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.model.remembered import Remembered, key_of
+from hsdsl.model.call_cache import CallCache, call_key
 
 MODELS = Path(__file__).parents[2] / "models"
 ENGINES = ("python", "c") if COMPILER else ("python",)
@@ -118,12 +118,12 @@ def test_chosen_columns_of_samples():
 
 def test_keys_tell_apart_what_is_not_the_same():
     values = [1, 1.0, True, "1", 0.0, None, [1], (1,), {"a": 1}, {"a": 1.0}, {"b": 1}]
-    assert len({key_of(value) for value in values}) == len(values)
-    assert key_of(np.float64(1)) is None and key_of({"a": object()}) is None
+    assert len({call_key(value) for value in values}) == len(values)
+    assert call_key(np.float64(1)) is None and call_key({"a": object()}) is None
 
 
 def test_only_the_last_are_remembered():
-    remembered = Remembered[int](2)
+    remembered = CallCache[int](2)
     for number in range(3):
         remembered.keep((number,), number)
     remembered.keep(None, 7)

@@ -22,7 +22,7 @@ import hsdsl
 from hsdsl import cache
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import ModelError
-from hsdsl.model import engines, seen
+from hsdsl.model import engines, program_cache
 from hsdsl.model.written import Written
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
@@ -279,7 +279,7 @@ def test_a_program_seen_before_is_the_program(path: Path) -> None:
     first, second = hsdsl.load(path), None
     program = first.program
     second = hsdsl.load(path)
-    assert "program" in second.parts.__dict__ and second.program == program
+    assert "program" in second.pipeline.__dict__ and second.program == program
     assert second.columns == first.columns and repr(second) == repr(first)
     assert second.system.digest == first.system.digest
 
@@ -313,17 +313,17 @@ def test_what_is_no_program_is_not_taken(folder: Path) -> None:
     path = MODELS[0]
     program = hsdsl.load(path).program
     written = Written.at(path, None).with_files({})
-    assert seen.find(written) == (program, written)
+    assert program_cache.find(written) == (program, written)
     for changed in (
         replace(program, parameters=(1,)),
         replace(program, modes=None),
         replace(program, title=3),
         replace(program, digest=program.digest[::-1]),  # the program of other bytes
     ):
-        for entry in (folder / seen.KIND / seen.key_of(written)).iterdir():
+        for entry in (folder / program_cache.KIND / program_cache.key_of(written)).iterdir():
             entry.unlink()
-        seen.keep(written, changed)  # type: ignore[arg-type]
-        assert seen.find(written) is None
+        program_cache.keep(written, changed)  # type: ignore[arg-type]
+        assert program_cache.find(written) is None
 
 
 @needs_compiler

@@ -18,7 +18,7 @@ from hsdsl.errors import ModelError, UsageError
 from hsdsl.files import data, read_bytes
 from hsdsl.limits import Limits, applied
 from hsdsl.lint.fix import fix
-from hsdsl.model import seen
+from hsdsl.model import program_cache
 
 posix = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX files")
 MODEL = """hsdsl: 1
@@ -47,7 +47,8 @@ def replaced(path: Path, text: str) -> None:
 
 
 # The name of a step of loading, and where it is looked up.
-STEPS = ["hsdsl.model.seen.find", "hsdsl.elaborate.decode", "hsdsl.elaborate.compose", "hsdsl.model.seen.keep",
+STEPS = ["hsdsl.model.program_cache.find", "hsdsl.elaborate.decode", "hsdsl.elaborate.compose",
+         "hsdsl.model.program_cache.keep",
          "hsdsl.elaborate.define_inputs", "hsdsl.lower.lower", "hsdsl.cache.keep", "hsdsl.cache.find"]  # fmt: skip
 
 
@@ -95,8 +96,8 @@ def test_what_is_loaded_while_others_save_is_one_of_what_they_saved(tmp_path):
     try:
         for _ in range(200):
             model = hsdsl.load(path)
-            flow = hsdsl.load(path, text=model.parts._written.text)
-            assert end(model) == end(flow) and f"x: {end(model):.0f}}}".encode() in model.parts._written.text
+            flow = hsdsl.load(path, text=model.pipeline._written.text)
+            assert end(model) == end(flow) and f"x: {end(model):.0f}}}".encode() in model.pipeline._written.text
     finally:
         done.set()
         thread.join()
@@ -279,7 +280,7 @@ def test_copies_in_two_folders_have_their_own_data_and_both_are_kept(tmp_path):
     for _ in range(2):
         for number in (1, 2):
             assert end(hsdsl.load(tmp_path / str(number) / "m.yaml")) == number
-    assert all("program" in vars(hsdsl.load(tmp_path / number / "m.yaml").parts) for number in "12")
+    assert all("program" in vars(hsdsl.load(tmp_path / number / "m.yaml").pipeline) for number in "12")
 
 
 @posix
@@ -304,7 +305,7 @@ def test_copies_without_data_share_what_is_kept(tmp_path):
         (tmp_path / number / "m.yaml").write_text(MODEL.format(4))
     assert end(hsdsl.load(tmp_path / "1" / "m.yaml")) == 4
     second = hsdsl.load(tmp_path / "2" / "m.yaml")
-    assert "program" in vars(second.parts) and second.program.path == str(tmp_path / "2" / "m.yaml")
+    assert "program" in vars(second.pipeline) and second.program.path == str(tmp_path / "2" / "m.yaml")
 
 
 def test_a_folder_that_is_no_longer_allowed_is_not_read(tmp_path):
@@ -349,4 +350,4 @@ def test_a_part_of_a_model_is_of_the_bytes_that_were_loaded(tmp_path):
 
 
 def test_keys_are_of_bytes_and_not_of_names():
-    assert key_of(b"ab", "c") != key_of(b"a", "bc") and seen.KIND != "compiled"
+    assert key_of(b"ab", "c") != key_of(b"a", "bc") and program_cache.KIND != "compiled"

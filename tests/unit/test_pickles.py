@@ -59,7 +59,7 @@ def test_a_model_is_itself_again(path, seen, tmp_path, monkeypatch):
         model = hsdsl.load(path)
     copied = again(model)
     assert copied.program == model.program and copied.system == model.system and copied.columns == model.columns
-    assert not {"system", "_compiled"} & set(model.parts.__getstate__())
+    assert not {"system", "_compiled"} & set(model.pipeline.__getstate__())
 
 
 def test_a_model_without_a_file_is_itself_again():
@@ -80,7 +80,7 @@ def test_a_model_in_another_process_needs_no_file(tmp_path):
     copied, part = pickle.loads(written)
     assert alike(copied.simulate(**FAST | {"until": "1/2 + 1/4"})) == expected
     assert copied.system.digest == model.system.digest and part.columns == model.only(["x"]).columns
-    assert copied.parts._written.limits == limits
+    assert copied.pipeline._written.limits == limits
 
 
 @pytest.mark.parametrize("engine", ["python", "c"] if COMPILER else ["python"])

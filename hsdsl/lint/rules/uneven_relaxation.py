@@ -58,7 +58,7 @@ from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import Number, evaluate
 from hsdsl.lint.start import along
 from hsdsl.lint.subject import EdgePart, Subject
-from hsdsl.schema import ReferenceTransition
+from hsdsl.schema import ReferenceTransitionDocument
 from hsdsl.system import TIME, Mode
 
 _FACTOR = 1000
@@ -107,6 +107,6 @@ def _known_points(subject: Subject, item: EdgePart) -> Iterator[dict[sp.Symbol, 
     """The states before transitions of an edge, as references of the file give them."""
     for reference in subject.document.reference:
         for event in reference.transitions:
-            if isinstance(event, ReferenceTransition) and event.edge and event.edge.value == item.edge.name:
+            if isinstance(event, ReferenceTransitionDocument) and event.edge and event.edge.value == item.edge.name:
                 before = {symbol(name): subject.read(scalar) for name, scalar in event.before.items()}
                 yield {**subject.numbers, TIME: subject.read(event.time), **before}

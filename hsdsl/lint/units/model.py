@@ -9,7 +9,7 @@ from functools import cached_property
 from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
-from hsdsl.schema import Model, ParameterEntry
+from hsdsl.schema import ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
 
 _VALUES = ("parameter", "input", "initial", "scale", "output")
@@ -38,13 +38,13 @@ class Units:
 
     Parameters
     ----------
-    document : Model
+    document : ModelDocument
         The file.
     expressions : tuple of SourceExpression
         Its expressions.
     """
 
-    def __init__(self, document: Model, expressions: tuple[SourceExpression, ...]) -> None:
+    def __init__(self, document: ModelDocument, expressions: tuple[SourceExpression, ...]) -> None:
         self._document = document
         self._expressions = expressions
         self._lets: dict[str, dict[str | None, Measure]] = {}  # by name, and by the mode that has it

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hsdsl.errors import Findings
 from hsdsl.names import shown
-from hsdsl.source.nodes import Node, Place, Scalar
+from hsdsl.source.nodes import Node, Scalar, SourceRange
 
 _MOST_PIECES = 100  # of one expression
 
@@ -112,5 +112,5 @@ def _joined(run: list[Scalar] | list[Node]) -> Node:
     if first is last:
         return first
     text = first.place.text
-    place = Place(text, first.place.start, last.place.end)
+    place = SourceRange(text, first.place.start, last.place.end)
     return Scalar(" ".join(text.content[place.start[0] : place.end[0]].split()), True, place)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from hsdsl.schema.forms import assigned
-from hsdsl.schema.meant import Location
-from hsdsl.source import Key, Mapping, Node, Place, Scalar, Sequence, absent
+from hsdsl.schema.suggestions import Location
+from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
 
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",))
 _WITH_ITS_ENTRY = ("times", "values", "file")
@@ -99,13 +99,13 @@ def _equated(parent: Node | None, key: str) -> bool:
     return True
 
 
-def _behind(place: Place, key: str, text: str) -> Scalar:
+def _behind(place: SourceRange, key: str, text: str) -> Scalar:
     """The last part of a key that stands in the file as it is read, as a value with its place."""
     first, line, column = place.start
     at = key.rfind(text)
     begin = (first + at, line, column + at)
     written = place.text.content[begin[0] : begin[0] + len(text)] == text
-    return Scalar(text, True, Place(place.text, begin, (begin[0] + len(text), line, begin[2] + len(text)))
+    return Scalar(text, True, SourceRange(place.text, begin, (begin[0] + len(text), line, begin[2] + len(text)))
                   if written else place)  # fmt: skip
 
 
@@ -162,5 +162,5 @@ def _replaced(parent: Node | None, step: int | str, text: str | None) -> bool:
     return False
 
 
-def _standing_in(place: Place, text: str | None) -> Scalar:
+def _standing_in(place: SourceRange, text: str | None) -> Scalar:
     return absent(place) if text is None else Scalar(text, True, place)

@@ -34,23 +34,23 @@ ELSEWHERE = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class Option:
     """A value and the place that gave it."""
 
     value: Any
-    place: str
+    origin: str
 
 
 @dataclass(frozen=True)
-class Source:
+class OptionSource:
     """One place and what it gives, by the names of :data:`KEYS`; None counts as not given."""
 
-    place: str
+    origin: str
     values: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Request:
+class Options:
     """What the places agree on: ``size`` is ``step`` or ``tolerance``, and ``values`` holds it with the rest.
 
     ``method`` is None for a scheme with its own formula; with ``automatic`` it is what serves where nothing better is
@@ -60,11 +60,11 @@ class Request:
     scheme: str
     method: Method | None
     size: str
-    values: dict[str, Asked]
+    values: dict[str, Option]
     automatic: bool = False
 
 
-def resolve(sources: Sequence[Source]) -> Request:
+def resolve(sources: Sequence[OptionSource]) -> Options:
     """Resolve what the places ask, lowest first.
 
     Raises
@@ -72,33 +72,33 @@ def resolve(sources: Sequence[Source]) -> Request:
     UsageError
         Step and tolerance in one place, an unknown name, or a method that cannot serve.
     """
-    values = {key: Asked(value, DEFAULT) for key, value in DEFAULTS.items()}
+    values = {key: Option(value, DEFAULT) for key, value in DEFAULTS.items()}
     for source in sources:
         given = {key: value for key, value in _with_scales(source) if value is not None}
         for key in given:
             if key not in KEYS and not key.startswith(SCALE):
-                raise UsageError(f"{source.place}: the experiment has no setting '{key}'", did_you_mean(key, KEYS))
+                raise UsageError(f"{source.origin}: the experiment has no setting '{key}'", did_you_mean(key, KEYS))
         if "step" in given and "tolerance" in given:
             raise UsageError(
-                f"{source.place} gives both step and tolerance, which exclude each other",
+                f"{source.origin} gives both step and tolerance, which exclude each other",
                 "keep step for a fixed step size, tolerance for an adaptive one",
             )
         for size, other in (("step", "tolerance"), ("tolerance", "step")):
             if size in given:
                 values.pop(other, None)
-        values |= {key: Asked(value, source.place) for key, value in given.items()}
+        values |= {key: Option(value, source.origin) for key, value in given.items()}
     if "step" not in values:
-        values.setdefault("tolerance", Asked(DEFAULT_TOLERANCE, DEFAULT))
+        values.setdefault("tolerance", Option(DEFAULT_TOLERANCE, DEFAULT))
     size = "step" if "step" in values else "tolerance"
     scheme = _scheme(values["scheme"])
     if scheme in OWN_FORMULA:
         _own_formula(scheme, values)
-        return Request(scheme, None, size, values)
+        return Options(scheme, None, size, values)
     method = _method(values["method"], values[size], size)
-    return Request(scheme, method or METHODS[AUTO], size, values, automatic=method is None)
+    return Options(scheme, method or METHODS[AUTO], size, values, automatic=method is None)
 
 
-def _with_scales(source: Source) -> Iterator[tuple[str, Any]]:
+def _with_scales(source: OptionSource) -> Iterator[tuple[str, Any]]:
     """The settings of a source, the size of each state under a key of its own."""
     for key, value in source.values.items():
         if key != "scale" or value is None:
@@ -107,22 +107,22 @@ def _with_scales(source: Source) -> Iterator[tuple[str, Any]]:
             yield from ((f"{SCALE}{name}", size) for name, size in cast("Mapping[str, Any]", value).items())
         else:
             raise UsageError(
-                f"scale ({source.place}): expected a mapping from states to sizes", "set experiment.scale.NAME"
+                f"scale ({source.origin}): expected a mapping from states to sizes", "set experiment.scale.NAME"
             )
 
 
-def _own_formula(scheme: str, values: Mapping[str, Asked]) -> None:
+def _own_formula(scheme: str, values: Mapping[str, Option]) -> None:
     for key, without in (("method", "auto"), ("relaxation", None)):
-        if values[key].place not in (FILE, DEFAULT) and values[key].value != without:
-            raise UsageError(f"scheme '{scheme}' has its own formula and no {key} ({values[key].place})")
+        if values[key].origin not in (FILE, DEFAULT) and values[key].value != without:
+            raise UsageError(f"scheme '{scheme}' has its own formula and no {key} ({values[key].origin})")
     if "step" not in values:
         raise UsageError(f"scheme '{scheme}' needs a step, and keeps no tolerance", "give a step, for example 1e-3")
 
 
-def _scheme(asked: Asked) -> str:
+def _scheme(asked: Option) -> str:
     if asked.value in SCHEMES:
         return asked.value
-    raise UsageError(f"there is no scheme '{asked.value}' ({asked.place})", did_you_mean(str(asked.value), [*SCHEMES]))
+    raise UsageError(f"there is no scheme '{asked.value}' ({asked.origin})", did_you_mean(str(asked.value), [*SCHEMES]))
 
 
 def _method_meant(name: str) -> str | None:
@@ -130,7 +130,7 @@ def _method_meant(name: str) -> str | None:
     return f"did you mean '{meant}'?" if meant in METHODS else did_you_mean(name, ["auto", *METHODS])
 
 
-def _method(asked: Asked, size_asked: Asked, size: str) -> Method | None:
+def _method(asked: Option, size_asked: Option, size: str) -> Method | None:
     """The method that is named, None where that is left to us."""
     if asked.value == "auto":
         return None
@@ -138,16 +138,16 @@ def _method(asked: Asked, size_asked: Asked, size: str) -> Method | None:
         hint = _method_meant(str(asked.value))
         from hsdsl.source import Key
 
-        if asked.place == FILE and isinstance(asked.value, Key):
+        if asked.origin == FILE and isinstance(asked.value, Key):
             raise ModelError([asked.value.place.diagnostic("HS204", f"there is no method '{asked.value}'", hint)])
-        raise UsageError(f"there is no method '{asked.value}' ({asked.place})", hint)
+        raise UsageError(f"there is no method '{asked.value}' ({asked.origin})", hint)
     table = METHODS[asked.value]
     if size == "step" or table.adaptive:
         return table
-    if asked.place == FILE and size_asked.place not in (FILE, DEFAULT):
+    if asked.origin == FILE and size_asked.origin not in (FILE, DEFAULT):
         return None
     raise UsageError(
-        f"method '{table.name}' ({asked.place}) has a fixed step and cannot keep a tolerance ({size_asked.place})",
+        f"method '{table.name}' ({asked.origin}) has a fixed step and cannot keep a tolerance ({size_asked.origin})",
         "give a step, or use method 'auto'",
     )
 

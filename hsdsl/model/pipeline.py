@@ -13,9 +13,9 @@ from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
-from hsdsl.model import automatic, engines, seen
+from hsdsl.model import automatic, engines, program_cache
+from hsdsl.model.options import FILE, KEYS, Options, OptionSource, resolve
 from hsdsl.model.overrides import recorded
-from hsdsl.model.requests import FILE, KEYS, Request, Source, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.model.written import Written
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 
-def parts_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Parts:
+def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
     """Read a model file once, or take the bytes given for it, and find what was kept of them or elaborate them."""
     began = time.perf_counter()
     written = Written.at(path, limits, text)
-    found = seen.find(written)
+    found = program_cache.find(written)
     if found is not None:
         program, written = found
-        return Parts(None, time.perf_counter() - began, written, program)
+        return Pipeline(None, time.perf_counter() - began, written, program)
     system = written.elaborated()
-    return Parts(system, time.perf_counter() - began, written.with_files(system.files))
+    return Pipeline(system, time.perf_counter() - began, written.with_files(system.files))
 
 
-class Parts:
+class Pipeline:
     """The parts of a checked model, and runs prepared from them; ``seconds`` is what making them took.
 
     Pickled they are what the model was read from, where it was read, and its program.
@@ -53,7 +53,7 @@ class Parts:
         load_seconds: float = 0.0,
         written: Written | None = None,
         program: Program | None = None,
-        part: seen.Part = (),
+        part: program_cache.Part = (),
         left_out: tuple[str, ...] = (),
     ) -> None:
         if system is not None:
@@ -76,7 +76,7 @@ class Parts:
     @cached_property
     def system(self) -> HybridSystem:
         """The mathematics; of a model seen before it is elaborated when it is asked for, from the bytes read then."""
-        from hsdsl.elaborate.needed import only
+        from hsdsl.elaborate.slicing import only
 
         assert self._written is not None
         system = self._written.elaborated()
@@ -97,9 +97,9 @@ class Parts:
             self._keep(program, self._part)
         return program
 
-    def _keep(self, program: Program, part: seen.Part) -> None:
+    def _keep(self, program: Program, part: program_cache.Part) -> None:
         if self._written is not None:
-            seen.keep(self._written, program, part)
+            program_cache.keep(self._written, program, part)
 
     @property
     def columns(self) -> list[str]:
@@ -107,7 +107,7 @@ class Parts:
         states = dict.fromkeys(name for mode in self.program.modes for name in mode.states)
         return list(dict.fromkeys((*states, *self.program.initial_states, *self.program.outputs)))
 
-    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Request:
+    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Options:
         """Resolve what the file, ``settings`` and a call ask for."""
         program, given = self.program, self.program.constants.names
         in_file: dict[str, Any] = {"scheme": program.scheme, "method": program.method}
@@ -115,7 +115,9 @@ class Parts:
         in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
         if "sample_times" in given or "sample_count" in given:
             in_file["samples"] = "samples"
-        return resolve((Source(FILE, in_file), Source("--set", settings or {}), Source("the call", asked or {})))
+        return resolve(
+            (OptionSource(FILE, in_file), OptionSource("--set", settings or {}), OptionSource("the call", asked or {}))
+        )
 
     def values(self, arithmetic: Arithmetic) -> Values:
         """Return the numbers of the model in an arithmetic, without overrides."""
@@ -179,20 +181,20 @@ class Parts:
         engine = asked.get("engine", "auto")
         return self.prepare(asked.get("settings"), settings, asked["parameters"], asked["initial"], engine, None)
 
-    def only(self, names: tuple[str, ...]) -> Parts:
+    def only(self, names: tuple[str, ...]) -> Pipeline:
         """Return the parts of the model with what these states and outputs need, this one where that is all."""
         began = time.perf_counter()
         part = (*self._part, names)
-        found = None if self._written is None else seen.find(self._written, part)
+        found = None if self._written is None else program_cache.find(self._written, part)
         if found is not None:
             program, written = found
             whole = program.left_out == self.program.left_out
-            return self if whole else Parts(None, self.seconds["load"], written, program, part)
-        from hsdsl.elaborate.needed import left_out, only
+            return self if whole else Pipeline(None, self.seconds["load"], written, program, part)
+        from hsdsl.elaborate.slicing import left_out, only
 
         system = only(self.system, names)
         if system is self.system:
             self._keep(self.program, part)
             return self
         spent = self.seconds["load"] + time.perf_counter() - began
-        return Parts(system, spent, self._written, part=part, left_out=left_out(self.system, system))
+        return Pipeline(system, spent, self._written, part=part, left_out=left_out(self.system, system))

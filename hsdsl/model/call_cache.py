@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar, cast
 Value = TypeVar("Value")
 
 
-class Remembered(Generic[Value]):
+class CallCache(Generic[Value]):
     """The last ``most`` values, by key; of a key None nothing is kept."""
 
     def __init__(self, most: int) -> None:
@@ -34,7 +34,7 @@ class Remembered(Generic[Value]):
 _PLAIN = frozenset((type(None), str, int, float, bool))
 
 
-def key_of(*arguments: Any) -> Hashable | None:
+def call_key(*arguments: Any) -> Hashable | None:
     """Return a key that calls share only if their arguments are the same; None where they are not plain data.
 
     1, 1.0 and True are not the same, zeros of both signs are.

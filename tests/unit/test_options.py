@@ -8,7 +8,7 @@ from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.errors import UsageError
 from hsdsl.integrators import INTEGRATORS
 from hsdsl.model import split_overrides
-from hsdsl.model.requests import FILE, Source, check_digits, resolve
+from hsdsl.model.options import FILE, OptionSource, check_digits, resolve
 
 # (file, --set, call) -> (method, size, its value)
 ACCEPTED = {
@@ -51,7 +51,9 @@ REFUSED = {
 
 
 def ask(places):
-    return resolve([Source(place, values) for place, values in zip((FILE, "--set", "the call"), places, strict=True)])
+    return resolve(
+        [OptionSource(place, values) for place, values in zip((FILE, "--set", "the call"), places, strict=True)]
+    )
 
 
 @pytest.mark.parametrize("case", ACCEPTED)

@@ -14,14 +14,14 @@ from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import Call, Tree
 from hsdsl.expression.timebox import Box
 from hsdsl.names import shown
-from hsdsl.source import ABSENT, Place, Scalar
+from hsdsl.source import ABSENT, Scalar, SourceRange
 
 T = TypeVar("T")
 
 _NOT_FINITE = (".inf", "+.inf", "-.inf", ".nan", "inf", "+inf", "-inf", "infinity", "-infinity", "nan")
 
 
-def understood(text: str, scope: Scope) -> Value:
+def resolved_expression(text: str, scope: Scope) -> Value:
     """The value of an expression that is in no file.
 
     Raises
@@ -44,7 +44,7 @@ def all_of(parts: Iterable[T | None]) -> list[T] | None:
 
 
 @dataclass
-class Reader:
+class ExpressionResolver:
     """Reads expressions; what is wrong with them goes to ``findings``, and the answer is then None.
 
     ``box`` bounds the time that each of them takes, and ``at`` is the one that was begun last.
@@ -54,7 +54,7 @@ class Reader:
     box: Box | None = None
     at: Scalar | None = None
 
-    def add(self, place: Place, code: str, message: str, hint: str | None = None) -> None:
+    def add(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
         """Report a fault at a place."""
         self.findings.add(place.diagnostic(code, message, hint))
 
@@ -123,6 +123,6 @@ def _tree(text: str, wanted: Wanted, scope: Scope) -> Tree:
     return parse(text, wanted)
 
 
-def _cut_by_comment(place: Place) -> bool:
+def _cut_by_comment(place: SourceRange) -> bool:
     line = place.text.lines[place.end[1]]
     return line[place.end[2] :].lstrip().startswith("#")

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from hsdsl.elaborate.reader import Reader
+from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.files import folder_of, read_data
 from hsdsl.names import closest
-from hsdsl.schema import Mode, Model
+from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import TIME
 
@@ -21,7 +21,7 @@ Values = dict[str, Value | Refusal | None]
 
 
 @dataclass
-class World:
+class SymbolTable:
     """A document with its names.
 
     Attributes
@@ -42,8 +42,8 @@ class World:
         The data files that were used: their content by name, relative to the model.
     """
 
-    document: Model
-    reader: Reader
+    document: ModelDocument
+    resolver: ExpressionResolver
     folder: Path
     path: str
     given: Mapping[str, bytes] | None = None
@@ -55,26 +55,28 @@ class World:
     files: dict[str, bytes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, document: Model, reader: Reader, path: str, given: Mapping[str, bytes] | None = None) -> World:
+    def of(
+        cls, document: ModelDocument, resolver: ExpressionResolver, path: str, given: Mapping[str, bytes] | None = None
+    ) -> SymbolTable:
         """A document with its names gathered and their clashes reported."""
-        world = cls(document, reader, folder_of(path), path, given)
+        symbols = cls(document, resolver, folder_of(path), path, given)
         for key in document.parameters:
-            world._claim(key, "parameters")
+            symbols._claim(key, "parameters")
         for key in document.inputs:
-            world._claim(key, "inputs")
+            symbols._claim(key, "inputs")
         for name, mode in document.modes.items():
-            world.states[name] = tuple(map(str, mode.flow or ()))
+            symbols.states[name] = tuple(map(str, mode.flow or ()))
             for key in mode.flow or ():
-                world._claim(key, "states")
+                symbols._claim(key, "states")
         for key in document.let:
-            world._claim(key, "let")
-        world.values["t"] = Value(TIME)
-        for name, kind in world.names.items():
+            symbols._claim(key, "let")
+        symbols.values["t"] = Value(TIME)
+        for name, kind in symbols.names.items():
             if kind == "states":
-                world.values[name] = state(name)
-        world.undeclared = frozenset(world._undeclared())
-        world.values.update(dict.fromkeys(world.undeclared))
-        return world
+                symbols.values[name] = state(name)
+        symbols.undeclared = frozenset(symbols._undeclared())
+        symbols.values.update(dict.fromkeys(symbols.undeclared))
+        return symbols
 
     def _undeclared(self) -> list[str]:
         start = self.document.initial
@@ -88,7 +90,7 @@ class World:
         taken = self.names.setdefault(key, kind)
         if taken != kind:
             message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
-            self.reader.add(key.place, "HS301", message, "give one of them another name")
+            self.resolver.add(key.place, "HS301", message, "give one of them another name")
 
     def scope(
         self, usable: tuple[str, ...], sentence: str, values: Values | None = None, hint: str | None = None
@@ -140,7 +142,7 @@ class World:
         hint = "give it to this mode too, or define it once in the `let` of the whole model"
         return {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
 
-    def without_states(self, mode: Mode) -> bool:
+    def without_states(self, mode: ModeDocument) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""
         return mode.final and mode.flow is None
 
@@ -149,7 +151,7 @@ def _refused(name: str, kind: str, sentence: str, hint: str | None) -> Refusal:
     return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
 
 
-def in_turn(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
+def definition_order(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
     """The names of definitions that may use earlier ones only.
 
     ``refused`` holds, while a name's turn lasts, refusals of it and of those below, and in the end nothing.
