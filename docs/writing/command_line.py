@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
+from typer import Context
 from writing.markdown import table
 
-from hsdsl.cli import verbs
+from hsdsl.cli.verbs import VERBS, command
 
 COMMAND_LINE = """# Command line
 
@@ -27,19 +27,19 @@ Answers go to standard output, messages and progress to standard error.
 def command_line() -> str:
     """Document every verb and option from the program itself."""
     parts = [COMMAND_LINE]
-    context = click.Context(verbs.app)
-    for name in verbs.VERBS:
-        command: Any = verbs.app.get_command(context, name)
-        parts.append(f"## hsdsl {name}\n\n{(command.help or '').strip()}\n\n")
-        parameters = [p for p in command.params if p.name != "help"]
-        rows = [(as_typed(p), (getattr(p, "help", None) or "").strip()) for p in parameters]
+    for name in VERBS:
+        verb = command(name)
+        context = Context(verb)
+        parts.append(f"## hsdsl {name}\n\n{(verb.help or '').strip()}\n\n")
+        parameters = [p for p in verb.params if p.name != "help"]
+        rows = [(as_typed(p, context), (getattr(p, "help", None) or "").strip()) for p in parameters]
         parts.append(table(("argument or option", "meaning"), rows) if rows else "")
     return "".join(parts)
 
 
-def as_typed(parameter: Any) -> str:
+def as_typed(parameter: Any, context: Context) -> str:
     """Name a parameter as one would type it."""
     if parameter.param_type_name == "argument":
         return f"`{(parameter.metavar or parameter.name).upper()}`"
     names = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts))
-    return names if parameter.is_flag else f"{names} `{parameter.metavar or parameter.type.name.upper()}`"
+    return names if parameter.is_flag else f"{names} `{parameter.make_metavar(context)}`"

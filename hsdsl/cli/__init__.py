@@ -11,15 +11,13 @@ import os
 import sys
 
 from hsdsl import interrupts
-from hsdsl.cli import streams
-
-WRONG_USAGE = 2
+from hsdsl.cli.console import WRONG_USAGE, prepare
 
 
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
     interrupts.expect()  # before anything that takes long to import
-    streams.prepare()
+    prepare()
     code = 0
     try:
         from hsdsl.cli.verbs import obey

@@ -1,54 +1,80 @@
-"""What the verbs share in speaking: errors in both forms, and progress on a terminal."""
+"""Messages, errors, and progress on standard error and standard output."""
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-import click
-from click.exceptions import Exit
-
-from hsdsl.cli.streams import draw
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
-from hsdsl.names import visible
-
-if TYPE_CHECKING:
-    from hsdsl.simulate.recorder import Progress
+from hsdsl.names import visible, visible_lines
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
-FILE = click.Path(path_type=Path)
-FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
+FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds of a progress display
+
+Text = Callable[[], str]
+
+
+class Visible:
+    """A text stream on which hidden characters become visible: no output can steer a terminal."""
+
+    def __init__(self, plain: Any) -> None:
+        self.plain = plain
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        self.plain.write(visible_lines(text))
+        return len(text)
+
+    def writelines(self, texts: Iterable[str]) -> None:
+        """Write texts."""
+        for text in texts:
+            self.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.plain, name)
+
+
+def prepare() -> None:
+    """Make standard output and error visible streams that encode any name; open them where they were closed."""
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if stream is None:
+            stream = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+        setattr(sys, name, stream if isinstance(stream, Visible) else Visible(stream))
 
 
 def say(text: str) -> None:
-    """Write a message to standard error: one line, whatever stands in it."""
+    """Write a message of one line to standard error."""
     say_lines(visible(text))
 
 
 def say_lines(text: str) -> None:
-    """Write several lines to standard error; what stands in each was made visible before."""
+    """Write several lines to standard error, each of them visible."""
     print(text, file=sys.stderr)
+
+
+def print_json(content: Any) -> None:
+    """Print the one JSON object of ``--json``."""
+    from hsdsl.report import dumps
+
+    print(dumps(content))
 
 
 @contextmanager
 def errors_reported(json: bool) -> Generator[None]:
-    """Turn the two exceptions of the house into messages and exit codes; never a traceback for bad input."""
+    """Turn `ModelError` and `UsageError` into messages and exit codes."""
+    from typer import Exit
+
     try:
         yield
     except ModelError as error:
-        from hsdsl.diagnose import as_json, render
-        from hsdsl.report import dumps
-
-        if json:
-            print(dumps(as_json(error.diagnostics)))
-        else:
-            say_lines("\n\n".join(render(d) for d in error.diagnostics))
-            count = len(error.diagnostics)
-            say_lines(f"\n{count} error{'s' * (count > 1)}")
+        report_errors(error, json)
         contradiction = all(d.code == STEP_AND_TOLERANCE for d in error.diagnostics)
         raise Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
     except UsageError as error:
@@ -56,42 +82,61 @@ def errors_reported(json: bool) -> Generator[None]:
         raise Exit(WRONG_USAGE) from None
 
 
-def report_usage(error: UsageError, json: bool) -> None:
-    """Say what is wrong with a request."""
-    if json:
-        from hsdsl.report import dumps
+def report_errors(error: ModelError, json: bool) -> None:
+    """Print the errors of a model."""
+    from hsdsl.diagnose import as_json, render
 
+    if json:
+        print_json(as_json(error.diagnostics))
+    else:
+        say_lines("\n\n".join(render(d) for d in error.diagnostics))
+        say_lines(f"\n{counted(len(error.diagnostics), 'error')}")
+
+
+def report_usage(error: UsageError, json: bool) -> None:
+    """Print what is wrong with a request."""
+    if json:
         empty = {"code": None, "path": None, "line": None, "column": None}
-        print(dumps({"errors": [{**empty, "message": str(error), "hint": error.hint}]}))
+        print_json({"errors": [{**empty, "message": str(error), "hint": error.hint}]})
     say_lines(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 @contextmanager
-def progress(quiet: bool) -> Generator[Callable[[Progress], None] | None]:
-    """Show how far a run is, on a terminal, once it takes longer than a moment. Yields the run's ``watch``."""
+def progress(quiet: bool = False) -> Generator[Callable[[Text], None] | None]:
+    """Draw the latest text on one line of a terminal, from half a second on.
+
+    Yields ``show(text)`` with ``text()`` called for each drawing, or None where nothing is drawn.
+    """
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    watched: list[Progress] = []
+    latest: list[Text] = []
     done = threading.Event()
 
     def show() -> None:
         wait = FIRST_SIGN
         while not done.wait(wait):
             wait = INTERVAL
-            for recorder in watched:
-                _bar(float(recorder.now / recorder.until) if recorder.until else 1.0, recorder.made)
+            if latest:
+                _draw(f"\r{visible(latest[-1]()[:100])}\x1b[K")
 
     thread = threading.Thread(target=show, daemon=True)
     thread.start()
     try:
-        yield watched.append
+        yield lambda text: latest.__setitem__(slice(None), [text])
     finally:
         done.set()
         thread.join()
-        draw("\r\x1b[K")
+        _draw("\r\x1b[K")
 
 
-def _bar(share: float, transitions: int, width: int = 30) -> None:
-    full = round(width * min(1.0, share))
-    draw(f"\r[{'=' * full}{' ' * (width - full)}] {share:4.0%}, {transitions} transitions\x1b[K")
+def _draw(text: str) -> None:
+    """Write text with control characters to standard error."""
+    plain = sys.stderr.plain if isinstance(sys.stderr, Visible) else sys.stderr
+    plain.write(text)
+    plain.flush()

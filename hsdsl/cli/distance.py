@@ -1,92 +1,79 @@
-"""``hsdsl distance``: how far apart two states of a model are, or two saved runs."""
+"""``hsdsl distance``: the distance between two states of a model, or between two runs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
+from typer import Argument
 
-from hsdsl.cli.console import FILE, errors_reported, say
-from hsdsl.cli.distance_runs import check_picture, of_runs
-from hsdsl.cli.limited import limited
+from hsdsl.cli.completion import model_files, override_names
+from hsdsl.cli.console import Text, print_json, progress, say
+from hsdsl.cli.options import (
+    AllowPath,
+    Json,
+    Limit,
+    Metric,
+    answering,
+    check_target,
+    names_of,
+    option,
+    split,
+)
 from hsdsl.errors import UsageError
 
+if TYPE_CHECKING:
+    from hsdsl.execution import Execution
+    from hsdsl.model import Model
 
-@click.command()
-@click.argument(
-    "first",
-    type=FILE,
-    metavar="A",
-    help="The model file, or a run: a saved one (.npz), or a model's own experiment.",
-)
-@click.argument("second", type=FILE, metavar="[B]", required=False, help="A second run.")
-@click.option(
-    "--from", "start", metavar="STATE", help='A mode and all its states: "free x=13 v=5"; values are expressions.'
-)
-@click.option("--to", "end", metavar="STATE", help="The other state.")
-@click.option(
-    "--metric",
-    metavar="NAME",
-    help="Between states: quotient or relaxed. Between runs: rho, rho-hat, sup, skorokhod or tau-epsilon.",
-)
-@click.option("--relaxation", metavar="EPS", help="Depth of the strips, for the relaxed metric; else the file's.")
-@click.option("--set", "overrides", multiple=True, metavar="NAME=VALUE", help="Override a parameter. May be repeated.")
-@click.option("--coordinates", metavar="A,B", help="For rho-hat: the states that count as the position.")
-@click.option(
-    "--plot",
-    type=FILE,
-    metavar="FILE",
-    help="Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg.",
-)
-@click.option(
-    "--hops",
-    type=int,
-    metavar="N",
-    help="The most passages of a path; else eight more than the fewest that connect the modes.",
-)
-@click.option(
-    "--seconds",
-    metavar="S",
-    default=60.0,
-    help="About how long the search may take; what is then still open stays open.",
-)
-@click.option("--json", is_flag=True, help="Print one JSON object instead of the sentence.")
-@limited
+
+SET = "Override a parameter. May be repeated."
+FIRST = "The model file, or a run: a saved one (.npz), or a model's own experiment."
+FROM = 'A mode and all its states: "free x=13 v=5"; values are expressions.'
+METRIC = "Between states: quotient or relaxed. Between runs: rho, rho-hat, sup, skorokhod or tau-epsilon."
+DEPTH = "Depth of the strips, for the relaxed metric; else the file's."
+PLOT = "Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg."
+HOPS = "The most passages of a path; else eight more than the fewest that connect the modes."
+SECONDS = "About how long the search may take; it then returns the bounds it has."
+
+
 def distance(
-    first: Path,
-    second: Path | None,
-    start: str | None,
-    end: str | None,
-    metric: str | None,
-    relaxation: str | None,
-    overrides: tuple[str, ...],
-    coordinates: str | None,
-    plot: Path | None,
-    hops: int | None,
-    seconds: float,
-    json: bool,
+    first: Annotated[Path, Argument(metavar="A", help=FIRST, autocompletion=model_files)],
+    second: Annotated[Path | None, Argument(metavar="[B]", help="A second run.", autocompletion=model_files)] = None,
+    start: Annotated[str | None, option("STATE", FROM, "--from")] = None,
+    end: Annotated[str | None, option("STATE", "The other state.", "--to")] = None,
+    metric: Annotated[Metric | None, option("NAME", METRIC)] = None,
+    relaxation: Annotated[str | None, option("EPS", DEPTH)] = None,
+    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    coordinates: Annotated[str | None, option("A,B", "For rho-hat: the states that count as the position.")] = None,
+    plot: Annotated[Path | None, option("FILE", PLOT)] = None,
+    hops: Annotated[int | None, option("N", HOPS)] = None,
+    seconds: Annotated[float, option("S", SECONDS)] = 60.0,
+    json: Json = False,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
 ) -> None:
-    """Measure how far apart two states, or two runs, are in the hybrid metric."""
-    with errors_reported(json):
+    """Measure the distance between two states, or two runs, in the hybrid metric."""
+    with answering(json, allow_path, limit):
         parameters = _parameters(overrides)
         options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
+        check_target(plot, "--plot", (".png", ".svg"))
         if second is not None:
             if start is not None or end is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
-            names = None if coordinates is None else [name.strip() for name in coordinates.split(",")]
-            of_runs(first, second, metric, json, options, names, plot)
+            position = None if coordinates is None else names_of(coordinates)
+            _between_runs((first, second), metric, position, plot, json, options)
         elif first.suffix.lower() == ".npz":
             hint = "give a second run, or the model file with --from and --to"
-            raise UsageError(f"{first} is a run: two runs, or a model and two states, are wanted", hint)
+            raise UsageError(f"{first} is a run: expected two runs, or a model and two states", hint)
         elif coordinates is not None:
             raise UsageError("--coordinates is for two runs")
         elif start is None or end is None:
-            raise UsageError("two states are wanted, or a second run", _example(first))
+            raise UsageError("expected two states, or a second run", _example(first))
         else:
-            check_picture(plot)
-            of_points(first, start, end, metric, json, {**options, "plot": plot})
+            _between_points(first, (start, end), metric, plot, json, options)
 
 
 def _example(path: Path) -> str:
@@ -98,34 +85,75 @@ def _example(path: Path) -> str:
     return "for example: hsdsl distance {} --from {} --to {}".format(path, *two)
 
 
-def of_points(path: Path, p: str, q: str, metric: str | None, json: bool, options: dict[str, Any]) -> None:
-    """Measure between two states of a model."""
+def _between_points(
+    path: Path, points: tuple[str, str], metric: str | None, plot: Path | None, json: bool, options: dict[str, Any]
+) -> None:
     from hsdsl.model import load
-    from hsdsl.report import dumps
 
     name = metric or ("quotient" if options["relaxation"] is None else "relaxed")
-    found = load(path).distance(p, q, metric=name, **options)
-    if options["plot"] is not None:
-        say(f"wrote {options['plot']}")
+    result = load(path).distance(*points, metric=name, plot=plot, **options)
+    if plot is not None:
+        say(f"wrote {plot}")
     if not json:
-        print(found.sentence)
+        print(result.sentence)
         return
     pieces = [
         {
             "mode": piece.mode, "from": list(piece.start), "to": list(piece.end),
             "edge": piece.edge, "forward": None if piece.edge is None else piece.forward,
         }
-        for piece in found.path
+        for piece in result.path
     ]  # fmt: skip
-    bounds = {"lower": found.interval.lower, "upper": found.interval.upper, "status": found.status}
-    print(dumps({**bounds, "metric": name, "certified": found.certified, "path": pieces}))
+    bounds = {"lower": result.interval.lower, "upper": result.interval.upper, "status": result.status}
+    print_json({**bounds, "metric": name, "certified": result.certified, "path": pieces})
 
 
-def _parameters(pairs: Sequence[str]) -> dict[str, str]:
-    from hsdsl.model import split_overrides
-
-    parameters, initial, settings = split_overrides(pairs)
+def _parameters(overrides: list[str] | None) -> dict[str, str]:
+    parameters, initial, settings = split(overrides)
     others: list[Any] = [*(f"initial.{name}" for name in initial), *(f"experiment.{name}" for name in settings)]
     if others:
         raise UsageError(f"a distance depends on parameters alone; --set {others[0]} has no meaning here")
     return parameters
+
+
+def _between_runs(
+    paths: tuple[Path, Path],
+    metric: str | None,
+    coordinates: list[str] | None,
+    plot: Path | None,
+    json: bool,
+    options: dict[str, Any],
+) -> None:
+    from hsdsl.model.between_runs import distance as between_runs
+    from hsdsl.model.between_runs import plot_distance
+
+    (run, model), (other, _) = (_run(path, options["parameters"]) for path in paths)
+    options = {**options, "model": model}
+    with progress() as show:
+        watch = show and partial(_watch, show)
+        result = between_runs(run, other, metric or "rho", coordinates=coordinates, watch=watch, **options)
+    if plot is not None:
+        plot_distance(run, other, plot, **options)
+        say(f"wrote {plot}")
+    if json:
+        print_json(result.as_json())
+    else:
+        print(result.sentence)
+
+
+def _watch(show: Callable[[Text], None], lower: float, upper: float) -> None:
+    show(lambda: f"at least {lower:.4g}, at most {upper:.4g} so far")
+
+
+def _run(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | Path | None]:
+    """A run, and its model where that is not where the run says."""
+    if path.suffix.lower() == ".npz":
+        from hsdsl.store import load
+
+        run = load(path)
+        neighbour = path.parent / Path(run.model).name
+        return run, neighbour if not Path(run.model).exists() and neighbour.exists() else None
+    from hsdsl.model import load as load_model
+
+    model = load_model(path)  # read once: it may come through a pipe
+    return model.simulate(parameters=parameters), model

@@ -1,4 +1,4 @@
-"""``hsdsl doctor``: what this installation is made of and what it can do here."""
+"""``hsdsl doctor``: packages, compiler and cache of this installation."""
 
 from __future__ import annotations
 
@@ -7,38 +7,27 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-import click
-from click.exceptions import Exit
+from typer import Exit
 
-NEEDED = (
-    "pyyaml",
-    "pydantic",
-    "sympy",
-    "mpmath",
-    "numpy",
-    "click",
-    "matplotlib",
-    "scipy",
-    "clarabel",
-    "pint",
-    "threadpoolctl",
-)
+from hsdsl.cli.console import print_json
+from hsdsl.cli.options import Json
+
+NEEDED = "pyyaml pydantic sympy mpmath numpy typer matplotlib scipy clarabel pint threadpoolctl"  # of pyproject.toml
 OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
 
 
-@click.command()
-@click.option("--json", is_flag=True, help="Print one JSON object.")
-def doctor(json: bool) -> None:
-    """Say what this installation is made of and what it can do here."""
-    from hsdsl.report import dumps
-
-    found = _found()
-    print(dumps(found) if json else _text(found))
-    if any(value is None for value in found["packages"].values()):
+def doctor(json: Json = False) -> None:
+    """Check this installation: its packages, its compiler and its cache."""
+    installation = _installation()
+    if json:
+        print_json(installation)
+    else:
+        print(_text(installation))
+    if any(value is None for value in installation["packages"].values()):
         raise Exit(1)
 
 
-def _found() -> dict[str, Any]:
+def _installation() -> dict[str, Any]:
     from hsdsl import __version__
     from hsdsl.integrators import METHODS
     from hsdsl.simulate import SCHEMES
@@ -48,7 +37,7 @@ def _found() -> dict[str, Any]:
         "python": platform.python_version(),
         "executable": sys.executable,
         "platform": platform.platform(),
-        "packages": {name: _version(name) for name in NEEDED},
+        "packages": {name: _version(name) for name in NEEDED.split()},
         "optional": {name: _version(name) for name in OPTIONAL},
         **_engines(),
         "schemes": list(SCHEMES),

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-import click
+from typing import Annotated
 
-from hsdsl.cli.console import errors_reported
+from typer import Argument
+
+from hsdsl.cli.completion import codes
+from hsdsl.cli.console import errors_reported, print_json
+from hsdsl.cli.options import Json
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
 
+CODE = "A code such as HS111, or the name of a lint rule."
 
-@click.command()
-@click.argument("code", metavar="CODE", help="A code such as HS111, or the name of a lint rule.")
-@click.option("--json", is_flag=True, help="Print one JSON object.")
-def explain(code: str, json: bool) -> None:
-    """Say what an error or a finding means, why, and what to write instead."""
+
+def explain(
+    code: Annotated[str, Argument(metavar="CODE", help=CODE, autocompletion=codes)], json: Json = False
+) -> None:
+    """Explain an error or a finding: its meaning, its reason, and what to write instead."""
     from hsdsl.lint import RULES
     from hsdsl.lint.pages import pages, titles
-    from hsdsl.report import dumps
 
     with errors_reported(json):
         by_name = {rule.name: code for code, rule in RULES.items()}
-        found = by_name.get(code.lower(), code.upper())
-        if found not in titles():
-            raise UsageError(f"there is no code '{code}'", did_you_mean(found, [*titles(), *by_name]))
-        name = RULES[found].name if found in RULES else None
+        known = by_name.get(code.lower(), code.upper())
+        if known not in titles():
+            raise UsageError(f"there is no code '{code}'", did_you_mean(known, [*titles(), *by_name]))
+        name = RULES[known].name if known in RULES else None
         if json:
-            print(dumps({"code": found, "name": name, "title": titles()[found], "page": pages()[found]}))
+            print_json({"code": known, "name": name, "title": titles()[known], "page": pages()[known]})
         else:
-            print(f"{found} {name or ''}".strip() + "\n\n" + pages()[found])
+            print(f"{known} {name or ''}".strip() + "\n\n" + pages()[known])

@@ -1,120 +1,128 @@
-"""``hsdsl run``: simulate a model, say what happened, and keep it."""
+"""``hsdsl run``: simulate a model, summarise the run, and save it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
-from click.exceptions import Exit
+from typer import Exit, Option
 
-from hsdsl.cli.console import FILE, errors_reported, progress, say
-from hsdsl.cli.limited import limited
+from hsdsl.cli.completion import override_names
+from hsdsl.cli.console import Text, print_json, progress, say
+from hsdsl.cli.options import (
+    AllowPath,
+    Engine,
+    Json,
+    Limit,
+    Method,
+    Model,
+    Quiet,
+    Scheme,
+    answering,
+    check_target,
+    names_of,
+    option,
+    split,
+)
 from hsdsl.errors import UsageError
+from hsdsl.interrupts import INTERRUPTED
+from hsdsl.names import did_you_mean, visible
 
 if TYPE_CHECKING:
     from hsdsl.execution import Execution
+    from hsdsl.model import Model as LoadedModel
+    from hsdsl.model.stream import Streamed
 
-STOPPED, INTERRUPTED = 3, 130
+STOPPED = 3
+SET = (
+    "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
+    " (experiment.step=1e-3). May be repeated; values are expressions of parameters."
+)
+PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
+ESTIMATE = "Run again, finer, and give the distance of the runs."
+EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
 OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".html")
 
 
-@click.command()
-@click.argument("model", type=FILE, metavar="MODEL", help="The model file.")
-@click.option(
-    "--set",
-    "overrides",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
-    " (experiment.step=1e-3). May be repeated; values are expressions of parameters.",
-)
-@click.option("--until", metavar="T", help="End of the run.")
-@click.option("--scheme", metavar="S", help="relaxed, located or paoli-schatzman.")
-@click.option("--method", metavar="M", help="A method's name, such as dopri5 or taylor, or auto.")
-@click.option("--step", metavar="H", help="Fixed step size; excludes --tolerance.")
-@click.option("--tolerance", metavar="TOL", help="Bound on the local error, relative to the states' scales.")
-@click.option("--relaxation", metavar="EPS", help="The paper's epsilon: depth of the strips, and a time.")
-@click.option("--engine", metavar="ENGINE", default="auto", help="auto, c or python.")
-@click.option(
-    "--precision",
-    type=int,
-    metavar="DIGITS",
-    help="Compute with this many decimal digits (mpmath); the default tolerance of taylor follows.",
-)
-@click.option("--outputs", metavar="A,B", help="Only these states and outputs in files and final outputs.")
-@click.option("--estimate", is_flag=True, help="Run again, finer, and say how far apart the two runs are.")
-@click.option("--out", type=FILE, metavar="FILE", help="Save the execution: .csv, .parquet or .npz.")
-@click.option(
-    "--every",
-    type=int,
-    metavar="K",
-    help="Write every K-th step to --out (.csv) while the run goes on, in constant memory; jumps are always written.",
-)
-@click.option("--plot", type=FILE, metavar="FILE", help="Draw it: .png, .svg or .html.")
-@click.option("--json", is_flag=True, help="Print one JSON object instead of the summary.")
-@click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress.")
-@limited
 def run(
-    model: Path,
-    overrides: tuple[str, ...],
-    engine: str,
-    outputs: str | None,
-    estimate: bool,
-    out: Path | None,
-    every: int | None,
-    plot: Path | None,
-    json: bool,
-    quiet: bool,
-    precision: int | None,
-    **settings: str | None,
+    model: Model,
+    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    until: Annotated[str | None, option("T", "End of the run.")] = None,
+    scheme: Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")] = None,
+    method: Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")] = None,
+    step: Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")] = None,
+    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")] = None,
+    relaxation: Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")] = None,
+    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    precision: Annotated[int | None, option("DIGITS", PRECISION)] = None,
+    outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
+    estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
+    out: Annotated[Path | None, option("FILE", "Save the execution: .csv, .parquet or .npz.")] = None,
+    every: Annotated[int | None, option("K", EVERY)] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw it: .png, .svg or .html.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
 ) -> None:
     """Simulate a model and summarise what happened."""
-    asked: dict[str, Any] = {**settings, "engine": engine, "precision": precision}
-    with errors_reported(json):
-        _check_target(out, "--out", OUT_SUFFIXES)
+    settings: dict[str, Any] = {"until": until, "scheme": scheme, "method": method, "step": step}
+    settings |= {"tolerance": tolerance, "relaxation": relaxation, "engine": engine, "precision": precision}
+    with answering(json, allow_path, limit):
+        check_target(out, "--out", OUT_SUFFIXES)
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
-        _check_target(plot, "--plot", PLOT_SUFFIXES)
-        if every is None:
-            stop = _simulate(model, overrides, asked, outputs, estimate, out, plot, json, quiet).stop
-        else:
-            from hsdsl.cli.streamed import streamed
-
-            if out is None or plot is not None or estimate or precision is not None:
+        check_target(plot, "--plot", PLOT_SUFFIXES)
+        loaded = _load(model, settings)
+        settings |= zip(("parameters", "initial", "settings"), split(overrides), strict=True)
+        names = chosen_names(outputs, loaded.columns)
+        result: Any
+        with progress(quiet or json) as show:
+            settings["watch"] = show and partial(_watch, show)
+            if every is None:
+                result = loaded.simulate(**settings, outputs=names)
+            elif out is None or plot is not None or estimate or precision is not None:
                 raise UsageError("--every streams to --out FILE.csv, without --plot, --estimate or --precision")
-            stop = streamed(model, overrides, asked, outputs, out, every, json, quiet)
-    if stop.reason == "interrupted":
-        raise Exit(INTERRUPTED)
+            else:
+                settings = {name: value for name, value in settings.items() if value is not None}
+                result = loaded.stream(out, every=every, columns=names, **settings)
+        if every is None:
+            _answer(loaded, result, names, estimate, out, plot, settings["parameters"], json, quiet)
+        else:
+            _answer_streamed(result, model, json, quiet)
+    stop = result.stop
     if not stop.complete:
-        raise Exit(STOPPED)
+        if not json:
+            say(f"hsdsl: stopped ({stop.reason}): {stop.message}")
+        raise Exit(INTERRUPTED if stop.reason == "interrupted" else STOPPED)
 
 
-def _simulate(
-    path: Path,
-    overrides: Sequence[str],
-    asked: dict[str, Any],
-    outputs: str | None,
+def _load(path: Path, settings: dict[str, Any]) -> LoadedModel:
+    """Load a model, and its compiled code at the same time."""
+    from hsdsl.files import read_bytes
+    from hsdsl.model import engines, load
+
+    text = read_bytes(path)
+    engines.begin(text, *(settings[key] for key in ("engine", "precision", "scheme", "method")))
+    return load(path, text=text)
+
+
+def _answer(
+    model: Any,
+    execution: Execution,
+    names: list[str] | None,
     estimate: bool,
     out: Path | None,
     plot: Path | None,
+    parameters: dict[str, str],
     json: bool,
     quiet: bool,
-) -> Execution:
-    from hsdsl.files import read_bytes
-    from hsdsl.model import engines, load, split_overrides
-
-    text = read_bytes(path)
-    engines.begin(text, *(asked[key] for key in ("engine", "precision", "scheme", "method")))
-    model = load(path, text=text)
-    names = chosen_names(outputs, model.columns)
-    parameters, initial, settings = split_overrides(overrides)
-    asked |= {"parameters": parameters, "initial": initial, "settings": settings, "outputs": names}
-    with progress(quiet or json) as watch:
-        execution = model.simulate(**asked, watch=watch)
-    found = model.estimate(execution) if estimate else None
-    if found is not None:
+) -> None:
+    """Save, draw and print a run."""
+    estimated = model.estimate(execution) if estimate else None
+    if estimated is not None:
         execution = execution.estimated()
     if out is not None:
         for written in execution.save(out, columns=names):
@@ -122,49 +130,72 @@ def _simulate(
     if plot is not None:
         model.plot(execution, plot, parameters)
         say(f"wrote {plot}")
-    _report(execution, names, found, json, quiet)
-    return execution
-
-
-def _report(execution: Execution, names: list[str] | None, found: Any, json: bool, quiet: bool) -> None:
-    from hsdsl.report import as_json, dumps, summary
-
     if json:
-        result = as_json(execution)
-        if names is not None:
-            chosen = result["final"]["outputs"]
-            result["final"]["outputs"] = {name: value for name, value in chosen.items() if name in names}
-        print(dumps(result | ({} if found is None else {"estimate": found.as_json()})))
+        _print_json(execution, names, estimated)
     elif not quiet:
-        print(summary(execution) + ("" if found is None else f"\n{found.sentence}"))
-    if not execution.stop.complete and not json:
-        say(f"hsdsl: stopped ({execution.stop.reason}): {execution.stop.message}")
+        from hsdsl.report import summary
+
+        print(summary(execution) + ("" if estimated is None else f"\n{estimated.sentence}"))
+
+
+def _print_json(execution: Execution, names: list[str] | None, estimated: Any) -> None:
+    from hsdsl.report import as_json
+
+    result = as_json(execution)
+    if names is not None:
+        chosen = result["final"]["outputs"]
+        result["final"]["outputs"] = {name: value for name, value in chosen.items() if name in names}
+    print_json(result | ({} if estimated is None else {"estimate": estimated.as_json()}))
+
+
+def _watch(show: Callable[[Text], None], run: Any, width: int = 30) -> None:
+    """Show how far a run is."""
+
+    def bar() -> str:
+        share = min(1.0, float(run.now / run.until)) if run.until else 1.0
+        return f"[{'=' * round(width * share):{width}}] {share:4.0%}, {run.made} transitions"
+
+    show(bar)
 
 
 def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
-    """Return the names that ``--outputs`` gives, None where it is left out."""
-    from hsdsl.names import did_you_mean
-
+    """The names of ``--outputs``, None where it is left out."""
     if outputs is None:
         return None
-    names = [name.strip() for name in outputs.split(",") if name.strip()]
+    names = names_of(outputs)
     for name in names:
         if name not in known:
             raise UsageError(f"--outputs: the model has no state or output '{name}'", did_you_mean(name, known))
     if not names:
-        raise UsageError("--outputs wants names of states or outputs, with commas between them")
+        raise UsageError("--outputs: expected names of states or outputs, with commas between them")
     return names
 
 
-def _check_target(path: Path | None, option: str, suffixes: tuple[str, ...]) -> None:
-    """Refuse a file that could not be written before a long run, not after it."""
-    if path is None:
+def _answer_streamed(run: Streamed, model: Path, json: bool, quiet: bool) -> None:
+    """Print a streamed run; its transitions are in the file, so they are only counted."""
+    if not json:
+        if not quiet:
+            print(f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}")
+            print(f"stop      {run.stop.reason}: {run.stop.message}\ntransitions {run.transitions}")
         return
-    if path.suffix.lower() not in suffixes:
-        raise UsageError(f"{option} {path}: the name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}")
-    if not path.parent.is_dir():
-        raise UsageError(f"{option} {path}: there is no folder {path.parent}")
-    if path.suffix.lower() == ".parquet":
-        from hsdsl.execution.samples import optional
-
-        optional("pyarrow", f"{option} {path}")
+    final = run.final
+    states = [name for name, present in zip(final.states, final.present[0], strict=True) if present]
+    print_json(
+        {
+            "model": str(model),
+            "engine": run.engine,
+            "scheme": run.scheme,
+            "method": run.method,
+            "overrides": run.overrides,
+            "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
+            "transition_count": run.transitions,
+            "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
+            "final": {
+                "time": float(final.time[0]),
+                "mode": str(final.mode[0]),
+                "state": {name: float(final[name][0]) for name in states},
+                "outputs": {name: float(final[name][0]) for name in final.outputs},
+            },
+            "seconds": {"simulate": run.seconds},
+        }
+    )

@@ -1,11 +1,6 @@
 """``hsdsl schema``: the JSON Schema of model files, for editors."""
 
-from __future__ import annotations
 
-import click
-
-
-@click.command()
 def schema() -> None:
     """Print the JSON Schema of the language (draft 7)."""
     import json

@@ -1,40 +1,40 @@
-"""``hsdsl validate``: say every error of model files, and run nothing."""
+"""``hsdsl validate``: report every error of model files, without a run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import click
-from click.exceptions import Exit
+from typer import Exit
 
-from hsdsl.cli.console import FILE
-from hsdsl.cli.gathered import FORMAT, FORMATS, Format, Gathered, counted
-from hsdsl.cli.limited import limited
+from hsdsl.cli.console import counted
+from hsdsl.cli.diagnostic_report import DiagnosticReport
+from hsdsl.cli.options import AllowPath, Formatted, Json, Limit, Models, Quiet, answering
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.names import visible
 
 
-@click.command()
-@click.argument("models", nargs=-1, required=True, type=FILE, metavar="MODEL...", help="Model files.")
-@click.option("--format", type=FORMAT, default="text", metavar=FORMATS, help="How to say what is wrong.")
-@click.option("--json", is_flag=True, help="The same as --format json.")
-@click.option("--quiet", "-q", is_flag=True, help="Say only what is wrong.")
-@limited
-def validate(models: tuple[Path, ...], format: Format, json: bool, quiet: bool) -> None:
-    """Check model files and say every error in them."""
-    gathered = Gathered()
-    format = Format.json if json else format
-    for path in models:
-        try:
-            line = _checked(path)
-        except (ModelError, UsageError) as error:
-            gathered.wrong({"path": str(path), "valid": False}, error)
-        else:
-            gathered.looked({"path": str(path), "valid": True}, (), ())
-            if format is Format.text and not quiet:
-                print(line)
-    gathered.say(format, lint=False)
-    raise Exit(gathered.code)
+def validate(
+    models: Models,
+    format: Formatted = "text",
+    json: Json = False,
+    quiet: Quiet = False,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
+) -> None:
+    """Check model files and report every error in them."""
+    report = DiagnosticReport("json" if json else format)
+    with answering(json, allow_path, limit):
+        for path in models:
+            try:
+                line = _checked(path)
+            except (ModelError, UsageError) as error:
+                report.add_error({"path": str(path), "valid": False}, error)
+            else:
+                report.add({"path": str(path), "valid": True})
+                if report.format == "text" and not quiet:
+                    print(line)
+    report.print(lint=False)
+    raise Exit(report.code)
 
 
 def _checked(path: Path) -> str:

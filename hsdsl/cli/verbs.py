@@ -1,68 +1,97 @@
-"""The verbs by name, each in a module of its name that is loaded when the verb is used."""
+"""The commands by name, each in a module of its name that is imported when the command runs."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
+from typing import Annotated, Any, cast
 
-import click
-from click.exceptions import Exit, NoSuchCommand
+from typer import Abort, Context, Exit, Option, Typer, TyperException
+from typer.core import TyperGroup
+from typer.main import get_command
 
-from hsdsl import __version__
+from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED, WORD
-from hsdsl.names import visible
+from hsdsl.names import did_you_mean, visible
 
 VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "schema", "doctor")
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
+SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 
 
-class _Verbs(click.Group):
-    """The group of all verbs."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in VERBS:
-            return None
-        return getattr(import_module(f"hsdsl.cli.{cmd_name}"), cmd_name)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args[0] not in VERBS and not ctx.resilient_parsing:
-            raise NoSuchCommand(args[0], possibilities=VERBS, ctx=ctx)
-        return super().resolve_command(ctx, args)
+def command(verb: str) -> Any:
+    """Import a command."""
+    single = Typer(add_completion=False, rich_markup_mode=None)
+    single.command(verb, context_settings=SETTINGS)(getattr(import_module(f"hsdsl.cli.{verb}"), verb))
+    return get_command(single)
 
 
-@click.group(
-    cls=_Verbs,
-    name="hsdsl",
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
-)
-@click.version_option(__version__, message="%(prog)s %(version)s", prog_name="hsdsl", help="Print the version.")
-def app() -> None:
+class _Verbs(TyperGroup):
+    """The group of all commands."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = cast("dict[str, Any]", dict.fromkeys(VERBS))  # names, for lists and suggestions
+
+    def get_command(self, ctx: Context, cmd_name: str) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return command(cmd_name) if cmd_name in VERBS else None
+
+
+app = Typer(cls=_Verbs, name="hsdsl", no_args_is_help=True, rich_markup_mode=None, context_settings=SETTINGS)
+
+
+def _version(asked: bool) -> None:
+    from hsdsl import __version__
+
+    if asked:
+        print(f"hsdsl {__version__}")
+        raise Exit
+
+
+@app.callback()
+def hsdsl(
+    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
+) -> None:
     """Hybrid systems written as mathematics in YAML: checked, simulated, measured."""
 
 
 def obey(words: list[str]) -> int:
-    """Do what a command line says and return the exit code."""
-    if instruction := os.environ.get(COMPLETE):
-        from click.shell_completion import shell_complete
-
-        return shell_complete(app, {}, "hsdsl", COMPLETE, instruction)
+    """Run a command line and return the exit code."""
+    if COMPLETE in os.environ:
+        get_command(app).main(words, prog_name="hsdsl")
+    alone = bool(words) and words[0] in VERBS  # without the group, whose options take long to import
     try:
-        with app.make_context("hsdsl", words) as context:
-            app.invoke(context)
+        verb = command(words[0]) if alone else get_command(app)
+        with verb.make_context(f"hsdsl {words[0]}" if alone else "hsdsl", words[alone:]) as context:
+            verb.invoke(context)
     except Exit as end:
         return end.exit_code
-    except click.ClickException as error:
-        vars(error)["message"] = visible(error.message)
-        error.show(sys.stderr)
-        return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
+    except TyperException as error:
+        return _report(error, words)
+    except (Abort, KeyboardInterrupt):
         print(WORD, file=sys.stderr)
         return INTERRUPTED
     return 0
+
+
+def _report(error: Any, words: list[str]) -> int:
+    """Print what is wrong with a command line."""
+    json = "--json" in words
+    choices = getattr(getattr(getattr(error, "param", None), "type", None), "choices", None)
+    if choices or json:
+        from hsdsl.cli.console import report_usage
+
+        report_usage(_not_a_choice(error, choices) if choices else UsageError(error.format_message()), json)
+    else:
+        error.message = visible(error.message) if words else error.message  # else the help text
+        error.show(sys.stderr)
+    return error.exit_code
+
+
+def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:
+    from hsdsl.model.requests import ELSEWHERE
+
+    value: str = error.message.split("'")[1]
+    return UsageError(f"there is no {error.param.name} '{value}'", did_you_mean(ELSEWHERE.get(value) or value, choices))

@@ -63,15 +63,15 @@ def test_a_picture(ask, folder):
 WRONG = {
     "the distance 'sup' has no relaxation": ("coarse.npz", "fine.npz", "--metric", "sup", "--relaxation", "1"),
     "coordinates are for rho-hat": ("coarse.npz", "fine.npz", "--metric", "sup", "--coordinates", "T"),
-    "fine.npz is a run: two runs": ("fine.npz", "--from", "on T=19", "--to", "on T=20"),
+    "fine.npz is a run: expected two runs": ("fine.npz", "--from", "on T=19", "--to", "on T=20"),
     "give two runs, or one model": ("coarse.npz", "fine.npz", "--from", "on T=19"),
     "positive number of seconds": ("coarse.npz", "fine.npz", "--seconds", "-1"),
     "runs are of different models": ("fine.npz", "other.npz"),
-    "no distance 'skorohod' between runs": ("coarse.npz", "fine.npz", "--metric", "skorohod"),
+    "no metric 'skorohod'": ("coarse.npz", "fine.npz", "--metric", "skorohod"),
     "no state 'S'": ("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "S"),
     "relaxation must be positive": ("coarse.npz", "fine.npz", "--relaxation", "0"),
     "cannot read gone.npz": ("gone.npz", "fine.npz"),
-    "should end in .png or .svg": ("coarse.npz", "fine.npz", "--plot", "apart.pdf"),
+    "must end in .png or .svg": ("coarse.npz", "fine.npz", "--plot", "apart.pdf"),
 }
 
 

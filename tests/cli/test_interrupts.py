@@ -75,18 +75,3 @@ def test_in_the_background_of_a_shell_control_c_is_not_for_us(tmp_path):
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode == 0
-
-
-def test_completion_answers_a_shell(tmp_path):
-    def answer(words: str, place: int, instruction: str) -> str:
-        given = {"_HSDSL_COMPLETE": instruction, "COMP_WORDS": words, "COMP_CWORD": str(place)}
-        done = subprocess.run(
-            [sys.executable, "-m", "hsdsl"], env={**os.environ, **given}, capture_output=True, text=True
-        )
-        assert not done.stderr
-        return done.stdout
-
-    assert "_hsdsl_completion" in answer("", 0, "bash_source")
-    assert "plain,validate" in answer("hsdsl val", 1, "bash_complete")
-    assert "--engine" in answer("hsdsl run --eng", 2, "bash_complete")
-    assert answer("hsdsl nothing x", 2, "bash_complete").strip() == ""

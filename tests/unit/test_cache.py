@@ -44,8 +44,8 @@ print([name for name in sys.argv[2:] if name in sys.modules])
 """
 LIGHT_COMMAND = """
 import sys
-from hsdsl.cli.verbs import app
-app(["run", sys.argv[1], "--json"], standalone_mode=False)
+from hsdsl.cli.verbs import obey
+obey(["run", sys.argv[1], "--json"])
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
 HEAVY = ("sympy", "mpmath", "scipy", "pydantic", "yaml", "matplotlib", "pint")

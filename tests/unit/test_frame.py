@@ -22,7 +22,7 @@ from hsdsl.errors import CODES
 
 ROOT = Path(__file__).parent.parent.parent
 SOURCES = sorted((ROOT / "hsdsl").rglob("*.py"))
-HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "click", "pandas")
+HEAVY = ("sympy", "scipy", "pydantic", "matplotlib", "yaml", "typer", "pandas")
 
 
 def modules_after(statement: str) -> set[str]:

@@ -1,0 +1,97 @@
+"""Types of arguments and options that several commands share, with their completions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from typer import Argument, Option
+
+from hsdsl.cli.completion import model_files
+from hsdsl.cli.console import errors_reported
+from hsdsl.errors import UsageError
+from hsdsl.limits import DEFAULT, NUMBERS, Limits, applied
+from hsdsl.names import did_you_mean
+
+
+def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | None = None) -> Any:
+    """An option with a value."""
+    return Option(*names, metavar=metavar, help=help, autocompletion=complete)
+
+
+Scheme = Literal["relaxed", "located", "paoli-schatzman"]
+Method = Literal[
+    "auto", "euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853", "taylor", "radau"
+]  # fmt: skip
+Engine = Literal["auto", "c", "python"]
+Metric = Literal["quotient", "relaxed", "rho", "rho-hat", "sup", "skorokhod", "tau-epsilon"]
+Format = Literal["text", "json", "sarif", "github"]
+
+Model = Annotated[Path, Argument(metavar="MODEL", help="The model file.", autocompletion=model_files)]
+Models = Annotated[list[Path], Argument(metavar="MODEL...", help="Model files.", autocompletion=model_files)]
+Formatted = Annotated[Format, Option("--format", metavar="|".join(Format.__args__), help="Form of the findings.")]
+Json = Annotated[bool, Option("--json", help="Print one JSON object on standard output.")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print no summary and no progress.")]
+FOLDER = "Let models read data files from here too. May be repeated."
+LIMIT = f"Let a model ask for more: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
+AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
+Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]
+
+
+@contextmanager
+def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None]:
+    """Report errors, and apply the limits while the command runs."""
+    with errors_reported(json), applied(limit_options(allow_path or (), limit or ())):
+        yield
+
+
+def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
+    """Read ``--allow-path`` and ``--limit``.
+
+    Raises
+    ------
+    UsageError
+        No such limit, no positive number, or no such folder.
+    """
+    numbers: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = (part.strip() for part in pair.partition("="))
+        if name not in NUMBERS:
+            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
+        try:
+            numbers[name] = type(getattr(DEFAULT, name))(float(value))
+        except (ValueError, OverflowError):
+            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-path {folder}: there is no such folder")
+    return Limits(**numbers, folders=tuple(folders))
+
+
+def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+    """Parameters, initial values and settings of ``--set``."""
+    from hsdsl.model import split_overrides
+
+    return split_overrides(overrides or ())
+
+
+def names_of(text: str | None) -> list[str]:
+    """The names in a text with commas between them."""
+    return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def check_target(path: Path | None, option: str, suffixes: Sequence[str]) -> None:
+    """Refuse a file that could not be written before a long run, not after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise UsageError(f"{option} {path}: the name must end in {known}")
+    if not path.parent.is_dir():
+        raise UsageError(f"{option} {path}: there is no folder {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        from hsdsl.execution.samples import optional
+
+        optional("pyarrow", f"{option} {path}")
