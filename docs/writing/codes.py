@@ -1,11 +1,11 @@
-"""The pages of error codes and lint rules, from their docstrings."""
+"""The pages of error codes and lint rules, from their Markdown files."""
 
 from __future__ import annotations
 
 from writing.markdown import lowered, table
 
 from hsdsl import errors
-from hsdsl.lint.pages import error_pages
+from hsdsl.lint.pages import error_pages, rule_pages, titles
 from hsdsl.lint.rules import FAMILIES, RULES, family
 
 ERROR_CODES = """# Error codes
@@ -39,8 +39,8 @@ def rule_index() -> str:
             (
                 f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})",
                 rule.name,
-                rule.title,
-                rule.severity if rule.by_default else "note, on request",
+                titles()[code],
+                rule.severity,
             )
             for code, rule in RULES.items()
             if family(code) == name
@@ -50,9 +50,9 @@ def rule_index() -> str:
 
 
 def rule_family(name: str) -> str:
-    """Document the rules of one family from their docstrings."""
+    """Document the rules of one family."""
     parts = [f"# Rules: {name}\n\n"]
     for code, rule in RULES.items():
         if family(code) == name:
-            parts.append(f"## {code} {rule.name}\n\n{lowered(rule.page)}\n\n")
+            parts.append(f"## {code} {rule.name}\n\n{lowered(rule_pages()[code])}\n\n")
     return "".join(parts)

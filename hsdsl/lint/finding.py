@@ -1,15 +1,16 @@
-"""What a rule says of a model."""
+"""Findings of rules, and the first of each kind of alike ones."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, field, replace
 
 from hsdsl.errors import Decided, Edit, Severity, Span
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a rule has found. Its code is the rule's.
+    """One finding of a rule, whose code it has.
 
     Attributes
     ----------
@@ -20,11 +21,11 @@ class Finding:
     hint : str or None
         What to write instead, when that is known.
     decided : {"symbolic", "interval", "sampled"}
-        How it is known: for all values, by bounds over boxes, or at points that were tried.
+        For all values, by bounds over boxes, or at points.
     fix : tuple of Edit
-        Changes of the text that remedy it and leave what the model means as it is; empty where there are none.
+        Changes of the text that remedy it and keep the meaning of the model.
     severity : {"warning", "note"} or None
-        How much it weighs, where that is not what the rule's findings usually weigh.
+        Another severity than that of the rule.
     """
 
     span: Span
@@ -33,3 +34,33 @@ class Finding:
     decided: Decided = "symbolic"
     fix: tuple[Edit, ...] = ()
     severity: Severity | None = None
+
+
+@dataclass
+class Alike:
+    """The first finding of each kind, with the number of others: a large model repeats itself.
+
+    ``shared`` names what the others have in common, where the whole finding is not known of them.
+    """
+
+    noun: str
+    shared: str = "like it"
+    _kinds: dict[Hashable, tuple[Finding, int]] = field(default_factory=dict[Hashable, tuple[Finding, int]])
+
+    def again(self, kind: Hashable) -> bool:
+        """Count one more of a known kind; False where the kind is new."""
+        if kind not in self._kinds:
+            return False
+        finding, count = self._kinds[kind]
+        self._kinds[kind] = finding, count + 1
+        return True
+
+    def add(self, kind: Hashable, finding: Finding) -> None:
+        """Keep a finding of a new kind, or count it."""
+        if not self.again(kind):
+            self._kinds[kind] = finding, 0
+
+    def __iter__(self) -> Iterator[Finding]:
+        for finding, count in self._kinds.values():
+            more = f"; {count:,} more {self.noun}{'s' * (count > 1)} {self.shared}" if count else ""
+            yield replace(finding, message=finding.message + more)

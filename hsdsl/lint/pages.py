@@ -1,32 +1,38 @@
-"""The page of every code, of errors and of rules: what `hsdsl explain` prints and the documentation shows."""
+"""Pages of errors and rules in Markdown: for `hsdsl explain`, SARIF and the documentation."""
 
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib import resources
 
 from hsdsl.errors import CODES
-from hsdsl.lint.rules import RULES
+from hsdsl.lint.rules import FAMILIES, RULES
 
 
 def titles() -> dict[str, str]:
     """One line about every code."""
-    return {**CODES, **{code: rule.title for code, rule in RULES.items()}}
+    return {**CODES, **{code: rule_pages()[code].partition("\n")[0].rstrip(".") for code in RULES}}
 
 
 def pages() -> dict[str, str]:
-    """The page of every code, in Markdown."""
-    return {**error_pages(), **{code: rule.page for code, rule in RULES.items()}}
+    """The page of every code."""
+    return {**error_pages(), **rule_pages()}
+
+
+@cache
+def rule_pages() -> dict[str, str]:
+    """The pages of rules, in one file a family; the first line of a page is its title."""
+    return {code: page for family in FAMILIES for code, page in _pages(f"rules/{family}.md").items()}
 
 
 def error_pages() -> dict[str, str]:
-    """The pages of errors, which stand in one file, each below its code."""
-    text = resources.files("hsdsl.lint").joinpath("errors.md").read_text(encoding="utf-8")
-    parts = re.split(r"^# (HS\d{3})\n", text, flags=re.MULTILINE)
-    return {
-        code: f"{_sentence(CODES[code])}\n\n{page.strip()}" for code, page in zip(parts[1::2], parts[2::2], strict=True)
-    }
+    """The pages of errors, with their titles."""
+    return {code: f"{CODES[code][0].upper()}{CODES[code][1:]}.\n\n{page}" for code, page in _pages("errors.md").items()}
 
 
-def _sentence(title: str) -> str:
-    return title[0].upper() + title[1:] + "."
+def _pages(file: str) -> dict[str, str]:
+    """The pages of a file, each below its code."""
+    text = resources.files("hsdsl.lint").joinpath(file).read_text(encoding="utf-8")
+    _, *parts = re.split(r"^# (HS\d{3})\n", text, flags=re.MULTILINE)
+    return {code: page.strip() for code, page in zip(parts[::2], parts[1::2], strict=True)}

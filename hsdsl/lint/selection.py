@@ -25,15 +25,14 @@ class Selection:
 
     @classmethod
     def of(cls, select: Iterable[str] | None = None, ignore: Iterable[str] | None = None) -> Selection:
-        """The rules that ``select`` names, those of every day when it is None, without those that ``ignore`` names.
+        """The rules that ``select`` names, all when it is None, without those that ``ignore`` names.
 
         Raises
         ------
         UsageError
             For a name that no rule has, and for a selection of nothing.
         """
-        usual = {code for code, rule in RULES.items() if rule.by_default}
-        chosen = usual if select is None else codes_of(select, "select")
+        chosen = set(RULES) if select is None else codes_of(select, "select")
         if not chosen:
             raise UsageError("select: no rule is named", "leave it out to use all rules")
         dropped = set[str]() if ignore is None else codes_of(ignore, "ignore")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,22 +15,22 @@ from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
 from hsdsl.lint.analysis.dynamics import Dynamics
-from hsdsl.lint.dependence import Influence, influence
+from hsdsl.lint.dependencies import Definition, Influence, closure, influence, unused
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
 from hsdsl.lint.source_expressions import SourceExpression, written
 from hsdsl.lint.units.model import Units
-from hsdsl.lint.uses import Definition, unused
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 
 @dataclass(frozen=True)
 class EdgePart:
-    """A transition as mathematics and as written; ``index`` is its position in its mode."""
+    """A transition as mathematics and as written, its position in its mode, and its path in the file."""
 
     edge: Edge
     document: schema.TransitionDocument
     index: int
+    path: tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,24 @@ class Subject:
         found: list[ModePart] = []
         for mode, (key, document) in zip(self.system.modes, self.document.modes.items(), strict=True):
             pairs = zip(mode.edges, document.transitions, strict=True)
-            edges = tuple(EdgePart(edge, transition, i) for i, (edge, transition) in enumerate(pairs))
+            path = ("modes", str(key), "transitions")
+            edges = tuple(EdgePart(edge, written, i, (*path, i)) for i, (edge, written) in enumerate(pairs))
             found.append(ModePart(mode, document, key, edges))
         return tuple(found)
+
+    @property
+    def edges(self) -> Iterator[tuple[ModePart, EdgePart]]:
+        """Every transition with its mode, in file order."""
+        return ((part, edge) for part in self.modes for edge in part.edges)
+
+    @cached_property
+    def states(self) -> dict[str, Key]:
+        """Every state with its first place in the file."""
+        found: dict[str, Key] = {}
+        for part in self.modes:
+            for key in part.document.flow or ():
+                found.setdefault(str(key), key)
+        return found
 
     @cached_property
     def expressions(self) -> tuple[SourceExpression, ...]:
@@ -108,22 +124,7 @@ class Subject:
     def reachable(self) -> frozenset[str]:
         """The modes that transitions lead to from where runs start, taking every transition to be possible."""
         targets = {m.name: {edge.target for edge in m.edges if not m.final} for m in self.system.modes}
-        found: set[str] = set()
-        waiting = list(self.starts)
-        while waiting:
-            name = waiting.pop()
-            if name not in found:
-                found.add(name)
-                waiting.extend(targets[name])
-        return frozenset(found)
-
-    @cached_property
-    def constants(self) -> dict[Any, Any]:
-        """The value of each parameter in this file, exact where it is written exactly: ``expr.subs(constants)``."""
-        found: dict[Any, Any] = {}
-        for parameter in self.system.parameters:
-            found[symbol(parameter.name)] = parameter.value.subs(found)
-        return found
+        return frozenset(closure(self.starts, targets.__getitem__))
 
     @cached_property
     def numbers(self) -> dict[Any, Number]:

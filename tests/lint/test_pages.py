@@ -6,7 +6,7 @@ from lint.fragments import blocks, completed
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import CODES, ModelError
 from hsdsl.lint import RULES
-from hsdsl.lint.pages import error_pages, pages, titles
+from hsdsl.lint.pages import error_pages, pages, rule_pages, titles
 
 # not UTF-8; large files, mappings, expressions and nests; a minute of work
 WITHOUT_EXAMPLE = {"HS001", "HS003", "HS015", "HS016", "HS110", "HS122", "HS123"}
@@ -26,6 +26,7 @@ def codes_found(page, heading, folder):
 
 def test_every_code_has_a_page_and_a_title():
     assert list(error_pages()) == list(CODES)
+    assert list(rule_pages()) == list(RULES)
     assert set(pages()) == set(titles()) == {*CODES, *RULES}
 
 

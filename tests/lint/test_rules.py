@@ -11,6 +11,7 @@ A case file `cases/RULE.yaml` has models under `good`, and under `bad` what the 
 A model may be a fragment; see `fragments.completed`.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,10 +21,10 @@ from lint.fragments import completed, examples
 from hsdsl.expression.timebox import OutOfTime
 from hsdsl.lint import RULES, Selection, lint
 from hsdsl.lint.fix import fix
+from hsdsl.lint.pages import rule_pages
 from hsdsl.lint.rules import FAMILIES, family
 
 FOLDER = Path(__file__).parent
-MODULES = FOLDER.parent.parent / "hsdsl" / "lint" / "rules"
 SECTIONS = ("What it does", "Why it is bad", "Example", "Use instead", "How it is decided", "How to fix it")
 CASES = {path.stem: yaml.load(path.read_text("utf-8"), yaml.BaseLoader) for path in FOLDER.glob("cases/*.yaml")}
 BAD = [(name, n) for name, case in CASES.items() for n in range(len(case["bad"]))]
@@ -43,10 +44,10 @@ def found(code: str, model: str):
     return [f for f in lint("model.yaml", selection, text=completed(model).encode()).findings if f.code == code]
 
 
-def test_every_file_is_registered_once():
-    files = {path.stem for path in MODULES.glob("*.py")} - {"__init__"}
-    registered = [rule.module.__name__.rpartition(".")[2] for rule in RULES.values()]
-    assert sorted(registered) == sorted(files)
+def test_names_are_those_of_checks():
+    named = {rule.name: rule.check.__name__ for rule in RULES.values() if rule.check and rule.check.__name__ != "check"}
+    assert all(name.replace("-", "_") == check for name, check in named.items())
+    assert len({rule.name for rule in RULES.values()}) == len(RULES)
 
 
 def test_every_rule_has_cases():
@@ -60,7 +61,7 @@ def test_codes_are_in_families_and_in_order():
 
 @pytest.mark.parametrize("code", RULES)
 def test_page_is_whole(code):
-    page = RULES[code].page
+    page = rule_pages()[code]
     headings = [line.removeprefix("## ") for line in page.splitlines() if line.startswith("## ")]
     assert tuple(headings) == SECTIONS
     assert page.splitlines()[0].endswith(".") and not page.splitlines()[1]
@@ -69,7 +70,7 @@ def test_page_is_whole(code):
 
 @pytest.mark.parametrize("code", TOLD)
 def test_examples_of_the_page(code):
-    bad, good = (examples(RULES[code].page, heading) for heading in ("Example", "Use instead"))
+    bad, good = (examples(rule_pages()[code], heading) for heading in ("Example", "Use instead"))
     assert bad and good
     assert all(found(code, model) for model in bad)
     assert not any(found(code, model) for model in good)
@@ -118,7 +119,7 @@ def test_a_rule_that_gives_up_says_so_and_the_others_go_on(monkeypatch, raised, 
     def fails(subject):
         raise raised
 
-    monkeypatch.setattr(RULES["HS421"].module, "check", fails)
+    monkeypatch.setitem(RULES, "HS421", replace(RULES["HS421"], check=fails))
     model = "parameters: {p: 1}\nmodes: {m: {flow: {x: 1}}}\n"
     found = lint("model.yaml", Selection.of(["HS401", "HS421"]), text=completed(model).encode()).findings
     assert [f.code for f in found] == ["HS492", "HS401"] and says in found[0].message

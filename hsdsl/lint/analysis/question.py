@@ -62,8 +62,8 @@ class Answer:
     ----------
     verdict : {"never", "somewhere", "unknown"}
         Whether there is such a point.
-    decided : {"symbolic", "interval", "sampled"} or None
-        How it is known; None where it is not.
+    decided : {"symbolic", "interval", "sampled"}
+        How it is known, where it is.
     point : mapping of symbols to numbers
         Such a point.
     searched : tuple of (symbol, low, high)
@@ -71,7 +71,7 @@ class Answer:
     """
 
     verdict: Literal["never", "somewhere", "unknown"]
-    decided: Decided | None = None
+    decided: Decided = "sampled"
     point: Mapping[Any, float] = field(default_factory=dict)
     searched: tuple[tuple[Any, float, float], ...] = ()
 

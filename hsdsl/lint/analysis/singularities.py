@@ -1,6 +1,6 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""Where expressions are not smooth or have no value: the parts of them that decide it, and the questions to ask."""
+"""Singular parts of expressions: jumps, kinks, poles, infinite slopes, and arguments without a real value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, positive, zero
 from hsdsl.lint.analysis.tape import too_large
-from hsdsl.lint.source_expressions import SourceExpression
 
 _SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
 _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
@@ -28,20 +27,11 @@ _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of an expression, what it is called, and the alternatives in which it is singular."""
+    """A part of an expression, its name in messages, and the alternatives in which it is singular."""
 
     expr: Any
-    said: str
+    name: str
     alternatives: tuple[Clause, ...]
-
-
-@dataclass(frozen=True)
-class Expression:
-    """An expression of a mode as written, its mathematics, and where it is evaluated."""
-
-    written: SourceExpression
-    expr: Any
-    where: tuple[Clause, ...]
 
 
 def parts(expr: Any) -> list[Any]:
@@ -139,8 +129,8 @@ def without_value(expr: Any) -> Iterator[Part]:
     """Where square roots, logarithms and inverse functions have no real value."""
     for part in parts(expr):
         if part.is_Pow and not part.exp.is_Integer and not part.base.is_number:
-            said = "a square root" if abs(part.exp) == sp.Rational(1, 2) else "a power that is no whole number"
-            yield Part(part.base, said, ((negative(part.base),),))
+            name = "a square root" if abs(part.exp) == sp.Rational(1, 2) else "a power that is no whole number"
+            yield Part(part.base, name, ((negative(part.base),),))
         elif isinstance(part, sp.log):
             yield Part(part.args[0], "a logarithm", ((at_most_zero(part.args[0]),),))
         elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
@@ -151,12 +141,12 @@ def without_value(expr: Any) -> Iterator[Part]:
             yield Part(part.args[0], "`acosh`", ((negative(part.args[0] - 1),),))
 
 
-def steep(expr: Any) -> Iterator[Part]:
+def infinite_slopes(expr: Any) -> Iterator[Part]:
     """Where roots and inverse functions have an infinite slope."""
     for part in parts(expr):
         if part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1 and not part.base.is_number:
-            said = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
-            yield _steep(expr, part, part.base, said, (part.base,))
+            name = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
+            yield _steep(expr, part, part.base, name, (part.base,))
         elif isinstance(part, (sp.asin, sp.acos)):
             inside = part.args[0]
             yield _steep(expr, part, inside, f"`{_name(part)}`", (1 - inside, 1 + inside))
@@ -164,6 +154,6 @@ def steep(expr: Any) -> Iterator[Part]:
             yield _steep(expr, part, part.args[0], "`acosh`", (part.args[0] - 1,))
 
 
-def _steep(expr: Any, part: Any, inside: Any, said: str, ends: tuple[Any, ...]) -> Part:
+def _steep(expr: Any, part: Any, inside: Any, name: str, ends: tuple[Any, ...]) -> Part:
     """Where an argument is at an end, unless what the function is multiplied with vanishes there."""
-    return Part(inside, said, tuple((zero(end), w) for end in ends for w in _weights(expr, part)))
+    return Part(inside, name, tuple((zero(end), w) for end in ends for w in _weights(expr, part)))

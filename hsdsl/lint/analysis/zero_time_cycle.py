@@ -1,22 +1,14 @@
-"""Transitions followed with numbers, as long as they fire at one instant."""
+"""Chains and cycles of transitions at one instant, followed with numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.mode_point import NEAR, ModePoint, Unsure
 from hsdsl.system import Edge
 
 MOST = 40
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """The edges that follow each other without end."""
-
-    edges: tuple[str, ...]
 
 
 def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
@@ -37,8 +29,8 @@ def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
     raise Unsure
 
 
-def cycle(here: ModePoint, edge: Edge) -> Cycle | None:
-    """The cycle that transitions run into which follow an edge at one instant; None where none is known."""
+def cycle(here: ModePoint, edge: Edge) -> tuple[str, ...] | None:
+    """The names of the transitions that follow an edge at one instant without end; None without a known cycle."""
     visited: list[ModePoint] = []
     names: list[str] = []
     try:
@@ -46,7 +38,7 @@ def cycle(here: ModePoint, edge: Edge) -> Cycle | None:
             names.append(following.name)
             for k, before in enumerate(visited):
                 if same(before, reached):
-                    return Cycle(tuple(names[k + 1 :]))
+                    return tuple(names[k + 1 :])
             visited.append(reached)
     except Unsure:
         return None

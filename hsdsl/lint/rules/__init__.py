@@ -1,75 +1,13 @@
-"""The lint rules: one file each, whose docstring is the rule's page, in one dictionary."""
+"""The lint rules by code: name, check and severity of each; their pages are the Markdown files here, one a family."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Literal
 
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.rules import (
-    adding_delays,
-    after_the_end,
-    argument_units,
-    condition_beyond_surface,
-    confusable_names,
-    constant_condition,
-    constant_state,
-    dead_end,
-    degenerate_surface,
-    duplicate_transition,
-    empty_section,
-    ends_on_event,
-    flow_units,
-    guard_inside_domain,
-    guard_never_crossed,
-    guard_turns_inward,
-    identity_reset,
-    idle_parameter,
-    idle_priority,
-    idle_state,
-    inconsistent_units,
-    invented_state,
-    jump_inside_mode,
-    kink_inside_mode,
-    large_relaxation,
-    late_reference,
-    lost_state,
-    misleading_name,
-    misnamed_output,
-    missing_reset,
-    not_lipschitz,
-    odd_samples,
-    odd_step,
-    outside_real_domain,
-    overlapping_guards,
-    repeated_default,
-    repeated_wall,
-    reset_lands_beyond,
-    reset_lands_on_guard,
-    shadowed_name,
-    shadowed_transition,
-    sliding,
-    starts_on_guard,
-    starts_outside,
-    tangency,
-    twin_modes,
-    unbounded_domain,
-    undecided,
-    uneven_relaxation,
-    unknown_ignore,
-    unknown_unit,
-    unreachable_mode,
-    unused_ignore,
-    unused_input,
-    unused_let,
-    unused_parameter,
-    unused_state,
-    value_units,
-    vanishing_divisor,
-    zero_time_cycle,
-)
+from hsdsl.lint.rules import experiment, guards, names, regularity, scene, shape, tangency, transitions, units
 from hsdsl.lint.subject import Subject
 
 FAMILIES = {
@@ -81,39 +19,20 @@ FAMILIES = {
     "mathematics": ("HS500", "HS599"),
     "units": ("HS600", "HS699"),
 }
+Check = Callable[[Subject], Iterable[Finding]]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule: its module, and how much its findings weigh.
+    """A rule: its name, its check, and the severity of its findings.
 
-    A warning says that something is probably not what was meant; a note, that something is worth knowing:
-    notes alone leave the exit code at 0.
+    A warning is a probable mistake. A note is a remark: notes alone leave the exit code at 0. Rules about comments
+    have no check, because they see what the others find.
     """
 
-    module: ModuleType
+    name: str
+    check: Check | None = None
     severity: Literal["warning", "note"] = "warning"
-    by_default: bool = True  # False: only where it is selected, by its code, its name or its family
-
-    @property
-    def name(self) -> str:
-        """What people call it."""
-        return self.module.__name__.rpartition(".")[2].replace("_", "-")
-
-    @property
-    def page(self) -> str:
-        """The rule's page, in Markdown; its first line is the title."""
-        return (self.module.__doc__ or "").strip()
-
-    @property
-    def title(self) -> str:
-        """What the rule finds, in one line."""
-        return self.page.partition("\n")[0].rstrip(".")
-
-    @property
-    def check(self) -> Callable[[Subject], Iterable[Finding]] | None:
-        """The rule itself; None for the rules about comments, which see what the others have found."""
-        return getattr(self.module, "check", None)
 
 
 def family(code: str) -> str:
@@ -122,71 +41,59 @@ def family(code: str) -> str:
 
 
 RULES: dict[str, Rule] = {
-    # names
-    "HS401": Rule(unused_parameter),
-    "HS402": Rule(unused_input),
-    "HS403": Rule(unused_let),
-    "HS404": Rule(unused_state),
-    "HS405": Rule(shadowed_name, severity="note"),
-    "HS406": Rule(unreachable_mode),
-    "HS407": Rule(confusable_names),
-    "HS408": Rule(misleading_name),
-    "HS409": Rule(misnamed_output),
-    # shape
-    "HS421": Rule(identity_reset),
-    "HS422": Rule(missing_reset),
-    "HS423": Rule(lost_state),
-    "HS424": Rule(invented_state),
-    "HS425": Rule(dead_end),
-    "HS426": Rule(duplicate_transition),
-    "HS427": Rule(shadowed_transition),
-    "HS428": Rule(constant_condition),
-    "HS429": Rule(empty_section, severity="note"),
-    "HS430": Rule(idle_priority),
-    # scene
-    "HS441": Rule(idle_state, severity="note"),
-    "HS442": Rule(idle_parameter, severity="note"),
-    "HS443": Rule(twin_modes),
-    "HS444": Rule(constant_state, severity="note"),
-    "HS445": Rule(repeated_default, severity="note"),
-    "HS446": Rule(repeated_wall),
-    "HS447": Rule(after_the_end),
-    # experiment
-    "HS461": Rule(starts_outside),
-    "HS462": Rule(starts_on_guard, severity="note"),
-    "HS463": Rule(ends_on_event, severity="note"),
-    "HS464": Rule(large_relaxation),
-    "HS465": Rule(uneven_relaxation),
-    "HS466": Rule(odd_samples),
-    "HS467": Rule(odd_step),
-    "HS468": Rule(late_reference),
-    "HS469": Rule(adding_delays, severity="note"),
-    # comments
-    "HS490": Rule(unused_ignore),
-    "HS491": Rule(unknown_ignore),
-    "HS492": Rule(undecided, severity="note"),
-    # mathematics
-    "HS501": Rule(guard_never_crossed),
-    "HS502": Rule(condition_beyond_surface),
-    "HS503": Rule(guard_inside_domain, severity="note"),
-    "HS504": Rule(guard_turns_inward, severity="note"),
-    "HS505": Rule(tangency, severity="note"),
-    "HS506": Rule(reset_lands_beyond),
-    "HS507": Rule(reset_lands_on_guard, severity="note"),
-    "HS508": Rule(overlapping_guards),
-    "HS509": Rule(sliding),
-    "HS510": Rule(zero_time_cycle),
-    "HS511": Rule(jump_inside_mode),
-    "HS512": Rule(kink_inside_mode, severity="note"),
-    "HS513": Rule(vanishing_divisor),
-    "HS514": Rule(outside_real_domain),
-    "HS515": Rule(not_lipschitz),
-    "HS516": Rule(unbounded_domain, severity="note", by_default=False),
-    "HS517": Rule(degenerate_surface),
-    # units
-    "HS601": Rule(unknown_unit),
-    "HS602": Rule(inconsistent_units),
-    "HS603": Rule(argument_units),
-    "HS604": Rule(flow_units),
-    "HS605": Rule(value_units),
+    "HS401": Rule("unused-parameter", names.unused_name("parameter")),
+    "HS402": Rule("unused-input", names.unused_name("input")),
+    "HS403": Rule("unused-let", names.unused_let),
+    "HS404": Rule("unused-state", names.unused_state),
+    "HS405": Rule("shadowed-name", names.shadowed_name, "note"),
+    "HS406": Rule("unreachable-mode", names.unreachable_mode),
+    "HS407": Rule("confusable-names", names.confusable_names),
+    "HS408": Rule("misleading-name", names.misleading_name),
+    "HS409": Rule("misnamed-output", names.misnamed_output),
+    "HS421": Rule("identity-reset", shape.identity_reset),
+    "HS422": Rule("missing-reset", shape.missing_reset),
+    "HS425": Rule("dead-end", shape.dead_end),
+    "HS426": Rule("duplicate-transition", shape.duplicate_transition),
+    "HS427": Rule("shadowed-transition", shape.shadowed_transition),
+    "HS428": Rule("constant-condition", shape.constant_condition),
+    "HS429": Rule("empty-section", shape.empty_section, "note"),
+    "HS430": Rule("idle-priority", shape.idle_priority),
+    "HS441": Rule("idle-state", scene.idle_state, "note"),
+    "HS442": Rule("idle-parameter", scene.idle_parameter, "note"),
+    "HS443": Rule("twin-modes", scene.twin_modes),
+    "HS444": Rule("constant-state", scene.constant_state, "note"),
+    "HS445": Rule("repeated-default", scene.repeated_default, "note"),
+    "HS446": Rule("repeated-wall", scene.repeated_wall),
+    "HS447": Rule("after-the-end", scene.after_the_end),
+    "HS461": Rule("starts-outside", experiment.starts_outside),
+    "HS462": Rule("starts-on-guard", experiment.starts_on_guard, "note"),
+    "HS463": Rule("ends-on-event", experiment.ends_on_event, "note"),
+    "HS464": Rule("large-relaxation", experiment.large_relaxation),
+    "HS466": Rule("odd-samples", experiment.odd_samples),
+    "HS467": Rule("odd-step", experiment.odd_step),
+    "HS468": Rule("late-reference", experiment.late_reference),
+    "HS490": Rule("unused-ignore"),
+    "HS491": Rule("unknown-ignore"),
+    "HS492": Rule("undecided", severity="note"),
+    "HS501": Rule("guard-never-crossed", guards.guard_never_crossed),
+    "HS502": Rule("condition-beyond-surface", guards.condition_beyond_surface),
+    "HS503": Rule("guard-inside-domain", guards.guard_inside_domain, "note"),
+    "HS504": Rule("guard-turns-inward", guards.guard_turns_inward, "note"),
+    "HS505": Rule("tangency", tangency.tangency, "note"),
+    "HS506": Rule("reset-lands-beyond", transitions.reset_lands_beyond),
+    "HS507": Rule("reset-lands-on-guard", transitions.reset_lands_on_guard, "note"),
+    "HS508": Rule("overlapping-guards", guards.overlapping_guards),
+    "HS509": Rule("sliding", transitions.sliding),
+    "HS510": Rule("zero-time-cycle", transitions.zero_time_cycle),
+    "HS511": Rule("jump-inside-mode", regularity.jump_inside_mode),
+    "HS512": Rule("kink-inside-mode", regularity.kink_inside_mode, "note"),
+    "HS513": Rule("vanishing-divisor", regularity.vanishing_divisor),
+    "HS514": Rule("outside-real-domain", regularity.outside_real_domain),
+    "HS515": Rule("not-lipschitz", regularity.not_lipschitz),
+    "HS517": Rule("degenerate-surface", tangency.degenerate_surface),
+    "HS601": Rule("unknown-unit", units.unknown_unit),
+    "HS602": Rule("inconsistent-units", units.misfits("sum")),
+    "HS603": Rule("argument-units", units.misfits("argument", units.PLAIN)),
+    "HS604": Rule("flow-units", units.flow_units),
+    "HS605": Rule("value-units", units.value_units),
 }

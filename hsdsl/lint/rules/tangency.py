@@ -1,95 +1,44 @@
-"""A flow that can touch a guard without crossing it.
-
-## What it does
-
-Finds guards on which L_f r, the rate of the surface function along the flow, can vanish.
-
-## Why it is bad
-
-Where a run touches a guard, a run beside it misses it, and the two go different ways: what comes after depends on how
-accurate the simulation is, and the error bounds hold only for runs that keep away from such points. For a stop or a
-floor such points (v = 0) cannot be avoided; it is the runs near them that are to be watched.
-
-## Example
-
-```yaml
-parameters: {x_max: 14}
-modes:
-  free:
-    flow: {x: v, v: -x}
-    transitions:
-      - {when: x >= x_max, to: free, reset: {v: -v}}
-initial: {mode: free, x: 0, v: 20}
-```
-
-## Use instead
-
-A guard that the flow crosses at a speed.
-
-```yaml
-parameters: {T_max: 22}
-modes:
-  heating:
-    flow: {T: 30 - T}
-    transitions:
-      - {when: T >= T_max, to: heating, reset: {T: 18}}
-initial: {mode: heating, T: 20}
-```
-
-## How it is decided
-
-A point of the guard with L_f r = 0 is looked for, symbolically or by search. The first derivative of r along the flow
-that is not 0 there, up to order 6, says what the flow does: of even order and negative, runs from inside the domain
-touch the surface and go back (they graze); of even order and positive, only a run that rests on the surface or starts
-there comes to it, and goes out; of odd order, the flow passes without speed. At a kink or a jump nothing of that is
-known. Whether a run of the model comes to the point is not looked at.
-
-## How to fix it
-
-Nothing has to be done where runs keep away from the point. Where they do not, look at them with a smaller tolerance,
-or change the surface.
-"""
+"""Rules about tangency: flows that touch a guard, and surfaces whose gradient vanishes on them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
-from hsdsl.lint.analysis.proof import strict
-from hsdsl.lint.analysis.question import Answer, negative, zero
-from hsdsl.lint.analysis.repeats import Repeats
+from hsdsl.lint.analysis.proof import Proof, strict
+from hsdsl.lint.analysis.question import Answer, negative, positive, zero
 from hsdsl.lint.analysis.smooth_pieces import pieces
-from hsdsl.lint.analysis.wording import at
-from hsdsl.lint.finding import Finding
+from hsdsl.lint.analysis.wording import at, within
+from hsdsl.lint.finding import Alike, Finding
 from hsdsl.lint.subject import EdgePart, ModePart, Subject
+from hsdsl.source import Scalar
+from hsdsl.system import Mode, Surface
 
 _GRAZES = "runs can graze it"
 
 
-def check(subject: Subject) -> Iterator[Finding]:
-    """Find guards that can be touched."""
+def tangency(subject: Subject) -> Iterator[Finding]:
+    """Find guards that the flow can touch without crossing at speed."""
     dynamics = subject.dynamics
-    found = Repeats("guard", "with this L_f r")
-    for part in subject.modes:
-        for edge in part.edges:
-            residual = dynamics.residual(edge.edge.surface)
-            rate = dynamics.rate(part.mode, residual)
-            if rate is None or rate.is_number or found.again(rate):
-                continue
-            answer, how = _touched(subject, part, edge)
-            if answer.somewhere:
-                bend = dynamics.rate(part.mode, rate) if how == _GRAZES else None
-                where = at(dynamics, part.mode, answer, [residual, rate, bend])
-                message = f"the flow meets the guard of '{edge.edge.name}' {where}, where L_f r = 0: {how}"
-                span = edge.document.when.place.span
-                found.add(rate, Finding(span, message, None, answer.decided or "sampled"))
-    yield from found
+    alike = Alike("guard", "with this L_f r")
+    for part, edge in subject.edges:
+        residual = dynamics.residual(edge.edge.surface)
+        rate = dynamics.rate(part.mode, residual)
+        if rate is None or rate.is_number or alike.again(rate):
+            continue
+        answer, how = _touches(dynamics, part.mode, edge)
+        if answer.somewhere:
+            bend = dynamics.rate(part.mode, rate) if how == _GRAZES else None
+            where = at(dynamics, part.mode, answer, [residual, rate, bend])
+            message = f"the flow meets the guard of '{edge.edge.name}' {where}, where L_f r = 0: {how}"
+            alike.add(rate, Finding(edge.document.when.place.span, message, None, answer.decided))
+    yield from alike
 
 
-def _touched(subject: Subject, part: ModePart, edge: EdgePart) -> tuple[Answer, str]:
+def _touches(dynamics: Dynamics, mode: Mode, edge: EdgePart) -> tuple[Answer, str]:
     """A point of the guard where the rate vanishes, and what the flow does there."""
-    dynamics, mode = subject.dynamics, part.mode
     residual = dynamics.residual(edge.edge.surface)
     domain, conditions = dynamics.domain(mode, without=edge.edge), dynamics.condition(edge.edge) or []
     for piece in pieces(residual, dynamics.flow(mode)) or ():
@@ -100,14 +49,13 @@ def _touched(subject: Subject, part: ModePart, edge: EdgePart) -> tuple[Answer, 
         surface = (zero(piece.residual), zero(rate), *piece.inside)
         inside = [(*surface, *strict(domain), *clause) for clause in conditions]
         answer = dynamics.ask_any(mode, inside, negative(bend))
-        if answer.somewhere and _what(ModePoint(dynamics, mode, answer.point), residual) == _GRAZES:
+        if answer.somewhere and _contact(ModePoint(dynamics, mode, answer.point), residual) == _GRAZES:
             return answer, _GRAZES
-    guard = dynamics.guard(edge.edge)
-    answer = dynamics.ask_any(mode, guard, zero(dynamics.rate(mode, residual)))
-    return answer, _what(ModePoint(dynamics, mode, answer.point), residual) if answer.somewhere else ""
+    answer = dynamics.ask_any(mode, dynamics.guard(edge.edge), zero(dynamics.rate(mode, residual)))
+    return answer, _contact(ModePoint(dynamics, mode, answer.point), residual) if answer.somewhere else ""
 
 
-def _what(here: ModePoint, residual: Any) -> str:
+def _contact(here: ModePoint, residual: Any) -> str:
     """Say what the flow does at a point of a surface where the first derivative vanishes."""
     try:
         order, sign = here.first(residual)
@@ -118,3 +66,49 @@ def _what(here: ModePoint, residual: Any) -> str:
     if order % 2:
         return f"it {'goes out' if sign > 0 else 'comes in'} there, with the derivative of order {order} alone"
     return _GRAZES if sign < 0 else "runs come there only by resting on it, or by starting there"
+
+
+def degenerate_surface(subject: Subject) -> Iterator[Finding]:
+    """Find surfaces whose function has one sign, or a gradient that vanishes on them."""
+    for part in subject.modes:
+        surfaces = [(edge.edge.surface, edge.document.when) for edge in part.edges]
+        surfaces += zip(part.mode.walls, part.document.domain, strict=True)
+        for surface, scalar in surfaces:
+            yield from _degenerate(subject.dynamics, part, surface, scalar)
+
+
+def _degenerate(dynamics: Dynamics, part: ModePart, surface: Surface, scalar: Scalar) -> Iterator[Finding]:
+    mode, residual = part.mode, dynamics.residual(surface)
+    slopes = dynamics.gradient(mode, residual)
+    if slopes is None or any(slope.is_number and slope != 0 for slope in slopes):
+        return
+    answer = dynamics.ask(mode, (zero(residual), *(zero(slope) for slope in slopes if slope != 0)))
+    if not answer.somewhere:
+        return
+    where = at(dynamics, mode, answer, [residual])
+    for side, say in ((positive, _nowhere_positive), (negative, _nowhere_negative)):
+        proof = Proof(dynamics, mode)
+        if not dynamics.ask(mode, (side(residual),)).somewhere and proof.never([(side(residual),)]):
+            message = f"{say(surface.text, within(proof.searched))}, and 0 {where}"
+            hint = "compare what passes through zero, not its square"
+            yield Finding(scalar.place.span, message, hint, proof.decided, severity="warning")
+            return
+    if _has_gradient(ModePoint(dynamics, mode, answer.point), residual):
+        message = f"the gradient of the surface '{surface.text}' vanishes on it {where}"
+        yield Finding(scalar.place.span, message, None, answer.decided, severity="note")
+
+
+def _nowhere_positive(text: str, limits: str) -> str:
+    return f"the surface '{text}' is {'not' if limits else 'never'} crossed{limits}: r is nowhere positive there"
+
+
+def _nowhere_negative(text: str, limits: str) -> str:
+    return f"every state{limits} is on or beyond the surface '{text}': r is nowhere negative there"
+
+
+def _has_gradient(here: ModePoint, residual: object) -> bool:
+    try:
+        here.piece(residual, {})
+    except Unsure:
+        return False
+    return True

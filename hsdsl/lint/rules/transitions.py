@@ -1,0 +1,171 @@
+"""Rules about what transitions lead to: landings on and beyond surfaces, sliding, and cycles at one instant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from hsdsl.expression.scope import symbol
+from hsdsl.lint.analysis.crossing import fires
+from hsdsl.lint.analysis.dynamics import Dynamics
+from hsdsl.lint.analysis.landing import Landing, landings, surfaces_of
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
+from hsdsl.lint.analysis.proof import Proof
+from hsdsl.lint.analysis.question import Answer, at_most_zero, positive, zero
+from hsdsl.lint.analysis.wording import at, within
+from hsdsl.lint.analysis.zero_time_cycle import cycle, same
+from hsdsl.lint.finding import Alike, Finding
+from hsdsl.lint.subject import EdgePart, ModePart, Subject
+from hsdsl.system import Edge, Mode
+
+
+def reset_lands_beyond(subject: Subject) -> Iterator[Finding]:
+    """Find resets that land outside the next domain: a warning where they always do, else a note."""
+    alike = Alike("reset")
+    for part, edge in subject.edges:
+        _find_beyond(subject.dynamics, part.mode, edge, alike)
+    yield from alike
+
+
+def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -> None:
+    target = dynamics.modes[edge.edge.target]
+    for surface, after in surfaces_of(target):
+        carried = dynamics.carried(dynamics.residual(surface), edge.edge)
+        answer = fires(dynamics, edge.edge, positive(carried))
+        if not answer.somewhere:
+            continue
+        proof, guard = Proof(dynamics, mode), dynamics.guard(edge.edge)
+        always = guard is not None and proof.never(guard, at_most_zero(carried))
+        residual = dynamics.residual(edge.edge.surface)
+        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in surfaces_of(target))
+        about = [residual, carried, *([] if always else [dynamics.rate(mode, residual), *others])]
+        where = at(dynamics, mode, answer, about)
+        beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
+        lands = f"lands{within(proof.searched)}" if always else "can land"
+        then = _next(ModePoint(dynamics, mode, answer.point), edge)
+        message = f"the reset of '{edge.edge.name}' {lands} beyond {beyond}: {where}{then}"
+        decided, severity = (proof.decided, "warning") if always else (answer.decided, "note")
+        finding = Finding(edge.document.to.place.span, message, None, decided, severity=severity)
+        alike.add((carried, edge.edge.surface.residual), finding)
+
+
+def _next(here: ModePoint, edge: EdgePart) -> str:
+    """Say what a run does after a transition that lands beyond a surface."""
+    try:
+        following = here.after(edge.edge).next()
+    except Unsure:
+        return ""
+    return f", where '{following.name}' fires at once" if following else ", where the run stops"
+
+
+def reset_lands_on_guard(subject: Subject) -> Iterator[Finding]:
+    """Find resets that land on surfaces and do not lead away from them."""
+    alike = Alike("reset", "with these rates")
+    for part, edge in subject.edges:
+        for landing in landings(subject.dynamics, edge.edge):
+            if landing.rate is not None and not landing.returns:
+                _find_on_guard(subject.dynamics, part.mode, edge, landing, alike)
+    yield from alike
+
+
+def _find_on_guard(dynamics: Dynamics, mode: Mode, edge: EdgePart, landing: Landing, alike: Alike) -> None:
+    name, residual = edge.edge.name, dynamics.residual(edge.edge.surface)
+    kind = (landing.rate, landing.edge is None, dynamics.rate(mode, residual))
+    if alike.again(kind):
+        return
+    own = landing.edge is not None and landing.edge.name == name and landing.edge.source == edge.edge.source
+    answer, order = dynamics.ask_any(mode, landing.guard, positive(landing.rate)), 1
+    then = "the flow can cross it at once" if landing.edge else "the flow can leave the domain there"
+    if not answer.somewhere and own and landing.bend is not None:
+        answer = dynamics.ask_any(mode, landing.guard, zero(landing.rate), at_most_zero(-landing.bend))
+        then, order = "the flow does not lead away from it (Zeno is possible)", 2
+    if not answer.somewhere or not _stays(ModePoint(dynamics, mode, answer.point), edge, landing, order):
+        return
+    on = f"the guard of '{landing.edge.name}'" if landing.edge else f"the wall '{landing.surface.text}'"
+    on = "its own guard" if own else on
+    on = on if landing.decided == "symbolic" else f"{on} at every point that was tried"
+    about = [residual, landing.rate, landing.bend if own else None]
+    message = f"the reset of '{name}' lands on {on}, and {at(dynamics, mode, answer, about)} {then}"
+    decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
+    alike.add(kind, Finding(edge.document.to.place.span, message, None, decided))
+
+
+def _stays(here: ModePoint, edge: EdgePart, landing: Landing, order: int) -> bool:
+    """Whether the flow goes out of the surface after landing, or from the second order on does not go in."""
+    try:
+        reached = here.after(edge.edge)
+        residual = reached.dynamics.residual(landing.surface)
+        first, sign = reached.first(residual)
+        return reached.sign(residual) == 0 and (sign > 0 if first < order or order == 1 else sign >= 0)
+    except Unsure:
+        return False
+
+
+def sliding(subject: Subject) -> Iterator[Finding]:
+    """Find pairs of transitions that push against one surface from both sides."""
+    dynamics = subject.dynamics
+    alike = Alike("pair", "with these rates")
+    reported: set[tuple[str, str, str, str]] = set()
+    for part, edge in subject.edges:
+        residual = dynamics.residual(edge.edge.surface)
+        rate = dynamics.rate(part.mode, residual)
+        for landing in landings(dynamics, edge.edge):
+            back = landing.edge
+            if rate is None or landing.rate is None or back is None or not landing.returns:
+                continue
+            pair = (edge.edge.source, edge.edge.name, back.source, back.name)
+            if pair[2:] + pair[:2] in reported or alike.again((rate, landing.rate)):
+                continue
+            answer = dynamics.ask_any(part.mode, landing.guard, positive(rate), positive(landing.rate))
+            if not answer.somewhere or not _returns(ModePoint(dynamics, part.mode, answer.point), edge.edge, back):
+                continue
+            reported.add(pair)
+            where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
+            names = f"'{edge.edge.name}' and '{back.name}'"
+            message = f"{names} push against one surface from both sides (sliding): {where}"
+            hint = "give the two surfaces a distance, or add a mode that moves along the surface"
+            decided = "sampled" if answer.decided == "sampled" else "symbolic"
+            alike.add((rate, landing.rate), Finding(edge.document.when.place.span, message, hint, decided))
+    yield from alike
+
+
+def _returns(here: ModePoint, edge: Edge, back: Edge) -> bool:
+    """Whether the second transition follows the first, and leads back to the state before it."""
+    try:
+        reached = here.after(edge)
+        return reached.next() is back and same(reached.after(back), here)
+    except Unsure:
+        return False
+
+
+def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
+    """Find cycles of transitions that take no time."""
+    reported: set[frozenset[str]] = set()
+    for part, edge in subject.edges:
+        for answer in _followed_at_once(subject.dynamics, part.mode, edge.edge):
+            here = ModePoint(subject.dynamics, part.mode, answer.point)
+            names = cycle(here, edge.edge) if answer.somewhere else None
+            if names and frozenset(names) not in reported:
+                reported.add(frozenset(names))
+                yield _cycle_finding(subject, part, edge, answer, names)
+
+
+def _cycle_finding(subject: Subject, part: ModePart, edge: EdgePart, answer: Answer, names: tuple[str, ...]) -> Finding:
+    about: list[Any] = [*map(symbol, part.mode.states), subject.dynamics.residual(edge.edge.surface)]
+    where = at(subject.dynamics, part.mode, answer, about)
+    cycle = ", ".join(f"'{name}'" for name in names)
+    follow = "follow each other" if len(names) > 1 else "follows itself"
+    message = f"once '{edge.edge.name}' has fired {where}, {cycle} {follow} at one instant without end"
+    hint = "give them different levels" if len(names) > 1 else "let its reset lead inside the domain"
+    return Finding(edge.document.to.place.span, message, hint, "sampled")
+
+
+def _followed_at_once(dynamics: Dynamics, mode: Mode, edge: Edge) -> Iterator[Answer]:
+    """Points of a guard from which another transition fires at once."""
+    for surface, after in surfaces_of(dynamics.modes[edge.target]):
+        if after is not None:
+            carried = dynamics.carried(dynamics.residual(surface), edge)
+            yield fires(dynamics, edge, positive(carried))
+    for landing in landings(dynamics, edge):
+        if landing.rate is not None and landing.edge is not None and not landing.returns:
+            yield dynamics.ask_any(mode, landing.guard, positive(landing.rate))
