@@ -16,7 +16,7 @@ import numpy as np
 import hsdsl
 from hsdsl.metrics.points import distances
 from hsdsl.metrics.space import make_space
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 
 MODELS = Path(__file__).parents[1] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"

@@ -215,3 +215,9 @@ class Program:
     switches: tuple[Switch, ...] = ()
     switching: Routines = NOTHING
     scaled_states: tuple[str, ...] = ()
+
+    @property
+    def all_states(self) -> tuple[str, ...]:
+        """The states of all modes and of the start, each once."""
+        names = (name for mode in self.modes for name in mode.states)
+        return tuple(dict.fromkeys((*names, *self.initial_states)))

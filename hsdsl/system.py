@@ -10,11 +10,14 @@ Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with its p
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
 import sympy as sp
+
+from hsdsl.expression.scope import symbol
 
 TIME = sp.Symbol("t", real=True)
 
@@ -158,3 +161,20 @@ class HybridSystem:
             for edge in mode.edges:
                 if edge.target not in names:
                     raise ValueError(f"edge {edge.name} leads to unknown mode {edge.target}")
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states of all modes, each once."""
+        return tuple(dict.fromkeys(name for mode in self.modes for name in mode.states))
+
+    @property
+    def parameter_symbols(self) -> tuple[sp.Symbol, ...]:
+        """The symbol of each parameter, in file order."""
+        return tuple(symbol(parameter.name) for parameter in self.parameters)
+
+    def parameter_values(self, evaluate: Callable[[sp.Expr, dict[Any, Any]], Any]) -> dict[Any, Any]:
+        """The value of each parameter by its symbol: ``evaluate`` of its expression and of the values before it."""
+        values: dict[Any, Any] = {}
+        for parameter in self.parameters:
+            values[symbol(parameter.name)] = evaluate(parameter.value, values)
+        return values

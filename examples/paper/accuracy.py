@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.execution import Execution
 from hsdsl.model import Model
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 from paper.results import Desk, Finding, say
 
 RATIOS = (2e-2, 2e-3, 2e-4, 2e-5)  # relaxation over step

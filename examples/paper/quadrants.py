@@ -15,7 +15,7 @@ from hsdsl.metrics.points import Place
 from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.space import make_space
 from hsdsl.model import Model
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 from paper.results import Desk, Finding, say
 
 DELTAS = tuple(Fraction(1, 10**k) for k in range(1, 7))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -23,35 +23,21 @@ from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
-from hsdsl.files import digest_of, read_bytes
+from hsdsl.files import ModelFiles
 from hsdsl.schema import ModelDocument, read
 from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem
 
-__all__ = ["Reading", "elaborate", "elaborate_with_places", "parameter_expression"]
+__all__ = ["Elaboration", "elaborate", "elaborate_files", "parameter_expression"]
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A hybrid system beside what it was made from, where every part of it has its place.
+class Elaboration:
+    """A hybrid system and the document it was made from, where every part of it has its place.
 
     The parts correspond by their order: ``system.modes[i].edges[k]`` is the k-th of the transitions of the i-th of
-    ``document.modes``, and likewise for walls, flows and outputs.
-
-    Attributes
-    ----------
-    system : HybridSystem
-        The mathematics.
-    document : ModelDocument
-        Keys and scalars as they stand in the file, each with its place.
-    root : Node
-        The nodes of the file, whose mappings and lists have places too.
-    text : Text
-        The file.
-    scopes : dict of str to Scope
-        What names mean in the expressions of each mode.
-    top : Scope
-        What names mean outside the modes.
+    ``document.modes``, and likewise for walls, flows and outputs. ``root`` has the nodes of the file ``text``. A scope
+    has the meaning of names: ``scopes`` that of each mode, ``top`` that outside the modes.
     """
 
     system: HybridSystem
@@ -62,24 +48,8 @@ class Reading:
     top: Scope
 
 
-def elaborate(
-    path: str | os.PathLike[str], *, text: bytes | None = None, files: Mapping[str, bytes] | None = None
-) -> HybridSystem:
-    """The hybrid system that a model file describes.
-
-    Parameters
-    ----------
-    path : path
-        The model file.
-    text : bytes, optional
-        Its content, where it is not to be read from ``path``.
-    files : mapping, optional
-        The content of its data files by name, where they are not to be read.
-
-    Returns
-    -------
-    HybridSystem
-        (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7, as SymPy expressions.
+def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
+    """The hybrid system of a model file; ``text`` is its content, where it is not to be read.
 
     Raises
     ------
@@ -88,41 +58,34 @@ def elaborate(
     UsageError
         The file cannot be read.
     """
-    return elaborate_with_places(path, text=text, files=files).system
+    return elaborate_files(ModelFiles.read(path, text=text)).system
 
 
-def elaborate_with_places(
-    path: str | os.PathLike[str], *, text: bytes | None = None, files: Mapping[str, bytes] | None = None
-) -> Reading:
-    """The hybrid system that a model file describes, beside the places its parts have there.
+def elaborate_files(files: ModelFiles) -> Elaboration:
+    """The hybrid system of a model's bytes: (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7.
 
-    Parameters and errors are those of :func:`elaborate`.
+    Raises
+    ------
+    ModelError
+        The model has errors; all that were found are carried, in source order.
     """
-    shown_path = os.fspath(path)
-    data = read_bytes(path) if text is None else text
-    findings = Findings(shown_path)
-    source = decode(shown_path, data)
-    root = compose(source, findings)
-    document = read(root, findings)
-    resolver = ExpressionResolver(findings)
-    symbols = SymbolTable.of(document, resolver, shown_path, files)
-    try:
-        with deep_stack(), timebox(limits.current().seconds, PARTS) as resolver.box:
-            parts = _parts(symbols)
-    except OutOfTime:
-        _say_too_long(resolver)
-    findings.raise_if_any()
-    digest = digest_of(data, symbols.files.values())
-    title, about = symbols.text(document.title), symbols.text(document.source)
-    try:
-        system = HybridSystem(path=shown_path, digest=digest, title=title, source=about, files=symbols.files, **parts)
-    except ValueError as error:  # a check at birth that no diagnostic foresaw
-        raise ModelError([source.diagnostic("HS204", str(error), source.span(1, 1))]) from error
-    top = symbols.scope(("time", "parameters", "inputs", "states", "let"), "")
-    return Reading(system, document, root, source, symbols.scopes, top)
+    with limits.applied(files.limits):
+        findings = Findings(files.path)
+        text = decode(files.path, files.text)
+        root = compose(text, findings)
+        symbols = SymbolTable(read(root, findings), ExpressionResolver(findings), files)
+        try:
+            with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
+                system = _system(symbols)
+        except OutOfTime:
+            _report_timeout(symbols.resolver)
+        except ValueError as error:  # a check at birth that no diagnostic foresaw
+            raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
+        top = symbols.scope(("time", "parameters", "inputs", "states", "let"), "")
+        return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
 
 
-def _say_too_long(resolver: ExpressionResolver) -> NoReturn:
+def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
     message = "working this expression out takes too long"
     hint = "make parts of it states, or allow more time with --limit seconds=600"
     if resolver.at is not None:
@@ -131,8 +94,9 @@ def _say_too_long(resolver: ExpressionResolver) -> NoReturn:
     raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
 
 
-def _parts(symbols: SymbolTable) -> dict[str, Any]:
-    """Everything of a system, in the order in which its parts build upon each other."""
+def _system(symbols: SymbolTable) -> HybridSystem:
+    """The system, its parts in the order in which they build upon each other."""
+    document = symbols.document
     parameters = define_parameters(symbols)
     inputs = define_inputs(symbols)
     define_lets(symbols)
@@ -142,7 +106,12 @@ def _parts(symbols: SymbolTable) -> dict[str, Any]:
     experiment = elaborate_experiment(symbols)
     units = elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
-    return dict(
+    symbols.resolver.findings.raise_if_any()
+    return HybridSystem(
+        path=symbols.files.path,
+        digest=symbols.files.with_data(symbols.data).digest,
+        title=symbols.text(document.title),
+        source=symbols.text(document.source),
         parameters=parameters,
         inputs=inputs,
         modes=modes,
@@ -151,6 +120,7 @@ def _parts(symbols: SymbolTable) -> dict[str, Any]:
         initial=initial,
         experiment=experiment,
         reference=reference,
+        files=symbols.data,
     )
 
 
@@ -164,13 +134,9 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
     text : str
         The expression; a plain number is one.
     where : str
-        What it is for, which begins the sentence of an error: ``"--set c"``.
+        The beginning of the sentence of an error: ``"--set c"``.
     allowed : sequence of str, optional
         The parameters it may use; all of them unless given.
-
-    Returns
-    -------
-    sympy.Expr
 
     Raises
     ------
@@ -189,14 +155,12 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
 
 
 def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Value | Refusal | None]:
-    states = [name for mode in system.modes for name in mode.states]
-    others = {"t": "the time", **dict.fromkeys(states, "a state")}
+    others = {"t": "the time", **dict.fromkeys(system.states, "a state")}
     others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
     values: dict[str, Value | Refusal | None] = {
         name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
     }
-    for parameter in system.parameters:
-        name = parameter.name
+    for name in (parameter.name for parameter in system.parameters):
         late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
         values[name] = Value(symbol(name)) if name in usable else late
     return values

@@ -35,11 +35,6 @@ def define_parameters(symbols: SymbolTable) -> tuple[Parameter, ...]:
     return tuple(found)
 
 
-def parameter_scope(symbols: SymbolTable, sentence: str, hint: str | None = None) -> Scope:
-    """A scope with the parameters alone."""
-    return symbols.scope(("parameters",), sentence, hint=hint)
-
-
 def _extra(symbols: SymbolTable, entry: ParameterEntry, scope: Scope) -> dict:
     bounds = {"minimum": entry.min, "maximum": entry.max}
     read = {k: symbols.resolver.number(s, scope, finite_now=True) for k, s in bounds.items() if s is not None}

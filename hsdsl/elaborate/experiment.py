@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from hsdsl.elaborate.definitions import parameter_scope
 from hsdsl.elaborate.edges import known_mode
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.errors import STEP_AND_TOLERANCE
@@ -21,7 +20,7 @@ def elaborate_initial(symbols: SymbolTable) -> Initial:
     """The initial mode and the values of its states."""
     document = symbols.document.initial
     hint = "name the value under `parameters`, and write that name for both"
-    scope = parameter_scope(symbols, "an initial value is an expression of parameters", hint)
+    scope = symbols.parameter_scope("an initial value is an expression of parameters", hint)
     given: dict[Key, Scalar] = document.__pydantic_extra__
     values = {str(key): symbols.resolver.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
     mode = known_mode(symbols, document.mode)
@@ -57,12 +56,12 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     """The settings of the file, as expressions of parameters."""
     document = symbols.document.experiment
     sentence = "a setting is an expression of parameters"
-    scope = parameter_scope(symbols, sentence)
+    scope = symbols.parameter_scope(sentence)
     if document.step is not None and document.tolerance is not None:
         message = "a run has either a `step` or a `tolerance`, not both"
         last = max((document.step, document.tolerance), key=lambda scalar: scalar.place.start)
         symbols.resolver.add(last.place, STEP_AND_TOLERANCE, message, "keep the one that the method works with")
-    end = parameter_scope(symbols, sentence, "to end with an event, let a transition lead to a mode with final: true")
+    end = symbols.parameter_scope(sentence, "to end with an event, let a transition lead to a mode with final: true")
     until = _setting(symbols, end, "until", document.until)
     numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_POSITIVE, "max_transitions")}
     return Experiment(

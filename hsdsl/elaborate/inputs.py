@@ -9,8 +9,8 @@ from typing import Any
 
 from hsdsl.elaborate.resolver import all_of
 from hsdsl.elaborate.samples import read_samples
-from hsdsl.elaborate.symbols import SymbolTable
-from hsdsl.expression.scope import Scope, Value, symbol
+from hsdsl.elaborate.symbols import SymbolTable, Values
+from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import Key, Scalar
 from hsdsl.system import SampledInput
@@ -19,7 +19,12 @@ from hsdsl.system import SampledInput
 def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
     """The sampled inputs; what the name of every input means goes to ``symbols.values``."""
     feedback = "what depends on states stands under `let`, or in `flow` itself"
-    timed = symbols.scope(("time", "parameters"), "an input is an expression of t and parameters", hint=feedback)
+    inputs, hint = symbols.document.inputs, "combine them under `let`"
+    refusals: Values = {
+        str(name): Refusal("HS117", f"'{name}' is an input; an input cannot use another input", hint) for name in inputs
+    }
+    sentence = "an input is an expression of t and parameters"
+    timed = symbols.scope(("time", "parameters"), sentence, refusals, hint=feedback)
     constant = symbols.scope(("parameters",), "samples are numbers or expressions of parameters")
     found: list[SampledInput] = []
     for name, entry in symbols.document.inputs.items():

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from hsdsl.elaborate.definitions import parameter_scope
 from hsdsl.elaborate.edges import known_mode
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope
@@ -33,7 +32,7 @@ class _Checker:
 
     def __init__(self, symbols: SymbolTable, modes: tuple[Mode, ...]) -> None:
         self.symbols = symbols
-        self.scope: Scope = parameter_scope(symbols, "a reference has numbers or expressions of parameters")
+        self.scope: Scope = symbols.parameter_scope("a reference has numbers or expressions of parameters")
         self.columns = [*symbols.all_states(), *symbols.all_outputs]
         self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
         self.complete = len(modes) == len(symbols.document.modes)

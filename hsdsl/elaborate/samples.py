@@ -22,7 +22,7 @@ def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | Non
     if file.value == ABSENT:
         return None
     try:
-        data = symbols.data(file.value)
+        data = symbols.content(file.value)
     except DataRefused as refusal:
         symbols.resolver.add(file.place, refusal.code, refusal.message, refusal.hint)
         return None
@@ -31,7 +31,7 @@ def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | Non
     except UnicodeDecodeError:
         symbols.resolver.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
-    table = _Table(str(symbols.folder / file.value), lines)
+    table = _Table(str(symbols.files.folder / file.value), lines)
     samples = table.samples(name)
     for diagnostic in table.faults:
         symbols.resolver.findings.add(diagnostic)

@@ -1,16 +1,15 @@
 # pyright: basic
-"""What is known of a model while it is elaborated: its document, and what each of its names means."""
+"""The symbol table of a model under elaboration: its document, and the meaning of each of its names."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.expression.scope import Refusal, Scope, Value, state
-from hsdsl.files import folder_of, read_data
+from hsdsl.files import ModelFiles
 from hsdsl.names import closest
 from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar
@@ -29,54 +28,42 @@ class SymbolTable:
     names : dict of str to str
         Every name that is not of one mode alone, and which of :data:`KINDS` it is.
     values : dict
-        What each of those names that is defined so far means; ``t`` is there from the start.
+        The meaning of each of those names that is defined so far; ``t`` is there from the start.
     states : dict
         The states of each mode in file order; empty for a final mode without a flow.
     undeclared : frozenset of str
         The names that only `initial` knows: states of its mode that lack a flow. They are reported there alone.
     scopes : dict
-        What names mean in each mode, once it is elaborated.
-    given : mapping or None
-        The content of all data files by name, where they are not to be read.
-    files : dict
-        The data files that were used: their content by name, relative to the model.
+        The scope of each mode, once it is elaborated.
+    data : dict
+        The content of the data files that were used, by name.
     """
 
     document: ModelDocument
     resolver: ExpressionResolver
-    folder: Path
-    path: str
-    given: Mapping[str, bytes] | None = None
+    files: ModelFiles
     names: dict[str, str] = field(default_factory=dict)
     values: Values = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
     undeclared: frozenset[str] = frozenset()
     scopes: dict[str, Scope] = field(default_factory=dict)
-    files: dict[str, bytes] = field(default_factory=dict)
+    data: dict[str, bytes] = field(default_factory=dict)
 
-    @classmethod
-    def of(
-        cls, document: ModelDocument, resolver: ExpressionResolver, path: str, given: Mapping[str, bytes] | None = None
-    ) -> SymbolTable:
-        """A document with its names gathered and their clashes reported."""
-        symbols = cls(document, resolver, folder_of(path), path, given)
-        for key in document.parameters:
-            symbols._claim(key, "parameters")
-        for key in document.inputs:
-            symbols._claim(key, "inputs")
-        for name, mode in document.modes.items():
-            symbols.states[name] = tuple(map(str, mode.flow or ()))
-            for key in mode.flow or ():
-                symbols._claim(key, "states")
-        for key in document.let:
-            symbols._claim(key, "let")
-        symbols.values["t"] = Value(TIME)
-        for name, kind in symbols.names.items():
-            if kind == "states":
-                symbols.values[name] = state(name)
-        symbols.undeclared = frozenset(symbols._undeclared())
-        symbols.values.update(dict.fromkeys(symbols.undeclared))
-        return symbols
+    def __post_init__(self) -> None:
+        document = self.document
+        self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
+        keys = [("parameters", document.parameters), ("inputs", document.inputs)]
+        keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
+        for kind, names in keys:
+            for key in names:
+                taken = self.names.setdefault(key, kind)
+                if taken != kind:
+                    message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
+                    self.resolver.add(key.place, "HS301", message, "give one of them another name")
+        self.values["t"] = Value(TIME)
+        self.values |= {name: state(name) for name in self.all_states()}
+        self.undeclared = frozenset(self._undeclared())
+        self.values.update(dict.fromkeys(self.undeclared))
 
     def _undeclared(self) -> list[str]:
         start = self.document.initial
@@ -86,36 +73,31 @@ class SymbolTable:
         given = [str(key) for key in start.__pydantic_extra__ if key not in self.names]
         return [key for key in given if closest(key, map(str, mode.flow)) is None]
 
-    def _claim(self, key: Key, kind: str) -> None:
-        taken = self.names.setdefault(key, kind)
-        if taken != kind:
-            message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
-            self.resolver.add(key.place, "HS301", message, "give one of them another name")
-
     def scope(
         self, usable: tuple[str, ...], sentence: str, values: Values | None = None, hint: str | None = None
     ) -> Scope:
         """A scope with names of some kinds; the others are refused with a sentence and a hint."""
-        found: Values = {"t": self.values["t"] if "time" in usable else _refused("t", "the time", sentence, hint)}
+
+        def refusal(name: str, kind: str) -> Refusal:
+            return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
+
+        known: Values = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
         for name, kind in self.names.items():
-            if kind in usable:
-                if name in self.values:
-                    found[name] = self.values[name]
-            else:
-                found[name] = _refused(name, KINDS[kind], sentence, hint)
-        return Scope({**dict.fromkeys(self.undeclared), **found, **(values or {})})
+            if kind not in usable:
+                known[name] = refusal(name, KINDS[kind])
+            elif name in self.values:
+                known[name] = self.values[name]
+        return Scope({**dict.fromkeys(self.undeclared), **known, **(values or {})})
 
-    def data(self, name: str) -> bytes:
-        """The content of a data file, which is read once.
+    def parameter_scope(self, sentence: str, hint: str | None = None) -> Scope:
+        """A scope with the parameters alone."""
+        return self.scope(("parameters",), sentence, hint=hint)
 
-        Raises
-        ------
-        DataRefused
-            It cannot be used.
-        """
-        if name not in self.files:
-            self.files[name] = read_data(self.folder, name) if self.given is None else self.given[name]
-        return self.files[name]
+    def content(self, name: str) -> bytes:
+        """The content of a data file, which is read once; raises DataRefused."""
+        if name not in self.data:
+            self.data[name] = self.files.content(name)
+        return self.data[name]
 
     def text(self, scalar: Scalar | None) -> str | None:
         """The text of a scalar that may be missing."""
@@ -147,14 +129,10 @@ class SymbolTable:
         return mode.final and mode.flow is None
 
 
-def _refused(name: str, kind: str, sentence: str, hint: str | None) -> Refusal:
-    return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
-
-
 def definition_order(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
     """The names of definitions that may use earlier ones only.
 
-    ``refused`` holds, while a name's turn lasts, refusals of it and of those below, and in the end nothing.
+    ``refused`` holds, at a name's turn, refusals of it and of those below, and in the end nothing.
     """
     keys = list(keys)
     for key in keys:

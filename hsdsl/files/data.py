@@ -1,14 +1,20 @@
-"""The bytes of a model's data files: each a regular file in the model's folder, or where the limits let it lie."""
+"""The bytes of a model file and of its data files: each file is read once, and lies where the limits let it lie.
+
+All that is made of a model is made of these bytes: a file that is saved meanwhile changes nothing.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from hsdsl import limits
-from hsdsl.files.model import is_piped, open_regular, reason
+from hsdsl.files.model import is_piped, open_regular, read_bytes, reason
+from hsdsl.limits import Limits, applied
 from hsdsl.names import shown
 
 LARGEST = 64 << 20  # bytes
@@ -22,34 +28,64 @@ class DataRefused(Exception):
         self.code, self.message, self.hint = code, message, hint
 
 
-def folder_of(path: str | os.PathLike[str]) -> Path:
-    """Where the data files of a model lie: beside it, or in the current folder where it comes through a pipe."""
-    return Path() if is_piped(path) else Path(path).parent
+@dataclass(frozen=True)
+class ModelFiles:
+    """A model's path and bytes, and the bytes of its data files by name; None while their names are not known."""
 
+    path: str
+    text: bytes = field(repr=False)
+    limits: Limits
+    data: Mapping[str, bytes] | None = field(default=None, repr=False)
 
-def read_data(folder: Path, name: str) -> bytes:
-    """The bytes of a data file.
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], limits_: Limits | None = None, text: bytes | None = None) -> ModelFiles:
+        """Read a model file, unless its bytes are given.
 
-    Raises
-    ------
-    DataRefused
-        When it lies elsewhere, is no regular file, is too large, or cannot be read.
-    """
-    target = _inside(folder, name)
-    try:
-        with open_regular(target, getattr(os, "O_NOFOLLOW", 0)) as stream:
-            data = stream.read(LARGEST + 1)
-    except (OSError, ValueError) as error:
-        message = f"the file '{shown(name)}' cannot be read: {reason(error)}"
-        raise DataRefused("HS311", message, "its path is taken from the folder of the model") from None
-    if len(data) > LARGEST:
-        raise DataRefused("HS311", f"the file '{shown(name)}' is larger than {LARGEST >> 20} MiB")
-    return data
+        Raises
+        ------
+        UsageError
+            It cannot be read.
+        """
+        with applied(limits_):
+            return cls(os.fspath(path), read_bytes(path) if text is None else text, limits.current())
 
+    @cached_property
+    def digest(self) -> str:
+        """The checksum of all files."""
+        return hashlib.sha256(b"".join((self.text, *(self.data or {}).values()))).hexdigest()
 
-def digest_of(text: bytes, data: Iterable[bytes]) -> str:
-    """What tells a model from another one: the checksum of its file and its data files."""
-    return hashlib.sha256(b"".join((text, *data))).hexdigest()
+    @property
+    def folder(self) -> Path:
+        """Where the data files lie: beside the model, or in the current folder where it comes through a pipe."""
+        return Path() if is_piped(self.path) else Path(self.path).parent
+
+    def with_data(self, data: Mapping[str, bytes]) -> ModelFiles:
+        """The same model with the bytes of its data files."""
+        return replace(self, data=data)
+
+    def content(self, name: str) -> bytes:
+        """The bytes of a data file.
+
+        Raises
+        ------
+        DataRefused
+            It lies elsewhere, is no regular file, is too large, or cannot be read.
+        KeyError
+            The data files are known, and it is none of them.
+        """
+        if self.data is not None:
+            return self.data[name]
+        with applied(self.limits):
+            target = _inside(self.folder, name)
+        try:
+            with open_regular(target, getattr(os, "O_NOFOLLOW", 0)) as stream:
+                content = stream.read(LARGEST + 1)
+        except (OSError, ValueError) as error:
+            message = f"the file '{shown(name)}' cannot be read: {reason(error)}"
+            raise DataRefused("HS311", message, "its path is taken from the folder of the model") from None
+        if len(content) > LARGEST:
+            raise DataRefused("HS311", f"the file '{shown(name)}' is larger than {LARGEST >> 20} MiB")
+        return content
 
 
 def _inside(folder: Path, name: str) -> Path:

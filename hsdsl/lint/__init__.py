@@ -11,10 +11,11 @@ import time
 from dataclasses import dataclass
 
 from hsdsl import limits
-from hsdsl.elaborate import elaborate_with_places
+from hsdsl.elaborate import elaborate_files
 from hsdsl.errors import Diagnostic
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.files import ModelFiles
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.ignores import Ignored, sift
 from hsdsl.lint.rules import RULES
@@ -56,7 +57,7 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     UsageError
         The file cannot be read.
     """
-    subject = Subject(elaborate_with_places(path, text=text))
+    subject = Subject(elaborate_files(ModelFiles.read(path, text=text)))
     codes = (selection or Selection.of()).codes
     seconds = limits.current().seconds
     end = time.process_time() + seconds / 2

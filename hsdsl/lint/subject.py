@@ -10,7 +10,7 @@ from typing import Any
 
 from hsdsl import schema
 from hsdsl.defaults import DEFAULTS, least_relaxation
-from hsdsl.elaborate import Reading
+from hsdsl.elaborate import Elaboration
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
@@ -56,7 +56,7 @@ class Subject:
         The nodes of the file.
     """
 
-    def __init__(self, reading: Reading) -> None:
+    def __init__(self, reading: Elaboration) -> None:
         self.reading = reading
         self.system: HybridSystem = reading.system
         self.document: schema.ModelDocument = reading.document
@@ -129,10 +129,7 @@ class Subject:
     @cached_property
     def numbers(self) -> dict[Any, Number]:
         """The value of each parameter in this file, as a number; see `hsdsl.lint.numbers`."""
-        found: dict[Any, Number] = {}
-        for parameter in self.system.parameters:
-            found[symbol(parameter.name)] = evaluate(parameter.value, found)
-        return found
+        return self.system.parameter_values(evaluate)
 
     @cached_property
     def start(self) -> dict[Any, Number]:

@@ -99,7 +99,7 @@ def _symbol(name: str) -> sp.Symbol:
 
 def _number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
     parameters = tuple(_symbol(f"p{i}") for i in range(len(system.parameters)))
-    shared: dict[sp.Symbol, sp.Expr] = dict(zip((_symbol(p.name) for p in system.parameters), parameters, strict=True))
+    shared: dict[sp.Symbol, sp.Expr] = dict(zip(system.parameter_symbols, parameters, strict=True))
     data = list(parameters)
     for i, sampled in enumerate(system.inputs):
         start, slope, since = (_symbol(f"{letter}{i}") for letter in "abc")

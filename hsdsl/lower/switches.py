@@ -101,7 +101,7 @@ def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     """Write a system's expressions with switches, and return these."""
     inputs = {_symbol(i.name): i.hold for i in system.inputs}
     moving = frozenset({TIME, *(symbol for symbol, hold in inputs.items() if hold == "linear")})
-    found = Switches(moving, frozenset({*inputs, *(_symbol(p.name) for p in system.parameters)}))
+    found = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
     modes = tuple(_mode(mode, found.out_of) for mode in system.modes)
     return replace(system, modes=modes), found
 

@@ -148,7 +148,7 @@ class _Look:
         return float(max((-v.real for v in values if v.real < 0 and abs(v.imag) <= -v.real), default=0.0))
 
     def step(self, h: float) -> None:
-        """Make a step (ROS2; Verwer, Spee, Blom and Hundsdorfer 1999, doi:10.1137/S1064827597326651)."""
+        """Make a step of ROS2 (Verwer, Spee, Blom, Hundsdorfer: A second-order Rosenbrock method, 1999)."""
         matrix: Array = np.eye(len(self.x)) - (1 - 0.5**0.5) * h * self.jacobian()
         first: Array = _solve(matrix, self.flow(self.t, self.x))
         second: Array = _solve(matrix, self.flow(self.t + h, self.x + h * first) - 2 * first)

@@ -1,4 +1,4 @@
-"""What was prepared for the last few calls, found by their arguments."""
+"""Prepared runs of the last few calls, found by their arguments."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Any, Generic, TypeVar, cast
 
 Value = TypeVar("Value")
+_PLAIN = frozenset((type(None), str, int, float, bool))
 
 
 class CallCache(Generic[Value]):
@@ -18,11 +19,11 @@ class CallCache(Generic[Value]):
         self._lock = Lock()
 
     def find(self, key: Hashable | None) -> Value | None:
-        """Return what was kept under a key."""
+        """The value of a key, if it is there."""
         return self._values.get(key)
 
     def keep(self, key: Hashable | None, value: Value) -> None:
-        """Keep a value, and forget the oldest where there are too many."""
+        """Keep a value, and drop the oldest where there are too many."""
         if key is None:
             return
         with self._lock:
@@ -31,11 +32,8 @@ class CallCache(Generic[Value]):
                 del self._values[next(iter(self._values))]
 
 
-_PLAIN = frozenset((type(None), str, int, float, bool))
-
-
 def call_key(*arguments: Any) -> Hashable | None:
-    """Return a key that calls share only if their arguments are the same; None where they are not plain data.
+    """A key that calls share only if their arguments are the same; None where they are not plain data.
 
     1, 1.0 and True are not the same, zeros of both signs are.
     """
@@ -52,10 +50,8 @@ def _key(value: Any) -> Hashable:
     kind = cast("type[Any]", type(value))
     if kind in _PLAIN:
         return kind, value
-    if kind is dict:
-        return kind, tuple([(name, _key(item)) for name, item in value.items()])
+    if isinstance(value, Mapping):
+        return dict, tuple([(name, _key(item)) for name, item in cast("Mapping[Any, Any]", value).items()])
     if kind is list or kind is tuple:
         return kind, tuple(map(_key, value))
-    if isinstance(value, Mapping):
-        return _key(dict(cast("Mapping[Any, Any]", value)))
     raise TypeError(f"a {kind.__name__} is not plain data")

@@ -1,14 +1,33 @@
-"""``hsdsl.distance``: between two runs, or between two points of a model."""
+"""``hsdsl.distance``: between two runs, or between two points of a model.
+
+A run names its model; that is read again where its space is needed.
+"""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
+from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+from hsdsl.metrics.budget import Budget
+from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.interval import Interval
+from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.points import Place
+from hsdsl.metrics.table import Request, between, check_same_model
+from hsdsl.model.overrides import parameters_of
+from hsdsl.simulate.stops import show
+
+if TYPE_CHECKING:
+    from hsdsl.model import Model
+    from hsdsl.model.values import Values
+
+SECONDS = 60.0  # that a search may take, unless said otherwise
 
 
 def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interval:
@@ -17,8 +36,8 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
     Parameters
     ----------
     first, second : Execution
-        Two runs of one model; further arguments as :func:`hsdsl.model.between_runs.distance` (``metric``,
-        ``relaxation``, ``model``, ``parameters``, ``coordinates``).
+        Two runs of one model; further arguments as :func:`distance_of_runs` (``metric``, ``relaxation``, ``model``,
+        ``parameters``, ``coordinates``).
     first : Model or path; second, third : str or Place
         A model and two of its points, as ``"free x=13 v=5"``; further arguments as :meth:`hsdsl.Model.distance`
         (``metric``, ``relaxation``, ``parameters``, ``hops``).
@@ -26,8 +45,8 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
     Returns
     -------
     Interval
-        What the distance is at least and at most; :meth:`hsdsl.Model.distance` also says the path, and
-        that function the time.
+        The least and the largest possible distance; :meth:`hsdsl.Model.distance` also has the path, and that function
+        the time.
 
     Raises
     ------
@@ -35,10 +54,9 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
         The arguments are neither, or do not fit the model.
     """
     from hsdsl.model import Model, load
-    from hsdsl.model.between_runs import distance as between_runs
 
     if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
-        return between_runs(first, second, **asked).interval
+        return distance_of_runs(first, second, **asked).interval
     model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
     if isinstance(model, Model) and isinstance(second, (str, Place)) and isinstance(third, (str, Place)):
         return model.distance(second, third, **asked).interval
@@ -46,3 +64,162 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
         "distance takes two runs, or a model and two of its points",
         'for example distance(run, other) or distance(model, "free x=13 v=5", "free x=13 v=-4")',
     )
+
+
+def distance_of_runs(
+    run: Execution,
+    other: Execution,
+    metric: str = "rho",
+    *,
+    relaxation: Any = None,
+    model: Model | str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    coordinates: Sequence[str] | None = None,
+    hops: int | None = None,
+    seconds: float = SECONDS,
+    watch: Callable[[float, float], None] | None = None,
+) -> CurveDistance:
+    """Return how far apart two runs of one model are.
+
+    Parameters
+    ----------
+    run, other : Execution
+        Of one model file; schemes, steps, engines, initial values and lengths may differ.
+    metric : str
+        A key of `hsdsl.metrics.table.CURVE_METRICS`: rho, quotient, relaxed, rho-hat, sup, skorokhod or tau-epsilon.
+    relaxation : number or str, optional
+        For ``rho`` and ``relaxed``: how deep the strips of the relaxed space are.
+    model : Model or path, optional
+        The model that the space is made of; left out, the file that the first run names.
+    parameters : mapping, optional
+        Overrides by name, beyond those of the first run: the space has guards and resets at these values. Where the
+        second run has others, the note says so.
+    coordinates : names, optional
+        For ``rho-hat``: the states that count as the position.
+    hops : int, optional
+        For ``rho``, ``quotient`` and ``relaxed``: the most passages of a path; left out, eight more than the fewest
+        that connect the modes. The lower end holds for paths with more, too.
+    seconds : float
+        For ``rho``, ``quotient`` and ``relaxed``: the time for the search. After it the interval is wider, and the note
+        says so.
+    watch : callable, optional
+        Called now and then with the bounds so far, for those three.
+
+    Raises
+    ------
+    UsageError
+        Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
+        since.
+    """
+    check_hops(hops)
+    source = _RunSpace(run, other, model, parameters or {}, budget_of(seconds, watch), hops)
+    depth = None if relaxation is None else source.depth(relaxation)
+    result = between(metric, Request(run, other, source.space, depth, coordinates, hops))
+    return replace(result, note="\n".join(filter(None, (result.note, source.note))))
+
+
+def plot_distance(
+    run: Execution,
+    other: Execution,
+    path: str | os.PathLike[str],
+    *,
+    relaxation: Any = None,
+    model: Model | str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    hops: int | None = None,
+    seconds: float = SECONDS,
+) -> None:
+    """Draw the distance of two runs over time, and the difference of their states; see :func:`distance_of_runs`.
+
+    After ``seconds`` the remaining times have wide bounds.
+    """
+    from hsdsl.metrics.profile import profiles
+    from hsdsl.plot.over_time import plot_over_time
+
+    check_same_model(run, other)
+    source = _RunSpace(run, other, model, parameters or {}, budget_of(seconds), hops)
+    depth = None if relaxation is None else source.depth(relaxation)
+    curves = profiles(run, other, source.space(depth), depth)
+    labels = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}
+    bounds = {labels[name]: (profile.lower, profile.upper) for name, profile in curves.items()}
+    plot_over_time(path, curves["rho"].times, bounds, f"Distance over time: {run.title or run.model}")
+
+
+def budget_of(seconds: float, watch: Callable[[float, float], None] | None = None) -> Budget:
+    """A budget of a positive number of seconds that begins now."""
+    if not seconds > 0:
+        raise UsageError(f"a distance needs a positive number of seconds, not {seconds:g}")
+    return Budget(seconds, watch=watch)
+
+
+def check_hops(hops: int | None) -> None:
+    """Refuse a number of passages that is negative or no whole number."""
+    if hops is not None and not (hops >= 0 and hops == int(hops)):
+        raise UsageError(f"hops must be a whole number, not {hops}")
+
+
+class _RunSpace:
+    """The space of a run's model, read when first needed; ``note`` has parameters that differ in the other run."""
+
+    def __init__(
+        self,
+        run: Execution,
+        other: Execution,
+        model: Model | str | os.PathLike[str] | None,
+        parameters: Mapping[str, Any],
+        budget: Budget,
+        hops: int | None,
+    ) -> None:
+        self.run, self.other, self.model, self.parameters = run, other, model, parameters
+        self.budget, self.hops, self.note = budget, hops, ""
+
+    @cached_property
+    def values(self) -> Values:
+        from hsdsl.model import Model
+        from hsdsl.model.values import with_parameters
+
+        model = self.model if isinstance(self.model, Model) else _load(self.model, self.run)
+        if model.system.digest != self.run.digest:
+            raise UsageError(
+                f"{model.system.path} is not the model that the run is of, or was edited since",
+                "run it again, or give the model as it was",
+            )
+        first, second = (parameters_of(run.overrides) | dict(self.parameters) for run in (self.run, self.other))
+        plain = model.pipeline.values(FLOAT64)
+        values = with_parameters(plain, first)
+        if first != second:
+            self.note = _differences(values, with_parameters(plain, second))
+        return values
+
+    def depth(self, relaxation: Any) -> float:
+        number = float(self.values.number(relaxation, "relaxation") if isinstance(relaxation, str) else relaxation)
+        if not number > 0:
+            raise UsageError(f"relaxation must be positive, not {number:.10g}")
+        return number
+
+    def space(self, depth: float | None) -> PointMetric:
+        from hsdsl.metrics.pointwise import SpaceMetric
+        from hsdsl.metrics.space import make_space
+
+        space = make_space(self.values.system, [float(v) for v in self.values.parameters])
+        self.budget.start()
+        return SpaceMetric(space, depth, self.budget, self.hops)
+
+
+def _differences(first: Values, second: Values) -> str:
+    """A sentence with the parameters that have different values in two runs."""
+    pairs = zip(first.program.parameters, first.parameters, second.parameters, strict=True)
+    apart = [f"{name} = {show(one)} and {show(two)}" for name, one, two in pairs if one != two]
+    if not apart:
+        return ""
+    return f"The runs have different parameters ({', '.join(apart)}): guards and resets are those of the first."
+
+
+def _load(path: str | os.PathLike[str] | None, run: Execution) -> Model:
+    from hsdsl.model import load
+
+    if path is None and not os.path.exists(run.model):
+        raise UsageError(
+            f"the run is of {run.model}, which is not there: the distance needs the model", "give it as model="
+        )
+    return load(run.model if path is None else path)

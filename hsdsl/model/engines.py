@@ -1,4 +1,4 @@
-"""Which loop runs a model: the compiled one where there is a compiler and the run is one it knows, else the Python one.
+"""The choice of the loop that runs a model.
 
 ======== ==========================================================================
 auto     ``c`` where it can serve, ``python`` where it cannot
@@ -27,35 +27,28 @@ ENGINES = ("auto", "c", "python")
 
 
 def check(engine: str) -> None:
-    """Refuse an engine there is not.
-
-    Raises
-    ------
-    UsageError
-        It is not one of :data:`ENGINES`.
-    """
+    """Refuse an engine that is not one of :data:`ENGINES`."""
     if engine not in ENGINES:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
 
 
 def begin(model: bytes, engine: str, precision: int | None, scheme: str | None, method: str | None) -> None:
-    """Compile the runtime while a model is read, where a run of it will need that and nobody has done it.
+    """Compile the runtime while a model is read, where a run will need it and no earlier run has compiled it.
 
-    What the file seems to say of its scheme and method is taken for what it says; where that is wrong the right runtime
-    is compiled when it is needed.
+    Scheme and method are guessed from the text of the model; after a wrong guess the right runtime is compiled later.
     """
     if engine == "python" or precision is not None:
         return
-    said = {key: value for key, value in re.findall(r"\b(scheme|method): *(\w+)", model.decode(errors="replace"))}
-    scheme = scheme or said.get("scheme", DEFAULTS["scheme"])
+    guessed = dict(re.findall(r"\b(scheme|method): *(\w+)", model.decode(errors="replace")))
+    scheme = scheme or guessed.get("scheme", DEFAULTS["scheme"])
     if scheme in SCHEMES:
-        kernel.begin(scheme, method or said.get("method", DEFAULTS["method"]))
+        kernel.begin(scheme, method or guessed.get("method", DEFAULTS["method"]))
 
 
 def choose(
     engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
 ) -> CompiledModel | None:
-    """Return the compiled model that a run is for, None where the Python loop is to run it.
+    """The compiled model that a run is for, None where the Python loop is to run it.
 
     Raises
     ------
@@ -73,7 +66,7 @@ def choose(
         except NoCompiler as error:
             why = str(error)
         if engine == "auto":
-            _say_once(why)
+            _warn_once(why)
     if engine == "c":
         raise UsageError(f"engine 'c' cannot run this: {why}", "use engine 'python', or 'auto'")
     return None
@@ -91,5 +84,5 @@ def _refusal(settings: Settings, precision: int | None) -> str | None:
 
 
 @cache
-def _say_once(why: str) -> None:
+def _warn_once(why: str) -> None:
     print(f"hsdsl: the Python engine runs this, which is slower: {why}", file=sys.stderr)

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Ensemble, Execution
-from hsdsl.model.instances import (
-    Columns,
-    Varied,
-    broadcast,
-    initial_rows,
-    parameter_rows,
-    settings_rows,
-    split,
-)
-from hsdsl.model.options import KEYS
-from hsdsl.model.settings import check_memory, whole
-from hsdsl.model.values import Values
-from hsdsl.model.workers import Progress, run_compiled, run_in_turn
-from hsdsl.names import did_you_mean
-from hsdsl.simulate import Prepared
+from hsdsl.model.options import KEYS, Options, check_arguments, overrides_of
+from hsdsl.model.settings import check_memory, setting_columns, whole
+from hsdsl.model.values import Columns, evaluate_parameters, initial_columns
+from hsdsl.model.workers import Progress, Recorder, run_compiled, run_in_turn
+from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept
 from hsdsl.simulate.layouts import Layouts
 
@@ -39,45 +31,60 @@ INITIAL = "initial."
 
 @dataclass(frozen=True)
 class EnsembleRequest:
-    """What an ensemble is asked for: ``call`` is what every single run of it is asked for."""
+    """The arguments of an ensemble: ``call`` has those of every single run, and ``varied`` the arrays by name.
 
-    parameters: dict[str, Any]
-    initial: dict[str, Any]
-    varied: Varied
+    The arrays are flattened; ``shape`` is their common shape.
+    """
+
+    call: dict[str, Any]
+    varied: dict[str, Array]
+    shape: tuple[int, ...]
     samples: int | Array | None
     transition_times: int
-    call: dict[str, Any]
 
     @staticmethod
-    def of(
-        parameters: Mapping[str, Any], initial: Mapping[str, Any], samples: Any, crossings: int, call: dict[str, Any]
-    ) -> EnsembleRequest:
-        """Sort out what the instances share and what is varied.
+    def of(call: dict[str, Any], samples: Any, transition_times: int) -> EnsembleRequest:
+        """Sort the arguments.
 
         Raises
         ------
         UsageError
-            Arrays without a common shape, or samples that are neither how many nor times.
+            An argument that a run does not take, a value that is no number, no expression and no array of numbers,
+            arrays without a common shape, or samples that are neither a number of them nor times.
         """
-        shared, by_parameter = split(parameters)
-        shared_initial, by_state = split(initial)
-        varied = broadcast(by_parameter | {INITIAL + name: array for name, array in by_state.items()})
-        return EnsembleRequest(shared, shared_initial, varied, _samples(samples), crossings, call)
+        check_arguments(call, "an ensemble", without=("samples", "precision"))
+        whole(transition_times, "transition_times", least=0)
+        varied: dict[str, Array] = {}
+        for group, prefix in (("parameters", ""), ("initial", INITIAL)):
+            given = overrides_of(call, group)
+            varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
+            call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
+        try:
+            common = np.broadcast_arrays(*varied.values())
+        except ValueError:
+            shapes = ", ".join(f"{name} has {array.shape}" for name, array in varied.items())
+            raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}") from None
+        shape = common[0].shape if common else ()
+        flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
+        return EnsembleRequest(call, flat, shape, _samples(samples), transition_times)
 
-    def arrays(self, initial: bool) -> dict[str, Array]:
-        """What is varied, of initial states or of parameters, by name."""
-        arrays = self.varied.arrays.items()
-        return {name.removeprefix(INITIAL): array for name, array in arrays if name.startswith(INITIAL) == initial}
+    def arrays(self, initial: bool) -> dict[str, list[float]]:
+        """The columns of initial states or of parameters, by name."""
+        columns = ((name, array) for name, array in self.varied.items() if name.startswith(INITIAL) == initial)
+        return {name.removeprefix(INITIAL): array.tolist() for name, array in columns}
 
     def single(self, index: int) -> dict[str, Any]:
-        """What the single run of one instance is asked for."""
-        own = [{name: float(a[index]) for name, a in self.arrays(initial).items()} for initial in (False, True)]
-        return self.call | {"parameters": self.parameters | own[0], "initial": self.initial | own[1]}
+        """The arguments of the single run of one instance."""
+        own = {"parameters": dict(self.call["parameters"]), "initial": dict(self.call["initial"])}
+        for name, array in self.varied.items():
+            group = "initial" if name.startswith(INITIAL) else "parameters"
+            own[group][name.removeprefix(INITIAL)] = float(array[index])
+        return self.call | own
 
     @property
     def sample_count(self) -> int:
-        """How many samples are taken of each instance."""
-        return self.samples if isinstance(self.samples, int) else 0 if self.samples is None else len(self.samples)
+        """The number of samples of each instance."""
+        return self.times(np.zeros(1)).shape[1]
 
     def times(self, until: Array) -> Array:
         """The sample times of every instance, shape (instances, samples)."""
@@ -86,44 +93,57 @@ class EnsembleRequest:
         if isinstance(self.samples, int):
             n = self.samples
             return np.concatenate([until[:, None] * np.arange(n - 1) / (n - 1), until[:, None]], axis=1)
-        return np.repeat(self.samples[None, :], len(until), axis=0)
+        return np.tile(self.samples, (len(until), 1))
 
 
-def _samples(asked: Any) -> int | Array | None:
-    if asked is None:
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _array(name: str, value: Any) -> Array:
+    if np.ma.is_masked(value):
+        raise UsageError(f"{name}: elements of the array are masked, and have no value", "leave those instances out")
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name}: expected a number, an expression or an array of numbers") from None
+
+
+def _samples(given: Any) -> int | Array | None:
+    if given is None:
         return None
-    if np.ndim(asked) == 1 and not isinstance(asked, str):
-        times = np.asarray(asked, dtype=float)
+    if np.ndim(given) == 1 and not isinstance(given, str):
+        times = np.asarray(given, dtype=float)
         if np.isfinite(times).all() and (times >= 0).all() and (np.diff(times) >= 0).all():
             return times
-    elif isinstance(asked, int) and not isinstance(asked, bool) and asked >= 2:
-        return asked
+    elif isinstance(given, int) and not isinstance(given, bool) and given >= 2:
+        return given
     raise UsageError("samples of an ensemble are times from 0 on that never decrease, or a whole number of at least 2")
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
+class SingleRuns:
     """Single runs of the instances of an ensemble, by their places."""
 
     model: Model
-    asked: EnsembleRequest
+    request: EnsembleRequest
 
     def __call__(self, place: tuple[int, ...]) -> Execution:
         """Run one."""
-        shape = self.asked.varied.shape
+        shape = self.request.shape
         return self.numbered(int(np.ravel_multi_index(place, shape)) if shape else 0)
 
     def numbered(self, index: int) -> Execution:
         """Run the one with this number."""
-        return self.model.simulate(**self.asked.single(index))
+        return self.model.simulate(**self.request.single(index))
 
 
 @dataclass(frozen=True, eq=False)
-class Ready:
-    """An ensemble that can start. ``places`` are the numbers of the instances that are not refused."""
+class PreparedEnsemble:
+    """An ensemble that can start: ``places`` are the numbers of the instances that are not refused."""
 
     model: Model
-    asked: EnsembleRequest
+    request: EnsembleRequest
     base: Prepared
     columns: Columns
     places: list[int]
@@ -135,81 +155,79 @@ class Ready:
         """The states of all modes."""
         return tuple(dict.fromkeys(name for kind in self.kinds for name in kind))
 
+    @property
+    def again(self) -> SingleRuns:
+        """Single runs."""
+        return SingleRuns(self.model, self.request)
+
     def run(self, threads: int, progress: Progress | None) -> Ensemble:
         """Run all instances."""
         began, program = time.perf_counter(), self.base.program
-        outputs, crossings = len(program.outputs), self.asked.transition_times
         plan, samples = self.base.plan, self.instances.time.shape[1]
         width = plan.compiled.table.width if plan else max(map(len, self.kinds))
-        kept = Kept(len(self.places), width, outputs, len(self.names), samples, crossings)
+        crossings = self.request.transition_times
+        kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings)
         if plan is None:
             modes = [mode.name for mode in program.modes]
             again = [partial(self.again.numbered, place) for place in self.places]
-            run_in_turn(again, self.instances, kept, self.names, self.kinds, modes, progress)
+            run_in_turn(again, Recorder(self.instances, kept, self.names, self.kinds, modes), progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
+        for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
+            kept.stop[i] = self.again.numbered(self.places[i]).stop.reason
         return self._ensemble(kept, time.perf_counter() - began)
 
-    @property
-    def again(self) -> Again:
-        """Single runs."""
-        return Again(self.model, self.asked)
-
     def _ensemble(self, kept: Kept, seconds: float) -> Ensemble:
-        shape, settings = self.asked.varied.shape, self.base.settings
-        program, plan, states = self.base.program, self.base.plan, self._states(kept)
+        shape, settings = self.request.shape, self.base.settings
+        program = self.base.program
 
         def placed(array: Array, missing: Any) -> Array:
-            """Put what was kept in its place among all instances."""
-            full = np.full((self.columns.count, *array.shape[1:]), missing, dtype=array.dtype)
+            """Put an array in its place among all instances."""
+            full = np.full((len(self.columns.rows), *array.shape[1:]), missing, dtype=array.dtype)
             full[self.places] = array
             return full.reshape((*shape, *array.shape[1:]))
 
-        nan = float("nan")
-        samples = {name: kept.states[:, i] for i, name in enumerate(self.names)}
-        samples |= {name: kept.results[:, :, i] for i, name in enumerate(program.outputs)}
-        outputs = {name: kept.outputs[:, i] for i, name in enumerate(program.outputs)}
+        def columns(arrays: Iterator[tuple[str, Array]]) -> dict[str, Array]:
+            return {name: placed(column, math.nan) for name, column in arrays}
+
+        sampled = [(name, kept.states[:, i]) for i, name in enumerate(self.names)]
+        sampled += [(name, kept.results[:, :, i]) for i, name in enumerate(program.outputs)]
         modes = np.array([*(mode.name for mode in program.modes), ""])
-        refused = {tuple(map(int, np.unravel_index(k, shape))): why for k, why in self.columns.refused.items()}
+        refused = self.columns.refused.items()
         return Ensemble(
             model=program.path,
             digest=program.digest,
-            engine="python" if plan is None else "c",
+            engine="python" if self.base.plan is None else "c",
             scheme=settings.scheme,
             method=settings.method.name if settings.method else "two-step",
             shape=shape,
-            varied={name: array.reshape(shape) for name, array in self.asked.varied.arrays.items()},
-            stop=placed(self._stops(kept), "refused"),
-            time=placed(kept.ended, nan),
+            varied={name: array.reshape(shape) for name, array in self.request.varied.items()},
+            stop=placed(kept.stop, "refused"),
+            time=placed(kept.ended, math.nan),
             mode=placed(modes[kept.mode], ""),
-            state={name: placed(column, nan) for name, column in states.items()},
-            outputs={name: placed(column, nan) for name, column in outputs.items()},
+            state=columns(self._final_states(kept)),
+            outputs=columns((name, kept.outputs[:, i]) for i, name in enumerate(program.outputs)),
             transitions=placed(kept.transitions, 0),
-            transition_times=placed(kept.crossed, nan),
-            sample_times=placed(self.instances.time, nan),
-            samples={name: placed(column, nan) for name, column in samples.items() if self.instances.time.shape[1]},
+            transition_times=placed(kept.crossed, math.nan),
+            sample_times=placed(self.instances.time, math.nan),
+            samples=columns(iter(sampled if self.instances.time.shape[1] else [])),
             seconds={"simulate": seconds},
-            refusals=refused,
+            refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
             again=self.again,
         )
 
-    def _states(self, kept: Kept) -> dict[str, Array]:
-        """The final states by name; where they stand depends on the mode."""
-        found = {name: np.full(len(self.places), float("nan")) for name in self.names}
-        for number, kind in enumerate(self.kinds):
-            here = kept.kind == number
-            for i, name in enumerate(kind):
-                found[name][here] = kept.final[here, i]
-        return found
-
-    def _stops(self, kept: Kept) -> Array:
-        """Why each run ended; of one that was stuck only its own message tells."""
-        for i in np.flatnonzero(kept.stop == "stuck").tolist():
-            kept.stop[i] = self.again.numbered(self.places[i]).stop.reason
-        return kept.stop
+    def _final_states(self, kept: Kept) -> Iterator[tuple[str, Array]]:
+        """The final states by name; their columns depend on the mode."""
+        for name in self.names:
+            column = np.full(len(self.places), math.nan)
+            for number, kind in enumerate(self.kinds):
+                if name in kind:
+                    here = kept.kind == number
+                    column[here] = kept.final[here, kind.index(name)]
+            yield name, column
 
 
-def ready(model: Model, values: Values, asked: EnsembleRequest, prepare: Callable[..., Prepared]) -> Ready:
+def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
     """Compute the numbers of every instance.
 
     Raises
@@ -217,42 +235,55 @@ def ready(model: Model, values: Values, asked: EnsembleRequest, prepare: Callabl
     UsageError
         None of them can be run.
     """
-    request = model.resolve(asked.call.get("settings"), {k: v for k, v in asked.call.items() if k not in OUTSIDE})
-    columns = parameter_rows(values, asked.parameters, asked.arrays(initial=False), asked.varied.count)
-    first = next((k for k in range(columns.count) if k not in columns.refused), None)
+    pipeline, call = model.pipeline, request.call
+    values = pipeline.values(FLOAT64)
+    columns = Columns(values, [()] * math.prod(request.shape))
+    evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
+    first = next((k for k in range(len(columns.rows)) if k not in columns.refused), None)
     if first is None:
         why = next(iter(columns.refused.values()), "there is none")
         raise UsageError(f"no instance of the ensemble can be run: {why}")
-    base = prepare(asked.single(first))
-    kept = 2 * len(base.states) + asked.transition_times + asked.sample_count * (1 + len(model.columns))
-    check_memory(base.settings.memory, columns.count, "instances", kept)
-    start = initial_rows(columns, base.states, asked.initial, asked.arrays(initial=True))
-    settings = settings_rows(columns, base.settings, request)
-    places = [k for k in range(columns.count) if k not in columns.refused]
-    timeline = partial(model.pipeline.timeline, values)
+    base = pipeline.prepare(request.single(first))
+    kept = 2 * len(base.states) + request.transition_times + request.sample_count * (1 + len(model.columns))
+    check_memory(base.settings.memory, len(columns.rows), "instances", kept)
+    start = np.array(initial_columns(columns, base.states, call["initial"], request.arrays(initial=True)), dtype=float)
+    options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
+    settings = _settings(columns, base.settings, options)
+    places = list(settings)
     instances = Instances(
-        settings=[settings[k] for k in places],
-        timelines=[timeline(columns.rows[k], settings[k].until) for k in places],
-        start=start[places],
-        time=asked.times(np.array([settings[k].until for k in places], dtype=float)),
+        settings=list(settings.values()),
+        timelines=[pipeline.timeline(values, columns.rows[k], settings[k].until) for k in places],
+        start=start.reshape(len(base.states), len(columns.rows)).T[places],
+        time=request.times(np.array([settings[k].until for k in places], dtype=float)),
     )
-    return Ready(model, asked, base, columns, places, instances, list(Layouts(model.program, base.states).kinds))
+    kinds = list(Layouts(model.program, base.states).kinds)
+    return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
 
 
-OUTSIDE = ("settings", "engine", "parameters", "initial")  # of what a run is asked for, these are no settings
+def _settings(columns: Columns, base: Settings, options: Options) -> dict[int, Settings]:
+    """The settings of every instance that can be run, by its number."""
+    rows = enumerate(setting_columns(options, columns))
+    kept: Mapping[int, dict[str, Any]] = {k: row for k, row in rows if k not in columns.refused}
+    if any(row[options.size] != getattr(base, options.size) for row in kept.values()):
+        raise UsageError(f"{options.size} differs between the instances of an ensemble", "give it as a number")
+    return {k: replace(base, **row) for k, row in kept.items()}
+
+
+def run_ensemble(
+    model: Model,
+    call: dict[str, Any],
+    samples: Any,
+    transition_times: int,
+    threads: int | None,
+    progress: Callable[[int, int], None] | None,
+) -> Ensemble:
+    """Run many instances of a model; see `Model.ensemble`."""
+    if threads is not None:
+        whole(threads, "threads", least=1)
+    request = EnsembleRequest.of(call, samples, transition_times)
+    return prepare_ensemble(model, request).run(threads or cores(), progress)
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """The number of cores of this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def check(asked: Mapping[str, Any], threads: int | None, transition_times: int) -> None:
-    """Refuse what an ensemble does not take."""
-    known = (*KEYS, "settings", "engine")
-    for name in asked:
-        if name == "samples" or name not in known:
-            raise UsageError(f"an ensemble has no argument '{name}'", did_you_mean(name, known))
-    if threads is not None:
-        whole(threads, "threads", least=1)
-    whole(transition_times, "transition_times", least=0)

@@ -15,7 +15,7 @@ from hsdsl.plot import GuardLine
 def guard_lines(values: Values) -> list[GuardLine]:
     """Return the level of every guard and wall that compares one state with parameters."""
     system = values.system
-    parameters = {sp.Symbol(p.name, real=True) for p in system.parameters}
+    parameters = set(system.parameter_symbols)
     found: list[tuple[str, str, sp.Expr, str]] = []
     for mode in system.modes:
         states = {sp.Symbol(name, real=True): name for name in mode.states}

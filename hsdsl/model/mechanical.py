@@ -56,7 +56,7 @@ def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
     """Return which of the two states is the position, and the numbers as expressions of parameters."""
     mode, edge = _only(system)
     symbols = [sp.Symbol(name, real=True) for name in mode.states]
-    known = {sp.Symbol(p.name, real=True) for p in system.parameters}
+    known = set(system.parameter_symbols)
     position = _position(edge, symbols, known)
     x, v = symbols[position], symbols[1 - position]
     if mode.flow[position] != v:

@@ -12,7 +12,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
 from hsdsl.model.call_cache import CallCache, call_key
-from hsdsl.model.options import Options
+from hsdsl.model.options import ARGUMENTS, Options, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean, visible
@@ -92,7 +92,7 @@ class Model:
 
     @property
     def system(self) -> HybridSystem:
-        """The mathematics; of a model seen before it is elaborated when it is asked for."""
+        """The mathematics; of a cached model it is elaborated at the first use."""
         return self.pipeline.system
 
     @property
@@ -105,9 +105,9 @@ class Model:
         """Names of all states and outputs."""
         return self.pipeline.columns
 
-    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Options:
-        """Resolve what the file, ``settings`` and a call ask for (see `hsdsl.model.options`)."""
-        return self.pipeline.resolve(settings, asked)
+    def resolve(self, settings: Mapping[str, Any] | None = None, call: Mapping[str, Any] | None = None) -> Options:
+        """Resolve the options of the file, of ``settings`` and of a call (see `hsdsl.model.options`)."""
+        return self.pipeline.resolve(settings, call)
 
     def simulate(
         self,
@@ -173,40 +173,28 @@ class Model:
         UsageError
             A name, value or combination that cannot be served.
         """
-        if outputs is not None:
-            smaller = self.only(outputs)
-
-            def known(given: Mapping[str, Any] | None) -> dict[str, Any]:
-                """Values of states that are left."""
-                gone = set(self.columns) - {"mode", *smaller.columns}
-                return {name: value for name, value in (given or {}).items() if name not in gone}
-
-            return smaller.simulate(
-                until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
-                scale=known(scale),
-                samples=samples, max_transitions=max_transitions, parameters=parameters, initial=known(initial),
-                settings=settings, engine=engine, precision=precision, watch=watch,
-            )  # fmt: skip
-        key = call_key(
+        arguments = (
             until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions,
             parameters, initial, settings, engine, precision,
         )  # fmt: skip
+        if outputs is not None:
+            return self._reduced_run(outputs, dict(zip(ARGUMENTS, arguments, strict=True)), watch)
+        key = call_key(*arguments)
         ready = self._prepared.find(key)
         if ready is None:
-            asked = dict(
-                until=until,
-                scheme=scheme,
-                method=method,
-                step=step,
-                tolerance=tolerance,
-                relaxation=relaxation,
-                scale=scale,
-                samples=samples,
-                max_transitions=max_transitions,
-            )
-            ready = self.pipeline.prepare(settings, asked, parameters or {}, initial or {}, engine, precision)
+            ready = self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True)))
             self._prepared.keep(key, ready)
         return ready.simulate(watch, self.pipeline.seconds)
+
+    def _reduced_run(
+        self, outputs: Sequence[str], asked: dict[str, Any], watch: Callable[[Progress], None] | None
+    ) -> Execution:
+        """Run the model reduced to some outputs; initial values and scales of states that are left out do not count."""
+        smaller = self.only(outputs)
+        gone = set(self.columns) - {"mode", *smaller.columns}
+        for group in ("initial", "scale"):
+            asked[group] = {name: value for name, value in overrides_of(asked, group).items() if name not in gone}
+        return smaller.simulate(**asked, watch=watch)
 
     def stream(
         self,
@@ -243,8 +231,7 @@ class Model:
         from hsdsl.model.stream import check, stream
 
         target = check(path, every, columns, asked, self)
-        plain: dict[str, Any] = {"parameters": {}, "initial": {}}
-        return stream(self.pipeline.prepare_single(plain | asked | {"engine": "c"}), target, every, columns, watch)
+        return stream(self.pipeline.prepare(asked | {"engine": "c"}), target, every, columns, watch)
 
     def ensemble(
         self,
@@ -283,12 +270,10 @@ class Model:
         UsageError
             What cannot be served: a name, arrays of different shapes, no instance that can be run.
         """
-        from hsdsl.model.ensemble import EnsembleRequest, check, cores, ready
+        from hsdsl.model.ensemble import run_ensemble
 
-        check(asked, threads, transition_times)
-        sorted_out = EnsembleRequest.of(parameters or {}, initial or {}, samples, transition_times, asked)
-        values = self.pipeline.values(FLOAT64)
-        return ready(self, values, sorted_out, self.pipeline.prepare_single).run(threads or cores(), progress)
+        call = asked | {"parameters": parameters or {}, "initial": initial or {}}
+        return run_ensemble(self, call, samples, transition_times, threads, progress)
 
     def only(self, asked: Sequence[str]) -> Model:
         """Return the model with the states and outputs asked for and those they, or any transition, depend on.
@@ -378,8 +363,8 @@ class Model:
         UsageError
             A point or a number that does not fit the model, or a point outside its mode's domain.
         """
-        from hsdsl.model.between_runs import budget_of
-        from hsdsl.model.places import distance_of_points
+        from hsdsl.model.distances import budget_of
+        from hsdsl.model.points import distance_of_points
 
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
         return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)

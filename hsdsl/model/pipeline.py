@@ -1,24 +1,25 @@
-"""What a model is made of: mathematics, program, kernels, compiled code; each is made when first needed, and once."""
+"""The stages of a model: mathematics, program, kernels, compiled code; each is made when first needed, and once."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
+from hsdsl.files import ModelFiles
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, program_cache
-from hsdsl.model.options import FILE, KEYS, Options, OptionSource, resolve
+from hsdsl.model.options import FILE, KEYS, Options, overrides_of, resolve
 from hsdsl.model.overrides import recorded
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
-from hsdsl.model.written import Written
 from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
@@ -30,28 +31,35 @@ if TYPE_CHECKING:
 
 
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
-    """Read a model file once, or take the bytes given for it, and find what was kept of them or elaborate them."""
+    """Read a model file once, or take the bytes given for it, and find its program in the cache or elaborate them."""
     began = time.perf_counter()
-    written = Written.at(path, limits, text)
-    found = program_cache.find(written)
-    if found is not None:
-        program, written = found
-        return Pipeline(None, time.perf_counter() - began, written, program)
-    system = written.elaborated()
-    return Pipeline(system, time.perf_counter() - began, written.with_files(system.files))
+    files = ModelFiles.read(path, limits, text)
+    cached = program_cache.find(files)
+    if cached is not None:
+        program, files = cached
+        return Pipeline(None, time.perf_counter() - began, files, program)
+    system = _elaborated(files)
+    return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
+
+
+def _elaborated(files: ModelFiles) -> HybridSystem:
+    from hsdsl.elaborate import elaborate_files
+
+    return elaborate_files(files).system
 
 
 class Pipeline:
-    """The parts of a checked model, and runs prepared from them; ``seconds`` is what making them took.
+    """The stages of a checked model, and runs prepared from them; ``seconds`` is the time spent on them.
 
-    Pickled they are what the model was read from, where it was read, and its program.
+    Pickled it is the model's files and its program. ``part`` has the names that it was reduced to, and ``left_out`` the
+    states that it lost by that.
     """
 
     def __init__(
         self,
         system: HybridSystem | None,
         load_seconds: float = 0.0,
-        written: Written | None = None,
+        files: ModelFiles | None = None,
         program: Program | None = None,
         part: program_cache.Part = (),
         left_out: tuple[str, ...] = (),
@@ -60,26 +68,36 @@ class Pipeline:
             self.system = system
         if program is not None:
             self.program = program
-        self._written, self._part, self._left_out = written, part, left_out
+        self._files, self._part, self._left_out = files, part, left_out
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        made = self.program  # the first thing that whoever gets it needs, and costly
+        program = self.program  # needed first by whoever gets it, and costly
         state = {key: value for key, value in vars(self).items() if key not in ("system", "_compiled", "kernels")}
-        return state | {"program": made} | ({"system": self.system} if self._written is None else {})
+        return state | {"program": program} | ({"system": self.system} if self._files is None else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _compiled=None, kernels={})
 
+    @contextmanager
+    def _stage(self) -> Generator[None]:
+        """Apply the model's limits, and count the time."""
+        began = time.perf_counter()
+        try:
+            with applied(None if self._files is None else self._files.limits):
+                yield
+        finally:
+            self.seconds["compile"] += time.perf_counter() - began
+
     @cached_property
     def system(self) -> HybridSystem:
-        """The mathematics; of a model seen before it is elaborated when it is asked for, from the bytes read then."""
+        """The mathematics; of a cached model it is elaborated from the bytes read at first."""
         from hsdsl.elaborate.slicing import only
 
-        assert self._written is not None
-        system = self._written.elaborated()
+        assert self._files is not None
+        system = _elaborated(self._files)
         for names in self._part:
             system = only(system, names)
         return system
@@ -89,107 +107,88 @@ class Pipeline:
         """The model lowered to routines, free of SymPy."""
         from hsdsl.lower import lower
 
-        began = time.perf_counter()
-        with applied(None if self._written is None else self._written.limits):
-            program = replace(lower(self.system), left_out=self._left_out)
-        self.seconds["compile"] += time.perf_counter() - began
+        system = self.system
+        with self._stage():
+            program = replace(lower(system), left_out=self._left_out)
         if program.method in (None, "auto", *METHODS):  # else it is refused, with its place
             self._keep(program, self._part)
         return program
 
     def _keep(self, program: Program, part: program_cache.Part) -> None:
-        if self._written is not None:
-            program_cache.keep(self._written, program, part)
+        if self._files is not None:
+            program_cache.keep(self._files, program, part)
 
     @property
     def columns(self) -> list[str]:
         """Names of all states and outputs."""
-        states = dict.fromkeys(name for mode in self.program.modes for name in mode.states)
-        return list(dict.fromkeys((*states, *self.program.initial_states, *self.program.outputs)))
+        return list(dict.fromkeys((*self.program.all_states, *self.program.outputs)))
 
-    def resolve(self, settings: Mapping[str, Any] | None = None, asked: Mapping[str, Any] | None = None) -> Options:
-        """Resolve what the file, ``settings`` and a call ask for."""
+    def resolve(self, settings: Mapping[str, Any] | None = None, call: Mapping[str, Any] | None = None) -> Options:
+        """Resolve the options of the file, of ``settings`` and of a call."""
         program, given = self.program, self.program.constants.names
         in_file: dict[str, Any] = {"scheme": program.scheme, "method": program.method}
-        in_file |= {key: key for key in KEYS if key in given and key != "scale"}  # their values are routines
+        in_file |= {key: key for key in KEYS if key in given}  # their values are routines
         in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
         if "sample_times" in given or "sample_count" in given:
             in_file["samples"] = "samples"
-        return resolve(
-            (OptionSource(FILE, in_file), OptionSource("--set", settings or {}), OptionSource("the call", asked or {}))
-        )
+        return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}})
 
     def values(self, arithmetic: Arithmetic) -> Values:
-        """Return the numbers of the model in an arithmetic, without overrides."""
-        program = self.program
+        """The numbers of the model in an arithmetic, without overrides."""
         if arithmetic.digits not in self.kernels:
-            began = time.perf_counter()
-            self.kernels[arithmetic.digits] = PythonKernel(program, arithmetic)
-            self.seconds["compile"] += time.perf_counter() - began
-        return Values(lambda: self.system, program, self.kernels[arithmetic.digits])
+            program = self.program
+            with self._stage():
+                self.kernels[arithmetic.digits] = PythonKernel(program, arithmetic)
+        return Values(lambda: self.system, self.program, self.kernels[arithmetic.digits])
 
     def _compile(self) -> CompiledModel:
-        """Compile the model, once: what failed is not tried again."""
+        """Compile the model, once: a failure is kept as well."""
         if self._compiled is None:
             program = self.program
-            began = time.perf_counter()
-            try:
-                with applied(None if self._written is None else self._written.limits):
+            with self._stage():
+                try:
                     self._compiled = CompiledModel(program)
-            except NoCompiler as error:
-                self._compiled = error
-            self.seconds["compile"] += time.perf_counter() - began
+                except NoCompiler as error:
+                    self._compiled = error
         if isinstance(self._compiled, NoCompiler):
             raise self._compiled
         return self._compiled
 
-    def prepare(
-        self,
-        settings: Mapping[str, Any] | None,
-        asked: Mapping[str, Any],
-        parameters: Mapping[str, Any],
-        initial: Mapping[str, Any],
-        engine: str,
-        precision: int | None,
-    ) -> Prepared:
-        """Prepare a run: everything that does not change when it is run again."""
-        request = self.resolve(settings, asked)
+    def prepare(self, asked: Mapping[str, Any]) -> Prepared:
+        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
+        parameters, initial = overrides_of(asked, "parameters"), overrides_of(asked, "initial")
+        engine, precision = asked.get("engine", "auto"), asked.get("precision")
+        options = self.resolve(asked.get("settings"), {key: asked.get(key) for key in KEYS})
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
-        with applied(None if self._written is None else self._written.limits):
-            chosen = replace(settings_of(request, values), overrides=recorded(parameters, initial, request))
+        with applied(None if self._files is None else self._files.limits):
+            settings = settings_of(options, values, recorded(parameters, initial, options))
         mode, states, x = initial_state(values, initial)
-        if request.method is None:
+        if options.method is None:
             from hsdsl.model.mechanical import one_stop
 
-            chosen = replace(chosen, one_stop=one_stop(values, x))
-        timeline = self.timeline(values, values.parameters, chosen.until)
-        if request.automatic:
-            chosen = automatic.chosen(chosen, self.program, values.kernel, timeline, mode, x)
-        chosen = following_digits(chosen, request, values.kernel.arithmetic)
-        compiled = engines.choose(engine, chosen, precision, self._compile)
-        return prepare(self.program, values.kernel, chosen, timeline, mode, states, x, compiled)
+            settings = replace(settings, one_stop=one_stop(values, x))
+        timeline = self.timeline(values, values.parameters, settings.until)
+        if options.automatic:
+            settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
+        settings = following_digits(settings, options, values.kernel.arithmetic)
+        compiled = engines.choose(engine, settings, precision, self._compile)
+        return prepare(self.program, values.kernel, settings, timeline, mode, states, x, compiled)
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
-        """Return the inputs over time."""
-        with applied(None if self._written is None else self._written.limits):
+        """The inputs over time."""
+        with applied(None if self._files is None else self._files.limits):
             return make_timeline(self.program, values.kernel, parameters, until)
 
-    def prepare_single(self, asked: dict[str, Any]) -> Prepared:
-        """Prepare a run in float64 from what a call asks, by name."""
-        settings = {key: asked.get(key) for key in KEYS}
-        engine = asked.get("engine", "auto")
-        return self.prepare(asked.get("settings"), settings, asked["parameters"], asked["initial"], engine, None)
-
     def only(self, names: tuple[str, ...]) -> Pipeline:
-        """Return the parts of the model with what these states and outputs need, this one where that is all."""
+        """The pipeline of these states and outputs with what they need; this one where that is the whole model."""
         began = time.perf_counter()
         part = (*self._part, names)
-        found = None if self._written is None else program_cache.find(self._written, part)
-        if found is not None:
-            program, written = found
+        cached = None if self._files is None else program_cache.find(self._files, part)
+        if cached is not None:
+            program, files = cached
             whole = program.left_out == self.program.left_out
-            return self if whole else Pipeline(None, self.seconds["load"], written, program, part)
+            return self if whole else Pipeline(None, self.seconds["load"], files, program, part)
         from hsdsl.elaborate.slicing import left_out, only
 
         system = only(self.system, names)
@@ -197,4 +196,4 @@ class Pipeline:
             self._keep(self.program, part)
             return self
         spent = self.seconds["load"] + time.perf_counter() - began
-        return Pipeline(system, spent, self._written, part=part, left_out=left_out(self.system, system))
+        return Pipeline(system, spent, self._files, part=part, left_out=left_out(self.system, system))

@@ -1,4 +1,4 @@
-"""Programs of models read before: kept as JSON, so that to run one again needs no SymPy.
+"""Programs of models read before, as JSON: to run one again needs no SymPy.
 
 An entry is found by the bytes of the model file, this package's own files, the limits in force and, where there are
 data files, the model's folder. It names the data files with their checksums, and is used only for the bytes that it was
@@ -24,83 +24,71 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hsdsl import cache as store
 from hsdsl import program as declared
-from hsdsl.files import DataRefused, folder_of
-from hsdsl.model.written import Written
+from hsdsl.files import DataRefused, ModelFiles
 from hsdsl.program import Program
 
 KIND = "programs"
 _PACKAGE = Path(__file__).parents[1]
-_READERS = (
-    "files",
-    "source",
-    "schema",
-    "expression",
-    "elaborate",
-    "lower",
-    "model",
-)  # what a program depends on, beside files
+# what a program depends on, beside the modules of the package itself
+_READERS = ("files", "source", "schema", "expression", "elaborate", "lower", "model")
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 Row = list[Any]
+Part = tuple[tuple[str, ...], ...]  # names that a model is reduced to, and then those that the rest is reduced to
 
 
-Part = tuple[tuple[str, ...], ...]  # names of states and outputs asked for, and then of those of what is left
-
-
-def key_of(written: Written, part: Part = ()) -> str:
-    """Return the name of an entry; where there are data files, copies in two folders have one each."""
-    folder = os.fsencode(folder_of(written.path).resolve()) if written.files != {} else b""
-    return store.key_of(written.text, _fingerprint(), repr(written.limits), folder, repr(part))
+def key_of(files: ModelFiles, part: Part = ()) -> str:
+    """The name of an entry; where there are data files, copies in two folders have one each."""
+    folder = os.fsencode(files.folder.resolve()) if files.data != {} else b""
+    return store.key_of(files.text, _fingerprint(), repr(files.limits), folder, repr(part))
 
 
 @cache
 def _fingerprint() -> str:
-    """What tells this package's files from those of another version; to hash them would take as long as to use them."""
-    return "\n".join(sorted(_described(_PACKAGE, *(_PACKAGE / name for name in _READERS))))
+    """Size and time of this package's files, which differ between versions; hashing them takes longer than loading."""
+
+    def described() -> Iterator[str]:
+        for folder in (_PACKAGE, *(_PACKAGE / name for name in _READERS)):
+            with os.scandir(folder) as entries:
+                for entry in (entry for entry in entries if entry.name.endswith(".py")):
+                    yield f"{entry.path} {entry.stat().st_size} {entry.stat().st_mtime_ns}"
+
+    return "\n".join(sorted(described()))
 
 
-def _described(*folders: Path) -> Iterator[str]:
-    for folder in folders:
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                if entry.name.endswith(".py"):
-                    status = entry.stat()
-                    yield f"{entry.path} {status.st_size} {status.st_mtime_ns}"
+def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | None:
+    """The program of a model read before, or of a part of it, and all bytes that it was made from.
 
-
-def find(written: Written, part: Part = ()) -> tuple[Program, Written] | None:
-    """Return the program of a model read before, or of a part of it, beside all that it was made from.
-
-    None where there is none, or where a data file is another one by now or breaks a rule.
+    None where there is none, or where a data file has changed or breaks a rule.
     """
-    for supposed in (written.with_files({}), written) if written.files is None else (written,):
+    for supposed in (files.with_data({}), files) if files.data is None else (files,):
         entry = store.find(KIND, key_of(supposed, part))
         with suppress(OSError, ValueError, KeyError, TypeError, IndexError, RecursionError, DataRefused):
             if entry is not None:
-                return _found(json.loads(entry.read_bytes()), written)
+                return _verified(json.loads(entry.read_bytes()), files)
     return None
 
 
-def _found(entry: dict[str, Any], written: Written) -> tuple[Program, Written]:
+def _verified(entry: dict[str, Any], files: ModelFiles) -> tuple[Program, ModelFiles]:
     """Read an entry that was made from just these bytes; ValueError where it was made from others."""
-    complete = written.with_files({name: written.data(name) for name in entry["files"]})
-    if any(_checksum(complete.data(name)) != checksum for name, checksum in entry["files"].items()):
+    complete = files.with_data({name: files.content(name) for name in entry["files"]})
+    if any(_checksum(complete.content(name)) != checksum for name, checksum in entry["files"].items()):
         raise ValueError("another data file")
-    program = replace(_read(entry["rows"]), path=written.path)
+    program = replace(_read(entry["rows"]), path=files.path)
     if program.digest != complete.digest:
         raise ValueError("another model")
     return program, complete
 
 
-def keep(written: Written, program: Program, part: Part = ()) -> None:
-    """Keep a program; nothing happens where nothing can be kept."""
-    files = {name: _checksum(content) for name, content in (written.files or {}).items()}
-    text = json.dumps({"files": files, "rows": _rows(program)}, separators=(",", ":"))
+def keep(files: ModelFiles, program: Program, part: Part = ()) -> None:
+    """Keep a program, where the cache can be written."""
+    checksums = {name: _checksum(content) for name, content in (files.data or {}).items()}
+    text = json.dumps({"files": checksums, "rows": _rows(program)}, separators=(",", ":"))
+
+    def write(target: Path) -> None:
+        target.write_text(text)
+
     with suppress(OSError):
-        store.keep(KIND, key_of(written, part), ".json", lambda target: _write(target, text))
-
-
-def _write(target: Path, text: str) -> None:
-    target.write_text(text)
+        store.keep(KIND, key_of(files, part), ".json", write)
 
 
 def _checksum(data: bytes) -> str:
@@ -108,7 +96,7 @@ def _checksum(data: bytes) -> str:
 
 
 def _rows(program: Program) -> list[Row]:
-    """Turn a program into rows of what JSON has: the name of a piece's type and its fields, behind what it names."""
+    """A program as rows of JSON data: the name of a piece's type and its fields, after the rows that they name."""
     rows: list[Row] = []
     numbers: dict[str, int] = {}
 
@@ -134,42 +122,42 @@ def _read(rows: list[Row]) -> Program:
     pieces: list[Any] = []
     for name, *row in rows:
         kind = _PIECES[name]
-        pieces.append(kind(*(read(item, pieces) for read, item in zip(_readers(kind), row, strict=True))))
+        pieces.append(kind(*(read(item, pieces) for read, item in zip(_decoders(kind), row, strict=True))))
     return _checked(Program)(pieces[-1], pieces)
 
 
-Reader = Callable[[Any, list[Any]], Any]
+Decoder = Callable[[Any, list[Any]], Any]
 
 
 @cache
-def _readers(kind: Any) -> tuple[Reader, ...]:
+def _decoders(kind: Any) -> tuple[Decoder, ...]:
     hints = get_type_hints(kind)
-    return tuple(_reader(hints[field.name]) for field in fields(kind))
+    return tuple(_decoder(hints[field.name]) for field in fields(kind))
 
 
 @cache
-def _reader(kind: Any) -> Reader:
-    """Make the function that turns JSON back into a type; it raises ValueError or TypeError where it does not fit."""
+def _decoder(kind: Any) -> Decoder:
+    """The function that turns JSON back into a type; it raises ValueError or TypeError where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if is_dataclass(kind):
         piece = _checked(kind)  # type: ignore[arg-type]
         return lambda value, pieces: piece(pieces[value], pieces)
     if origin is tuple and arguments[-1] is Ellipsis:
-        one = _reader(arguments[0])
+        one = _decoder(arguments[0])
         return lambda value, pieces: tuple([one(item, pieces) for item in value])
     if origin in (Union, types.UnionType):
         (other,) = (a for a in arguments if a is not type(None))
-        given = _reader(other)
+        given = _decoder(other)
         return lambda value, pieces: None if value is None else given(value, pieces)
     if kind is Fraction:
         return lambda value, _: Fraction(value)
     return _checked(dict if origin is dict else str if origin is Literal else kind)
 
 
-def _checked(kind: type) -> Reader:
+def _checked(kind: type) -> Decoder:
     def read(value: Any, _: list[Any]) -> Any:
         if type(value) is not kind:
-            raise TypeError(f"{kind.__name__} expected")
+            raise TypeError(f"expected {kind.__name__}, got {type(value).__name__}")
         return value
 
     return read

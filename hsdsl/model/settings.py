@@ -1,7 +1,8 @@
-"""The numbers of a run: what it is asked, evaluated with the parameters it has, and checked."""
+"""Numbers of a run's settings: its options, evaluated with the parameters it has, and checked."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from operator import index
@@ -10,122 +11,142 @@ from typing import Any, SupportsIndex
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
-from hsdsl.integrators import TaylorMethod
+from hsdsl.integrators import AUTO, Method, TaylorMethod
 from hsdsl.limits import current
-from hsdsl.model.options import DEFAULT, FILE, SCALE, Option, Options, check_digits, check_smooth, check_tolerance
-from hsdsl.model.values import Values, samples
+from hsdsl.model.options import DEFAULT, FILE, SCALE, Options
+from hsdsl.model.values import Columns, Values
 from hsdsl.names import did_you_mean
+from hsdsl.program import Program
 from hsdsl.simulate import Settings
+from hsdsl.simulate.stops import show
 
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
 
-def settings_of(request: Options, values: Values) -> Settings:
-    """Turn what a run is asked into numbers, and refuse those that make no run.
+def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) -> Settings:
+    """The settings of a single run; ``overrides`` are recorded in them.
 
     Raises
     ------
     UsageError
         A number that is out of its range, or a method that cannot serve this model.
     """
-
-    def number(key: str) -> Number:
-        asked = request.values[key]
-        if asked.origin == FILE:
-            return values.constant(key)[0]
-        return values.number(asked.value, key)
-
-    def positive(key: str) -> Number:
-        value = number(key)
-        if not value > 0:
-            raise UsageError(f"{key} must be positive, not {value}")
-        return value
-
-    until = number("until")
-    if until < 0:
-        raise UsageError(f"until must not be negative, not {until}")
-    most = number("max_transitions")
-    if most < 0 or most != int(most):
-        raise UsageError(f"max_transitions must be a whole number, not {most}")
-    step = positive("step") if request.size == "step" else None
+    arithmetic = values.kernel.arithmetic
+    numbers: dict[str, Any]
+    (numbers,) = setting_columns(options, values.alone())
+    numbers = {"step": None, "tolerance": None} | numbers
+    until, step, tolerance = numbers["until"], numbers["step"], numbers["tolerance"]
     if step is not None and until > 0 and until + step == until:
         raise UsageError(f"a step of {step} is lost in round-off beside until = {until}", "take a larger step")
-    check_digits(request.method, values.kernel.arithmetic)
-    check_smooth(request.method, values.program)
-    tolerance = positive("tolerance") if request.size == "tolerance" else None
-    check_tolerance(tolerance, values.kernel.arithmetic)
-    relaxation = positive("relaxation")
-    if request.values["relaxation"].origin == "default":
-        relaxation = least_relaxation(relaxation, until)
-    method = request.method
+    check_method(options.method, values.program, arithmetic)
+    if tolerance is not None and tolerance < 2 * arithmetic.unit:
+        kind = f"{arithmetic.digits} digits" if arithmetic.digits else "float64"
+        raise UsageError(
+            f"a tolerance of {float(tolerance):.3g} is below the precision of {kind}, {float(2 * arithmetic.unit):.2g}",
+            "take a larger tolerance, or more digits by --precision",
+        )
+    method = options.method
     if isinstance(method, TaylorMethod):
-        method = method.for_tolerance(tolerance, values.kernel.arithmetic)
+        method = method.for_tolerance(tolerance, arithmetic)
     return Settings(
-        scheme=request.scheme,
+        scheme=options.scheme,
         method=method,
-        step=step,
-        tolerance=tolerance,
-        relaxation=relaxation,
-        until=until,
-        max_transitions=int(most),
-        scale=_scale(request, values),
-        samples=_samples(request, values),
+        **numbers,
+        samples=_samples(options, values),
+        overrides=overrides,
         memory=current().memory,
     )
 
 
-def _scale(request: Options, values: Values) -> dict[str, Number]:
-    """The given sizes of states."""
-    program = values.program
-    states = dict.fromkeys((*(s for mode in program.modes for s in mode.states), *program.initial_states))
-    in_file = dict(zip(program.scaled_states, values.constant("scale") if values.has("scale") else (), strict=True))
-    sizes: dict[str, Number] = {}
-    for key, asked in request.values.items():
-        name = key.removeprefix(SCALE)
-        if name == key:
-            continue
-        if name not in states:
-            raise UsageError(f"{key}: the model has no state '{name}'", did_you_mean(name, [*states]))
-        size = in_file[name] if asked.origin == FILE else values.number(asked.value, key)
-        if not size > 0:
-            raise UsageError(f"{key} must be positive, not {size}")
-        sizes[name] = size
-    return sizes
+def setting_columns(options: Options, columns: Columns) -> list[dict[str, Any]]:
+    """The numbers of the settings of every instance, by their names in `Settings`."""
+    names = ["until", "max_transitions", "relaxation", options.size]
+    names += [name for name in options.values if name.startswith(SCALE)]
+    table = {name: _column(options, columns, name) for name in names}
+    by_default = options.values["relaxation"].origin == DEFAULT
+    rows: list[dict[str, Any]] = []
+    for i, numbers in enumerate(zip(*table.values(), strict=True)):
+        row: dict[str, Any] = dict(zip(table, numbers, strict=True))
+        if why := _refusal(row, options.size) if i not in columns.refused else None:
+            columns.refuse(i, why)
+        if i not in columns.refused:
+            row["max_transitions"] = int(row["max_transitions"])
+            row["relaxation"] = least_relaxation(row["relaxation"], row["until"]) if by_default else row["relaxation"]
+        row["scale"] = {name.removeprefix(SCALE): row.pop(name) for name in names[4:]}
+        rows.append(row)
+    return rows
 
 
-def following_digits(settings: Settings, request: Options, arithmetic: Arithmetic) -> Settings:
-    """Return the settings with a default tolerance that follows the digits of the numbers.
+def _column(options: Options, columns: Columns, name: str) -> Sequence[Number]:
+    option, program = options.values[name], columns.values.program
+    state = name.removeprefix(SCALE)
+    if state != name and state not in program.all_states:
+        raise UsageError(f"{name}: the model has no state '{state}'", did_you_mean(state, program.all_states))
+    if option.origin != FILE:
+        return columns.expression(option.value, name)
+    place = program.scaled_states.index(state) if state != name else 0
+    return [row[place] for row in columns.constant("scale" if state != name else name, name)]
+
+
+def _refusal(row: Mapping[str, Any], size: str) -> str | None:
+    if row["until"] < 0:
+        return f"until must not be negative, not {row['until']}"
+    most = row["max_transitions"]
+    if most < 0 or most != int(most):
+        return f"max_transitions must be a whole number, not {most}"
+    positive = (name for name in row if name in (size, "relaxation") or name.startswith(SCALE))
+    return next((f"{name} must be positive, not {row[name]}" for name in positive if not row[name] > 0), None)
+
+
+def following_digits(settings: Settings, options: Options, arithmetic: Arithmetic) -> Settings:
+    """The settings with a default tolerance that follows the digits of the numbers.
 
     A method of fixed order would need steps shorter by as many orders of magnitude: with one the tolerance stays.
     """
-    left_open = request.size == "tolerance" and request.values["tolerance"].origin == DEFAULT
+    left_open = options.size == "tolerance" and options.values["tolerance"].origin == DEFAULT
     if not left_open or arithmetic.digits is None or not isinstance(settings.method, TaylorMethod):
         return settings
     tolerance = arithmetic.constant(Fraction(1, 10 ** kept_digits(arithmetic.digits)))
     return replace(settings, tolerance=tolerance, method=settings.method.for_tolerance(tolerance, arithmetic))
 
 
-def _samples(request: Options, values: Values) -> int | tuple[Number, ...] | None:
-    asked = request.values.get("samples")
-    if asked is None:
+def _samples(options: Options, values: Values) -> int | tuple[Number, ...] | None:
+    """The times a run is sampled at, or how many equally spaced ones."""
+    option = options.values.get("samples")
+    if option is None:
         return None
-    found = _sampled(asked, values)
-    if isinstance(found, int):
-        width = max(len(mode.states) for mode in values.program.modes)
-        check_memory(current().memory, found, "samples", 1 + width + len(values.program.outputs))
-    return found
-
-
-def _sampled(asked: Option, values: Values) -> int | tuple[Number, ...]:
-    if asked.origin != FILE:
-        return samples(values, asked.value)
-    if values.has("sample_times"):
+    given = option.value
+    if option.origin == FILE and values.has("sample_times"):
         return values.constant("sample_times")
-    return samples(values, values.constant("sample_count")[0])
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return tuple(values.number(t, "samples") for t in given)  # pyright: ignore[reportUnknownVariableType]
+    count = values.constant("sample_count")[0] if option.origin == FILE else values.number(given, "samples")
+    if count != int(count) or count < 2:
+        raise UsageError(f"samples must be a list of times or a whole number of at least 2, not {show(count)}")
+    width = max(len(mode.states) for mode in values.program.modes)
+    check_memory(current().memory, int(count), "samples", 1 + width + len(values.program.outputs))
+    return int(count)
+
+
+def check_method(method: Method | None, program: Program, arithmetic: Arithmetic) -> None:
+    """Refuse a method that lacks digits, and Taylor series of a flow that has none everywhere."""
+    if method is not None and method.digits is not None and (arithmetic.digits or 0) > method.digits:
+        raise UsageError(
+            f"the coefficients of method '{method.name}' are known to {method.digits} digits, too few for a precision "
+            f"of {arithmetic.digits}",
+            f"use method '{AUTO}', whose coefficients are exact",
+        )
+    kinked = next((mode.name for mode in program.modes if mode.tape is None), None)
+    if isinstance(method, TaylorMethod) and kinked is not None:
+        raise UsageError(
+            f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max or floor "
+            "of a state",
+            f"use method '{AUTO}'",
+        )
 
 
 def whole(value: Any, name: str, least: int) -> int:
-    """Return an argument that must be a whole number.
+    """An argument that must be a whole number.
 
     Raises
     ------
@@ -140,28 +161,16 @@ def whole(value: Any, name: str, least: int) -> int:
 
 
 def check_memory(most: int, count: int, what: str, columns: int) -> None:
-    """Refuse more numbers than may be kept.
-
-    Raises
-    ------
-    UsageError
-        So many of ``what``, each with so many numbers, take more than ``most`` bytes.
-    """
-    wanted = 8 * count * columns
-    if wanted > most:
-        sentence = f"{count:.6g} {what} of {columns:.6g} numbers take {wanted:.3g} bytes"
-        hint = f"allow more with --limit memory={10 * wanted:.0e}"
+    """Refuse more numbers than ``most`` bytes hold: so many of ``what``, each with so many numbers."""
+    needed = 8 * count * columns
+    if needed > most:
+        sentence = f"{count:.6g} {what} of {columns:.6g} numbers take {needed:.3g} bytes"
+        hint = f"allow more with --limit memory={10 * needed:.0e}"
         raise UsageError(f"{sentence}, and the limit 'memory' is {most:.3g}", hint)
 
 
 def arithmetic_of(precision: int | None) -> Arithmetic:
-    """Return the arithmetic of a run: float64, or mpmath's with so many decimal digits.
-
-    Raises
-    ------
-    UsageError
-        Too few digits, or too many.
-    """
+    """The arithmetic of a run: float64, or mpmath's with so many decimal digits."""
     if precision is None:
         return FLOAT64
     if not LEAST_DIGITS <= precision <= MOST_DIGITS:

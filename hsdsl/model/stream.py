@@ -15,9 +15,8 @@ import numpy as np
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Samples, Stop
 from hsdsl.execution.samples import split
-from hsdsl.model.options import KEYS
+from hsdsl.model.options import check_arguments
 from hsdsl.model.settings import whole
-from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate.layouts import Layouts
 from hsdsl.simulate.prepared import Prepared, Watch
@@ -68,7 +67,7 @@ class Rows:
         write: Callable[[bytes], None],
     ) -> None:
         self._program, self._every, self._columns, self._write = program, every, columns, write
-        self._names = tuple(dict.fromkeys((*states, *(name for mode in program.modes for name in mode.states))))
+        self._names = tuple(dict.fromkeys((*states, *program.all_states)))
         self._layouts = Layouts(program, states)
         self._arc = 0, 0, 0  # the last one's mode, jump and layout
         self._held: dict[str, Array] | None = None  # the last row: whether a jump follows it is not known yet
@@ -136,10 +135,7 @@ def check(
     UsageError
         An argument there is not, a name that does not end in .csv, a column the model does not have.
     """
-    known = (*KEYS, "settings", "parameters", "initial", "engine")
-    for name in asked:
-        if name == "samples" or name not in known:
-            raise UsageError(f"a streamed run has no argument '{name}'", did_you_mean(name, known))
+    check_arguments(asked, "a streamed run", without=("samples", "precision"))
     if asked.get("engine") == "python":
         raise UsageError("only the compiled engine streams", "leave out the engine, or what is to be streamed")
     target = Path(path)

@@ -1,10 +1,13 @@
-"""Overrides: values a call or `--set` gives, as numbers or as expressions of parameters."""
+"""Numbers of a model: parameters with overrides, constants and initial states, of one run or of many instances.
+
+Each number of an instance is computed by the routine of a single run, and is the same to the last bit.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -20,19 +23,18 @@ if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 _NUMBER = re.compile(r"-?[0-9]{1,30}(\.[0-9]{0,30})?([eE][+-]?[0-9]{1,2})?")  # needs no parsing
+Row = tuple[Number, ...]
+Routine = Callable[..., Sequence[Number]]
 
 
 @dataclass(frozen=True)
 class Values:
-    """A model's numbers for one run: its kernel, and parameter values with overrides applied.
-
-    ``read`` gives the mathematics, which a run of a model seen before does not have at hand.
-    """
+    """A model's kernel, and its parameters' values; ``read`` gives the mathematics, which a cached model lacks."""
 
     read: Callable[[], HybridSystem]
     program: Program
     kernel: PythonKernel
-    parameters: Sequence[Number] = ()
+    parameters: Row = ()
 
     @property
     def system(self) -> HybridSystem:
@@ -40,7 +42,7 @@ class Values:
         return self.read()
 
     def number(self, value: Any, where: str) -> Number:
-        """Turn a number or an expression of parameters into a finite number.
+        """The finite number of a number or of an expression of parameters.
 
         Raises
         ------
@@ -58,21 +60,19 @@ class Values:
 
     def _evaluate(self, value: Any, where: str) -> Number:
         arithmetic = self.kernel.arithmetic
-        if isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
-            return arithmetic.constant(Fraction(value.strip()))
-        if isinstance(value, str):
+        if isinstance(value, str) and not _NUMBER.fullmatch(value.strip()):
             return self.routine(value, where, len(self.parameters))(*self.parameters)[0]
         if isinstance(value, bool) or value is None:
-            raise UsageError(f"{where}: a number or an expression is wanted, not {value}")
+            raise UsageError(f"{where}: expected a number or an expression, got {value}")
         if hasattr(value, "_mpf_"):
             return arithmetic.zero + value if arithmetic.name == "mpmath" else float(value)
         try:
             return arithmetic.constant(Fraction(value))
         except (TypeError, ValueError, OverflowError):
-            raise UsageError(f"{where}: a finite number or an expression is wanted, not {value!r}") from None
+            raise UsageError(f"{where}: expected a finite number or an expression, got {value!r}") from None
 
-    def routine(self, value: Any, where: str, known: int) -> Callable[..., Sequence[Number]]:
-        """Return a function of the first ``known`` parameters for a number or an expression of them."""
+    def routine(self, value: Any, where: str, known: int) -> Routine:
+        """A function of the first ``known`` parameters for a number or an expression of them."""
         if not isinstance(value, str) or _NUMBER.fullmatch(value.strip()):
             number = self.number(value, where)
             return lambda *_: (number,)
@@ -85,37 +85,105 @@ class Values:
         missing = (arithmetic.zero,) * (len(names) - known)
         return lambda *parameters: routine(*parameters, *missing)
 
-    def constant(self, name: str) -> tuple[Number, ...]:
-        """Evaluate one of the program's constants; its numbers must be finite."""
-        values = self.kernel.constant(name, self.parameters)
-        if not all(map(self.kernel.arithmetic.isfinite, values)):
-            raise UsageError(f"{name} has no finite value with these parameters")
-        return values
+    def constant(self, name: str) -> Row:
+        """One of the program's constants; its numbers must be finite."""
+        return self.alone().constant(name, name)[0]
 
     def has(self, name: str) -> bool:
         """Whether the file gives this constant."""
         return self.kernel.has_constant(name)
 
+    def alone(self) -> Columns:
+        """A table of one instance, which refuses by an exception."""
+        return Columns(self, [self.parameters], strict=True)
+
+
+@dataclass
+class Columns:
+    """Numbers of instances; ``rows`` has their parameters.
+
+    ``refused`` has the instances without numbers, and why; with ``strict`` a refusal is an exception.
+    """
+
+    values: Values
+    rows: list[Row]
+    refused: dict[int, str] = field(default_factory=dict[int, str])
+    strict: bool = False
+
+    def refuse(self, instance: int, why: str) -> None:
+        """Note why an instance has no numbers; the first reason counts."""
+        if self.strict:
+            raise UsageError(why)
+        self.refused.setdefault(instance, why)
+
+    def of(self, routine: Routine, what: str) -> list[Row]:
+        """The values of a routine of the parameters, of every instance."""
+        try:
+            rows = [tuple(routine(*row)) for row in self.rows]
+        except DOMAIN_ERRORS:
+            attempts = [_attempt(routine, row) for row in self.rows]
+            width = max(map(len, attempts))
+            rows = [row or (self.values.kernel.arithmetic.functions["nan"],) * max(1, width) for row in attempts]
+        isfinite = self.values.kernel.arithmetic.isfinite
+        for i, numbers in enumerate(rows):
+            if not all(map(isfinite, numbers)):
+                self.refuse(i, f"{what} has no finite value with these parameters")
+        return rows
+
+    def constant(self, name: str, what: str) -> list[Row]:
+        """One of the program's constants, of every instance."""
+        return self.of(lambda *row: self.values.kernel.constant(name, row), what)
+
+    def expression(self, value: Any, what: str) -> list[Number]:
+        """A number or an expression of all parameters, of every instance."""
+        routine = self.values.routine(value, what, len(self.values.program.parameters))
+        return [row[0] for row in self.of(routine, what)]
+
+    def given(self, column: Sequence[Number], what: str) -> list[Number]:
+        """The numbers that a call gives to the instances."""
+        isfinite = self.values.kernel.arithmetic.isfinite
+        for i in (i for i, value in enumerate(column) if not isfinite(value)):
+            self.refuse(i, f"{what}: {column[i]} has no finite value")
+        return list(column)
+
+
+def _attempt(routine: Routine, row: Row) -> Row:
+    try:
+        return tuple(routine(*row))
+    except DOMAIN_ERRORS:
+        return ()
+
 
 def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
-    """Evaluate the parameters in file order, derived ones anew, and check the bounds the file gives them."""
+    """The values of a single run with these overrides."""
+    columns = Columns(values, [()], strict=True)
+    evaluate_parameters(columns, overrides, {})
+    return replace(values, parameters=columns.rows[0])
+
+
+def evaluate_parameters(columns: Columns, shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]) -> None:
+    """Evaluate the parameters in file order, derived ones anew, and check the bounds of the file."""
+    values = columns.values
     program = values.program
-    for name in overrides:
+    for name in (*shared, *varied):
         if name not in program.parameters:
             raise UsageError(f"the model has no parameter '{name}'", _elsewhere(name, program))
-    found: list[Number] = []
-    earlier = Values(values.read, program, values.kernel, found)
     for i, name in enumerate(program.parameters):
-        if name in overrides:
-            found.append(earlier.number(overrides[name], f"parameter {name}"))
-            continue
-        try:
-            found.append(earlier.constant(f"parameter_{i}")[0])
-        except DOMAIN_ERRORS:
-            raise UsageError(f"parameter {name} has no finite value with these parameters") from None
-    values = replace(values, parameters=tuple(found))
-    _check_bounds(values)
-    return values
+        what = f"parameter {name}"
+        if name in varied:
+            column = columns.given(varied[name], what)
+        elif name in shared:
+            column = [row[0] for row in columns.of(values.routine(shared[name], what, i), what)]
+        else:
+            column = [row[0] for row in columns.constant(f"parameter_{i}", what)]
+        columns.rows = [(*row, number) for row, number in zip(columns.rows, column, strict=True)]
+    for i, name in enumerate(program.parameters):
+        for kind, sign in (("minimum", 1), ("maximum", -1)):
+            bounds = columns.constant(f"{kind}_{i}", f"the {kind} of {name}") if values.has(f"{kind}_{i}") else ()
+            for k, (bound,) in enumerate(bounds):
+                if sign * (columns.rows[k][i] - bound) < 0:
+                    value = show(columns.rows[k][i])
+                    columns.refuse(k, f"parameter {name} = {value} is beyond its {kind} {show(bound)}")
 
 
 def _elsewhere(name: str, program: Program) -> str | None:
@@ -127,52 +195,51 @@ def _elsewhere(name: str, program: Program) -> str | None:
     return did_you_mean(name, program.parameters)
 
 
-def _check_bounds(values: Values) -> None:
-    for i, (name, value) in enumerate(zip(values.program.parameters, values.parameters, strict=True)):
-        for kind, sign in (("minimum", 1), ("maximum", -1)):
-            if values.has(f"{kind}_{i}"):
-                bound = values.constant(f"{kind}_{i}")[0]
-                if sign * (value - bound) < 0:
-                    raise UsageError(f"parameter {name} = {show(value)} is beyond its {kind} {show(bound)}")
+def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...], Row]:
+    """The initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
+    index, states = initial_layout(values, overrides)
+    columns = initial_columns(values.alone(), states, overrides, {})
+    return index, states, tuple(column[0] for column in columns)
 
 
-def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...], tuple[Number, ...]]:
-    """Return the initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
-    program = values.program
-    names = [mode.name for mode in program.modes]
-    wanted = overrides.get("mode")
-    if wanted is not None and wanted not in names:
-        raise UsageError(f"the model has no mode '{wanted}'", did_you_mean(str(wanted), names))
-    index = program.initial_mode if wanted is None else names.index(wanted)
-    mode = program.modes[index]
-    given = dict(zip(program.initial_states, values.constant("initial"), strict=True))
-    free = mode.final and not mode.states
-    states = mode.states if not free else tuple(given)
-    for name in overrides:
-        if name != "mode" and name not in states:
-            raise UsageError(f"mode {mode.name} has no state '{name}'", did_you_mean(name, states))
-    for name, value in overrides.items():
-        if name != "mode":
-            given[name] = values.number(value, f"initial.{name}")
-    if missing := [name for name in states if name not in given]:
-        raise UsageError(
-            f"mode {mode.name} starts with {', '.join(states)}, but no value is given for {', '.join(missing)}",
-            f"--set initial.{missing[0]}=VALUE",
-        )
-    return index, states, tuple(given[name] for name in states)
-
-
-def samples(values: Values, asked: Any) -> int | tuple[Number, ...]:
-    """Return the times a run is sampled at, or how many equally spaced ones.
+def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
+    """The initial mode's index and its states, which must all have a value.
 
     Raises
     ------
     UsageError
-        Neither a list of times nor a whole number of at least 2.
+        The mode does not exist, lacks one of the states, or has one without a value.
     """
-    if isinstance(asked, Sequence) and not isinstance(asked, str):
-        return tuple(values.number(t, "samples") for t in asked)  # pyright: ignore[reportUnknownVariableType]
-    count = values.number(asked, "samples")
-    if count != int(count) or count < 2:
-        raise UsageError(f"samples must be a list of times or a whole number of at least 2, not {show(count)}")
-    return int(count)
+    program = values.program
+    names = [mode.name for mode in program.modes]
+    given = overrides.get("mode")
+    if given is not None and given not in names:
+        raise UsageError(f"the model has no mode '{given}'", did_you_mean(str(given), names))
+    index = program.initial_mode if given is None else names.index(given)
+    mode = program.modes[index]
+    states = program.initial_states if mode.final and not mode.states else mode.states
+    for name in overrides:
+        if name != "mode" and name not in states:
+            raise UsageError(f"mode {mode.name} has no state '{name}'", did_you_mean(name, states))
+    if missing := [name for name in states if name not in (*program.initial_states, *overrides)]:
+        raise UsageError(
+            f"mode {mode.name} starts with {', '.join(states)}, but no value is given for {', '.join(missing)}",
+            f"--set initial.{missing[0]}=VALUE",
+        )
+    return index, states
+
+
+def initial_columns(
+    columns: Columns, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
+) -> list[Sequence[Number]]:
+    """The initial value of each state, of every instance."""
+    in_file = columns.constant("initial", "initial")
+    numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False))
+    found: list[Sequence[Number]] = []
+    for name in states:
+        what = f"initial.{name}"
+        if name in varied:
+            found.append(columns.given(varied[name], what))
+        else:
+            found.append(columns.expression(shared[name], what) if name in shared else numbers[name])
+    return found

@@ -1,9 +1,10 @@
-"""Who runs the instances of an ensemble: threads over the compiled loop, or the Python loop one after the other."""
+"""Runs of the instances of an ensemble: by threads over the compiled loop, or one after the other in Python."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,48 +59,48 @@ def run_compiled(
 
 def run_in_turn(
     runs: Sequence[Callable[[], Execution]],
-    instances: Instances,
-    kept: Kept,
-    names: tuple[str, ...],
-    kinds: list[tuple[str, ...]],
-    modes: list[str],
+    record: Callable[[int, Execution], None],
     progress: Progress | None,
 ) -> None:
-    """Run all instances one after the other; at Ctrl-C what is done is kept."""
+    """Run all instances one after the other and record each; at Ctrl-C those that are done are kept."""
     try:
         for i, run in enumerate(runs):
             execution = run()
             if execution.stop.reason == "interrupted":
                 return
-            _keep(execution, i, instances, kept, names, kinds, modes)
+            record(i, execution)
             if progress is not None:
                 progress(i + 1, len(runs))
     except KeyboardInterrupt:
         return
 
 
-def _keep(
-    execution: Execution,
-    i: int,
-    instances: Instances,
-    kept: Kept,
-    names: tuple[str, ...],
-    kinds: list[tuple[str, ...]],
-    modes: list[str],
-) -> None:
-    last, n = execution.arcs[-1], len(execution.arcs[-1].states)
-    kept.stop[i] = execution.stop.reason
-    kept.mode[i] = modes.index(last.mode)
-    kept.kind[i] = kinds.index(last.states)
-    kept.transitions[i] = len(execution.transitions)
-    kept.ended[i] = execution.times[-1]
-    kept.final[i, :n] = execution.values[-1, :n]
-    kept.outputs[i] = execution.outputs[-1]
-    times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
-    kept.crossed[i, : len(times)] = times
-    inside = instances.time[i] <= execution.times[-1] + 1e-12 * abs(float(execution.times[-1]))
-    samples = execution.sample(instances.time[i][inside])
-    for k, name in enumerate(names):
-        if name in samples.states:
-            kept.states[i, k, np.flatnonzero(inside)] = samples[name]
-    kept.results[i, np.flatnonzero(inside)] = samples.output_columns
+@dataclass(frozen=True, eq=False)
+class Recorder:
+    """Arrays for executions; ``kinds`` are the layouts of states, ``modes`` and ``names`` those of the model."""
+
+    instances: Instances
+    kept: Kept
+    names: tuple[str, ...]
+    kinds: list[tuple[str, ...]]
+    modes: list[str]
+
+    def __call__(self, i: int, execution: Execution) -> None:
+        """Record the execution of an instance."""
+        kept, last = self.kept, execution.arcs[-1]
+        n, end = len(last.states), execution.times[-1]
+        kept.stop[i] = execution.stop.reason
+        kept.mode[i] = self.modes.index(last.mode)
+        kept.kind[i] = self.kinds.index(last.states)
+        kept.transitions[i] = len(execution.transitions)
+        kept.ended[i] = end
+        kept.final[i, :n] = execution.values[-1, :n]
+        kept.outputs[i] = execution.outputs[-1]
+        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+        kept.crossed[i, : len(times)] = times
+        inside = np.flatnonzero(self.instances.time[i] <= end + 1e-12 * abs(float(end)))
+        samples = execution.sample(self.instances.time[i][inside])
+        for k, name in enumerate(self.names):
+            if name in samples.states:
+                kept.states[i, k, inside] = samples[name]
+        kept.results[i, inside] = samples.output_columns

@@ -2,6 +2,8 @@
 
 from hsdsl.schema.documents import (
     ExperimentDocument,
+    InputFile,
+    InputSamples,
     ModeDocument,
     ModelDocument,
     ParameterEntry,
@@ -9,7 +11,6 @@ from hsdsl.schema.documents import (
     ReferenceTransitionDocument,
     TransitionDocument,
 )
-from hsdsl.schema.inputs import InputFile, InputSamples
 from hsdsl.schema.jsonschema import json_schema
 from hsdsl.schema.read import read
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, LiteralString, TypeVar, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainValidator, WithJsonSchema, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from hsdsl.expression.scope import RESERVED
@@ -175,9 +175,24 @@ def shaped_as_list(value: Any) -> Any:
     return value  # pyright: ignore[reportUnknownVariableType]
 
 
-def empty() -> dict[Any, Any]:
-    """What a mapping is where the file says nothing."""
-    return {}
+def required(description: str, *examples: Any) -> Any:
+    """A key that must be there."""
+    return Field(description=description, examples=list(examples))
+
+
+def optional(description: str, *examples: Any, default: Any = None, alias: str | None = None) -> Any:
+    """A key with a default."""
+    return Field(default, description=description, examples=list(examples), alias=alias)
+
+
+def mapping(description: str, *examples: Any, alias: str | None = None) -> Any:
+    """A key whose mapping is empty where it is left out."""
+    return Field(default_factory=dict[Any, Any], description=description, examples=list(examples), alias=alias)
+
+
+def items(description: str, *examples: Any) -> Any:
+    """A key whose list is empty where it is left out."""
+    return Field(default_factory=list[Any], description=description, examples=list(examples))
 
 
 class Document(BaseModel):
@@ -195,7 +210,6 @@ _NUMBER_OR_TEXT: dict[str, Any] = {"type": ["number", "string"]}
 _ANY_SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean", "null"]}
 
 Expression = Annotated[Scalar, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
-Condition = Annotated[Scalar, PlainValidator(_condition), WithJsonSchema({"type": ["string", "boolean"]})]
 Inequality = Annotated[Scalar, PlainValidator(_inequality), WithJsonSchema({"type": "string"})]
 OptionalExpression = Annotated[Scalar | None, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
 OptionalCondition = Annotated[

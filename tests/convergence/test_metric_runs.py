@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 
 MODELS = Path(__file__).parents[2] / "models"
 EPS = 1e-9

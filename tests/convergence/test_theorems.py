@@ -9,7 +9,7 @@ import pytest
 from convergence.theorem_scenes import BEFORE_ZENO, LONG, OTHER, SCENES, known, slope
 
 from hsdsl.integrators import INTEGRATORS
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 
 FIXED = [name for name, table in INTEGRATORS.items() if table.embedded is None]
 ALL = {**SCENES, **LONG, **BEFORE_ZENO}

@@ -18,7 +18,7 @@ from references.impact_oscillator import exact_example_1, exact_example_2
 
 import hsdsl
 from hsdsl.exact.references import reference
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent / "scenes"

@@ -54,7 +54,7 @@ def test_what_is_refused_is_refused_again():
     model = hsdsl.load(OSCILLATOR)
     assert model.simulate(**FAST | {"until": 1}).stop.time == 1
     for _ in range(2):
-        with pytest.raises(UsageError, match="a number or an expression is wanted"):
+        with pytest.raises(UsageError, match="expected a number or an expression"):
             model.simulate(**FAST | {"until": True})
 
 

@@ -55,9 +55,7 @@ def made(folder: Path, flow: str, initial: str, until: str) -> hsdsl.Model:
 
 
 def prepared(model: hsdsl.Model, **asked: object):
-    given = {"parameters": {}, "initial": {}, "engine": "python", "precision": None}
-    options = {key: asked.pop(key, value) for key, value in given.items()}
-    return model.pipeline.prepare({}, asked, **options).settings  # type: ignore[arg-type]
+    return model.pipeline.prepare({"engine": "python", **asked}).settings
 
 
 @pytest.mark.parametrize("name", CASES)

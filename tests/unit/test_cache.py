@@ -22,8 +22,8 @@ import hsdsl
 from hsdsl import cache
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import ModelError
+from hsdsl.files import ModelFiles
 from hsdsl.model import engines, program_cache
-from hsdsl.model.written import Written
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
 
@@ -312,7 +312,7 @@ def test_a_change_of_the_data_or_the_model_is_seen(tmp_path: Path) -> None:
 def test_what_is_no_program_is_not_taken(folder: Path) -> None:
     path = MODELS[0]
     program = hsdsl.load(path).program
-    written = Written.at(path, None).with_files({})
+    written = ModelFiles.read(path).with_data({})
     assert program_cache.find(written) == (program, written)
     for changed in (
         replace(program, parameters=(1,)),

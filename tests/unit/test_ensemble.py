@@ -144,7 +144,7 @@ def test_what_cannot_be_served_is_refused():
         ({"parameters": {"c": [1, 2], "a": [1, 2, 3]}}, "no common shape"),
         ({"parameters": {"d": [1, 2]}}, "the model has no parameter 'd'"),
         ({"initial": {"w": [1, 2]}}, "mode free has no state 'w'"),
-        ({"parameters": {"c": ["x", "y"]}}, "an array of numbers is wanted"),
+        ({"parameters": {"c": ["x", "y"]}}, "or an array of numbers"),
         ({"parameters": {"c": [float("nan")]}}, "no instance of the ensemble can be run"),
         ({"samples": 1}, "samples of an ensemble"),
         ({"steps": 1}, "an ensemble has no argument 'steps'"),

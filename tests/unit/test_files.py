@@ -96,8 +96,8 @@ def test_what_is_loaded_while_others_save_is_one_of_what_they_saved(tmp_path):
     try:
         for _ in range(200):
             model = hsdsl.load(path)
-            flow = hsdsl.load(path, text=model.pipeline._written.text)
-            assert end(model) == end(flow) and f"x: {end(model):.0f}}}".encode() in model.pipeline._written.text
+            flow = hsdsl.load(path, text=model.pipeline._files.text)
+            assert end(model) == end(flow) and f"x: {end(model):.0f}}}".encode() in model.pipeline._files.text
     finally:
         done.set()
         thread.join()

@@ -14,7 +14,7 @@ from hsdsl.metrics.inside import CERTAIN, OUTSIDE, straight_inside
 from hsdsl.metrics.nearest import to_passages
 from hsdsl.metrics.points import Place, distance
 from hsdsl.metrics.space import make_space
-from hsdsl.model.between_runs import distance as between_runs
+from hsdsl.model.distances import distance_of_runs as between_runs
 
 MODEL = Path(__file__).parents[2] / "models" / "pronking-runner.yaml"
 PSI = np.pi / 5

@@ -8,7 +8,7 @@ import pytest
 import hsdsl
 from hsdsl.metrics.points import Place, distance
 from hsdsl.metrics.space import make_space
-from hsdsl.model.between_runs import distance as between_runs
+from hsdsl.model.distances import distance_of_runs as between_runs
 
 HEAD = "hsdsl: 1\n"
 TAIL = "initial: {mode: a, x: 0}\nexperiment: {until: 3}\n"

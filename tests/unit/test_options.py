@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+import hsdsl
 from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.errors import UsageError
 from hsdsl.integrators import INTEGRATORS
 from hsdsl.model import split_overrides
-from hsdsl.model.options import FILE, OptionSource, check_digits, resolve
+from hsdsl.model.options import FILE, resolve
+from hsdsl.model.settings import check_method
 
 # (file, --set, call) -> (method, size, its value)
 ACCEPTED = {
@@ -30,6 +32,7 @@ ACCEPTED = {
     "auto": (({"step": 1, "method": "euler"}, {}, {"method": "auto"}), ("dopri5", "step", 1)),
     "none is not given": (({"step": 1, "method": "euler"}, {}, {"step": None}), ("euler", "step", 1)),
 }
+MODEL = "{hsdsl: 1, modes: {a: {flow: {x: 1}}}, initial: {mode: a, x: 0}, experiment: {until: 1}}"
 OWN = {"scheme": "paoli-schatzman"}
 REFUSED = {
     "both in the file": (({"step": 1, "tolerance": 1}, {}, {}), "both step and tolerance"),
@@ -51,9 +54,7 @@ REFUSED = {
 
 
 def ask(places):
-    return resolve(
-        [OptionSource(place, values) for place, values in zip((FILE, "--set", "the call"), places, strict=True)]
-    )
+    return resolve(dict(zip((FILE, "--set", "the call"), places, strict=True)))
 
 
 @pytest.mark.parametrize("case", ACCEPTED)
@@ -90,8 +91,9 @@ def test_malformed_overrides(pair):
 
 
 def test_a_method_known_as_decimals_serves_no_more_digits_than_it_has():
-    check_digits(INTEGRATORS["dop853"], FLOAT64)
-    check_digits(INTEGRATORS["dop853"], multiprecision(25))
-    check_digits(INTEGRATORS["dopri5"], multiprecision(1000))
+    smooth = hsdsl.loads(MODEL).program
+    check_method(INTEGRATORS["dop853"], smooth, FLOAT64)
+    check_method(INTEGRATORS["dop853"], smooth, multiprecision(25))
+    check_method(INTEGRATORS["dopri5"], smooth, multiprecision(1000))
     with pytest.raises(UsageError, match="25 digits, too few for a precision of 26"):
-        check_digits(INTEGRATORS["dop853"], multiprecision(26))
+        check_method(INTEGRATORS["dop853"], smooth, multiprecision(26))

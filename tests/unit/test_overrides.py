@@ -12,7 +12,7 @@ from engines import COMPILER
 
 import hsdsl
 from hsdsl.cli import main
-from hsdsl.model.between_runs import distance
+from hsdsl.model.distances import distance_of_runs as distance
 from hsdsl.report import as_json, dumps, summary
 from hsdsl.store import load
 

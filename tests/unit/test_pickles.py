@@ -80,7 +80,7 @@ def test_a_model_in_another_process_needs_no_file(tmp_path):
     copied, part = pickle.loads(written)
     assert alike(copied.simulate(**FAST | {"until": "1/2 + 1/4"})) == expected
     assert copied.system.digest == model.system.digest and part.columns == model.only(["x"]).columns
-    assert copied.pipeline._written.limits == limits
+    assert copied.pipeline._files.limits == limits
 
 
 @pytest.mark.parametrize("engine", ["python", "c"] if COMPILER else ["python"])

@@ -45,9 +45,7 @@ class Dynamics:
         self.system = system
         self.modes = {mode.name: mode for mode in system.modes}
         self.decider = Decider()
-        self._values: dict[Any, Any] = {}
-        for parameter in system.parameters:
-            self._values[symbol(parameter.name)] = replaced(parameter.value, self._values, {})
+        self._values = system.parameter_values(lambda value, earlier: replaced(value, earlier, {}))
         self._done: dict[Any, Any] = {}
         self._rates: dict[Any, Any] = {}
         self._slopes: dict[tuple[Any, Any], Any] = {}

@@ -16,7 +16,7 @@ from hsdsl.metrics.geometry import TOLERANCE, Space
 from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.metrics.table import CURVE_METRICS
-from hsdsl.model.between_runs import check_hops
+from hsdsl.model.distances import check_hops
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate.stops import show
