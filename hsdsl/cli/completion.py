@@ -39,7 +39,7 @@ def override_names(ctx: Context, incomplete: str) -> list[str]:
 
 def _names(path: Path) -> Iterator[str]:
     from hsdsl.model import load
-    from hsdsl.model.requests import KEYS
+    from hsdsl.model.options import KEYS
 
     program = load(path).program
     yield from program.parameters

@@ -124,8 +124,8 @@ def _between_runs(
     json: bool,
     options: dict[str, Any],
 ) -> None:
-    from hsdsl.model.between_runs import distance as between_runs
-    from hsdsl.model.between_runs import plot_distance
+    from hsdsl.model.distances import distance_of_runs as between_runs
+    from hsdsl.model.distances import plot_distance
 
     (run, model), (other, _) = (_run(path, options["parameters"]) for path in paths)
     options = {**options, "model": model}

@@ -91,7 +91,7 @@ def _report(error: Any, words: list[str]) -> int:
 
 
 def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:
-    from hsdsl.model.requests import ELSEWHERE
+    from hsdsl.model.options import ELSEWHERE
 
     value: str = error.message.split("'")[1]
     return UsageError(f"there is no {error.param.name} '{value}'", did_you_mean(ELSEWHERE.get(value) or value, choices))

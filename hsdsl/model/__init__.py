@@ -1,18 +1,17 @@
 """A model: a YAML file turned into something that runs.
 
-============= ===========================================================================================
-``model``     :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
-``pipeline``     what it is made of, each part made once: the pipeline in one place
-``written``   the bytes that a model is made of, read once
-``seen``      programs of models read before, so that to run one again needs no SymPy
-``requests``  what a run is asked, from four places: the file, ``--set``, options and a call
-``values``    overrides, as numbers or expressions of parameters; ``overrides`` reads them from text
-``settings``  the numbers of a run; ``automatic`` chooses its method, ``engines`` what runs it
-``instances`` the instances of an ensemble; ``ensemble`` runs them, ``workers`` with Python
-``stream``    a run whose rows go to a file while it goes on
-``estimate``  a run's error, by a finer run
-``distances`` distances of points and of runs; with ``places`` and ``between_runs``
-============= ===========================================================================================
+================= ==========================================================================================
+``model``         :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
+``pipeline``      its stages, each made once: mathematics, program, kernels, compiled code
+``program_cache`` programs of models read before; ``call_cache`` runs prepared for the last calls
+``options``       options of the file, of ``--set`` and of a call; ``overrides`` reads and records them
+``values``        parameters, constants and initial states, of one run or of many instances
+``settings``      the numbers of a run; ``automatic`` chooses its method, ``engines`` its loop
+``ensemble``      many instances; ``workers`` runs them
+``stream``        a run whose rows go to a file while it goes on
+``estimate``      a run's error, by a finer run
+``distances``     distances of runs; ``points`` those of points
+================= ==========================================================================================
 """
 
 from hsdsl.model.model import Model, load, loads
