@@ -126,7 +126,7 @@ class Execution(Deferred):
 
     def _repr_html_(self) -> str:
         """Show a short summary in Jupyter."""
-        from hsdsl.report.page import html
+        from hsdsl.report.html import html
 
         return html(self, limit=12)
 

@@ -21,6 +21,16 @@ BINS = 1500
 SEVERAL = "several modes"
 
 
+@dataclass(frozen=True)
+class GuardLine:
+    """A guard that is a level of one state: in ``mode`` something fires where ``state`` reaches ``value``."""
+
+    mode: str
+    state: str
+    value: float
+    label: str
+
+
 @dataclass(frozen=True, eq=False)
 class Curves:
     """The points of a run.

@@ -13,11 +13,10 @@ from matplotlib.gridspec import GridSpecFromSubplotSpec
 from matplotlib.patches import Patch
 
 from hsdsl.execution import Execution
-from hsdsl.plot.colours import band, colours
-from hsdsl.plot.curves import Curves, curves
-from hsdsl.plot.guards import GuardLine
+from hsdsl.plot.curves import Curves, GuardLine, curves
 from hsdsl.plot.panel import draw_panel, name_bands
 from hsdsl.plot.phase import draw_phase, has_phase
+from hsdsl.plot.style import band, colours
 from hsdsl.report import words
 
 if TYPE_CHECKING:

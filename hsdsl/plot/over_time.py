@@ -5,18 +5,17 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hsdsl.errors import UsageError
-from hsdsl.plot.style import styled
-from hsdsl.store.atomic import replacing
+from hsdsl.plot.style import save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = npt.NDArray[Any]
-FORMATS = (".png", ".svg")
 COLOURS = ("#0b5394", "#c8c8c8", "#b45f06")
 DECADES = 12  # below the largest value: smaller ones are drawn there
 
@@ -42,13 +41,9 @@ def plot_over_time(
     UsageError
         For an unknown suffix, or a file that cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
-    with styled(), replacing(target) as file:
-        from matplotlib.figure import Figure
 
-        from hsdsl.plot import write_figure
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
 
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")
         axis = figure.add_subplot()
@@ -58,18 +53,13 @@ def plot_over_time(
         for k, (name, (lower, upper)) in enumerate(bounds.items()):
             colour, front = COLOURS[k % len(COLOURS)], 10 - k
             axis.plot(times, np.maximum(upper, floor), color=colour, linewidth=1.2, label=name, zorder=front)
-            axis.fill_between(
-                times,
-                np.maximum(lower, floor),
-                np.maximum(upper, floor),
-                color=colour,
-                alpha=0.3,
-                linewidth=0,
-                zorder=front,
-            )
+            ends = np.maximum(lower, floor), np.maximum(upper, floor)
+            axis.fill_between(times, *ends, color=colour, alpha=0.3, linewidth=0, zorder=front)
         axis.set_yscale("log")
         axis.set_xlabel("time t")
         axis.set_ylabel("distance")
         axis.set_title(title, loc="left", parse_math=False)
         axis.legend(frameon=False)
-        write_figure(figure, file, target.suffix[1:].lower())
+        return figure
+
+    save(draw, path)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hsdsl.plot.colours import ALARM, FAINT, INK, band, colours
-from hsdsl.plot.curves import SEVERAL, Array, Curves, limits, line
-from hsdsl.plot.guards import GuardLine
+from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits, line
+from hsdsl.plot.style import ALARM, FAINT, INK, band, colours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,14 +54,8 @@ def draw_bands(axis: Axes, data: Curves) -> None:
     """Colour the background by mode."""
     for mode, colour in colours(data.modes).items():
         spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
-        axis.broken_barh(
-            spans,
-            (0, 1),
-            transform=axis.get_xaxis_transform(),
-            facecolors=band(colour, len(data.modes) == 1),
-            linewidth=0,
-            zorder=0,
-        )
+        shade, across = band(colour, len(data.modes) == 1), axis.get_xaxis_transform()
+        axis.broken_barh(spans, (0, 1), transform=across, facecolors=shade, linewidth=0, zorder=0)
 
 
 def name_bands(axis: Axes, data: Curves, width: float) -> bool:

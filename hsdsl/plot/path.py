@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,11 +15,11 @@ from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Array, Domain, Gate, Space
 from hsdsl.metrics.line import interval_of
 from hsdsl.metrics.paths import Piece
-from hsdsl.plot.colours import ALARM, FAINT, INK
-from hsdsl.plot.style import styled
-from hsdsl.store.atomic import replacing
+from hsdsl.plot.style import ALARM, FAINT, INK, save
 
-FORMATS = (".png", ".svg")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 GRID = 160  # points of a panel's side at which domains and curved guards are looked at
 MARGIN = 0.25  # of a path's extent, around it
 
@@ -44,14 +43,10 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
     UsageError
         No path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"--plot {target}: the name should end in .png or .svg")
     modes = _visited(space, pieces)
-    with styled(), replacing(target) as file:
-        from matplotlib.figure import Figure
 
-        from hsdsl.plot import write_figure
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
 
         columns = min(3, len(modes))
         rows = -(-len(modes) // columns)
@@ -62,7 +57,9 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
         for axis in axes[len(modes) :]:
             axis.set_visible(False)
         figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-        write_figure(figure, file, target.suffix[1:].lower())
+        return figure
+
+    save(draw, path)
 
 
 def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:

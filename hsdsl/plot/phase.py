@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hsdsl.execution import Execution
-from hsdsl.plot.colours import INK, colours, curve
-from hsdsl.plot.curves import SEVERAL, Array, Curves, limits, line
-from hsdsl.plot.guards import GuardLine
+from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits, line
 from hsdsl.plot.panel import label, mark_jumps, with_guards
+from hsdsl.plot.style import INK, colours, curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,13 +1,25 @@
-"""Settings of matplotlib that every picture is drawn with, whatever a person's own are, by one thread at a time."""
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""Settings and colours of every picture, and pictures as files."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Generator
+import warnings
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import RLock
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from hsdsl.errors import UsageError
+from hsdsl.names import visible_lines
+from hsdsl.plot.curves import SEVERAL
+from hsdsl.store.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # The salt makes the SVG's ids repeatable.
 STYLE: dict[str, Any] = {
@@ -28,7 +40,49 @@ STYLE: dict[str, Any] = {
     "axes.formatter.limits": (-4, 5),
     "agg.path.chunksize": 20_000,
 }
-_drawing = RLock()  # the settings are the whole process's
+FORMATS = (".png", ".svg")
+INK, FAINT, ALARM = "#16324f", "#8a8a8a", "#d55e00"
+# Okabe and Ito 2008: people with any colour vision tell them apart
+PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
+_drawing = RLock()  # matplotlib's settings are the whole process's
+
+
+def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
+    """Draw a figure once and write it to every path, in the format of its suffix.
+
+    Raises
+    ------
+    UsageError
+        For an unknown suffix, or a file that cannot be written.
+    """
+    targets = check_suffixes(*paths)
+    with styled():
+        figure = draw()
+        for path in targets:
+            with replacing(path) as file:
+                write_figure(figure, file, path.suffix[1:].lower())
+
+
+def check_suffixes(*paths: str | os.PathLike[str], formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Refuse paths whose suffix is not among the formats."""
+    targets = [Path(path) for path in paths]
+    for path in targets:
+        if path.suffix.lower() not in formats:
+            known = f"{', '.join(formats[:-1])} or {formats[-1]}"
+            raise UsageError(f"{path} should end in {known}: the suffix gives the format")
+    return targets
+
+
+def write_figure(figure: Figure, file: BinaryIO, kind: str) -> None:
+    """Write a figure as ``png`` or ``svg``: the same run gives the same bytes."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):  # hidden characters must not break the XML
+        assert isinstance(text, Text)
+        if (visible := visible_lines(text.get_text())) != text.get_text():
+            text.set_text(visible)
+    dated = ("Date", "Creator", "Format", "Type") if kind == "svg" else ("Software",)
+    figure.savefig(file, format=kind, dpi=150, metadata=dict.fromkeys(dated))
 
 
 @contextmanager
@@ -38,7 +92,8 @@ def styled() -> Generator[None]:
         _import()
         import matplotlib.style
 
-        with matplotlib.style.context(["default", STYLE]):
+        with matplotlib.style.context(["default", STYLE]), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing")  # a script that the font lacks
             yield
 
 
@@ -53,3 +108,26 @@ def _import() -> None:
         os.environ["MPLBACKEND"] = named
         with suppress(ValueError):
             matplotlib.rcParams["backend"] = named
+
+
+def colours(modes: Sequence[str]) -> dict[str, str]:
+    """Give each mode a colour; after seven modes they begin again, darker."""
+    chosen: dict[str, str] = {}
+    for i, mode in enumerate(mode for mode in modes if mode != SEVERAL):
+        chosen[mode] = _mixed(PALETTE[i % len(PALETTE)], 0.55 ** (i // len(PALETTE)), "#000000")
+    return chosen | {mode: "#7a7a7a" for mode in modes if mode == SEVERAL}
+
+
+def band(colour: str, alone: bool = False) -> str:
+    """Lighten a colour for the background, more so where it is the only one."""
+    return _mixed(colour, 0.1 if alone else 0.24, "#ffffff")
+
+
+def curve(colour: str) -> str:
+    """Darken a colour for a line on white."""
+    return _mixed(colour, 0.75, "#000000")
+
+
+def _mixed(colour: str, share: float, other: str) -> str:
+    parts = (int(colour[i : i + 2], 16) * share + int(other[i : i + 2], 16) * (1 - share) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(part):02x}" for part in parts)

@@ -8,19 +8,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.errors import UsageError
-from hsdsl.plot.colours import FAINT, PALETTE
-from hsdsl.plot.style import styled
-from hsdsl.store.atomic import replacing
+from hsdsl.plot.style import FAINT, PALETTE, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg")
 MARKERS = "osD^vP*hXp<>"
 LEAST_ERROR = 1e-16
 WORST = 30  # times the largest error of a right answer: where wrong ones are drawn that are farther off
@@ -69,16 +64,12 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
     UsageError
         For an unknown suffix, or a file that cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"{target} should end in .png or .svg: the suffix says what to draw")
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
     places, down, across = _places(columns)
-    with styled(), replacing(target) as file:
-        from matplotlib.figure import Figure
 
-        from hsdsl.plot import write_figure
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
 
         figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
         axes = figure.subplots(down, across, squeeze=False)
@@ -89,7 +80,9 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
                 else:
                     axes[k][i].axis("off")
         _legend(figure, labels, groups)
-        write_figure(figure, file, target.suffix[1:].lower())
+        return figure
+
+    save(draw, path)
 
 
 def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:
@@ -136,15 +129,8 @@ def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str
     axis.set_title(panel.title, loc="left", parse_math=False, fontsize=9.5)
     silent = [line.label for line in panel.lines if not any(isfinite(m.error) for m in line.marks)]
     if silent:
-        axis.text(
-            0.02,
-            0.02,
-            "no answer: " + ", ".join(silent),
-            transform=axis.transAxes,
-            fontsize=7,
-            color=FAINT,
-            wrap=True,
-        )
+        text = "no answer: " + ", ".join(silent)
+        axis.text(0.02, 0.02, text, transform=axis.transAxes, fontsize=7, color=FAINT, wrap=True)
 
 
 def _legend(figure: Figure, labels: Sequence[str], groups: dict[str, str]) -> None:

@@ -1,6 +1,6 @@
-"""What is said of a run: a readable summary, a short one in HTML (`page`), and the object that `--json` prints."""
+"""A run as a readable summary, as HTML (`html`), and as the object that `--json` prints."""
 
-from hsdsl.report.plain import as_json, dumps
-from hsdsl.report.text import summary
+from hsdsl.report.json_form import as_json, dumps
+from hsdsl.report.summary import summary
 
 __all__ = ["as_json", "dumps", "summary"]

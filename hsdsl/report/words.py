@@ -1,20 +1,28 @@
-"""How the parts of a run are put into words, the same in text, in HTML and on a plot."""
+"""The parts of a run in words, the same in text, in HTML and on a plot."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from hsdsl import decimals
 from hsdsl.defaults import kept_digits
-from hsdsl.execution import Execution, Point, Transition
+from hsdsl.execution import Execution, Transition
+
+COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
 def number(x: Any, digits: int = 6) -> str:
-    """Write a number for reading, to a few significant digits; text and None as they are."""
-    if isinstance(x, bool) or not (isinstance(x, (int, float)) or decimals.is_multiprecision(x)):
+    """Write a number to a few significant digits; text and None as they are."""
+    if isinstance(x, (bool, int)) or not (isinstance(x, float) or decimals.is_multiprecision(x)):
         return str(x)
-    return str(x) if isinstance(x, int) else f"{float(x):.{digits}g}"
+    return f"{float(x):.{digits}g}"
+
+
+def values(named: Mapping[str, Any]) -> str:
+    """Write named values."""
+    return ", ".join(f"{name} = {number(value, 10)}" for name, value in named.items())
 
 
 def heading(execution: Execution) -> str:
@@ -23,7 +31,7 @@ def heading(execution: Execution) -> str:
 
 
 def settings(execution: Execution) -> list[str]:
-    """List what the run was done with."""
+    """List the scheme, the method and the settings of a run."""
     chosen = [f"{execution.scheme} {execution.method}"]
     shown = {"scheme", "method", "engine", "method_chosen"}
     for name, value in execution.settings.items():
@@ -35,7 +43,7 @@ def settings(execution: Execution) -> list[str]:
 
 
 def _kept(execution: Execution) -> str:
-    """Say how many digits the tolerance keeps, where these are far fewer than there are."""
+    """The number of digits that the tolerance keeps, where these are far fewer than there are."""
     tolerance, digits = execution.settings.get("tolerance"), execution.digits
     if tolerance is None or digits is None:
         return ""
@@ -44,14 +52,52 @@ def _kept(execution: Execution) -> str:
 
 
 def overrides(execution: Execution) -> str:
-    """Write which parameters and initial values are not those of the file; settings are told with the others."""
+    """Parameters and initial values that are not those of the file; `settings` has the others."""
     return values({n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")})
 
 
-def left_out(execution: Execution) -> str:
-    """Say which states were not integrated, and why that cannot matter."""
-    found = execution.settings["left_out"]
-    return f"{', '.join(found['states'])}: {found['reason']}"
+def facts(execution: Execution) -> Iterator[tuple[str, str]]:
+    """Labels and texts of the end of a run, its verdict and its seconds."""
+    final, left_out = execution.final, execution.settings.get("left_out")
+    count = f"{final.jump} transition{'' if final.jump == 1 else 's'}"
+    waiting = ", waiting in a strip" if final.kind == "strip" else ""
+    yield "stop", stop(execution)
+    yield "final", f"mode {final.mode} after {count}{waiting}"
+    yield "state", values(final.state)
+    yield "outputs", values({name: value for name, value in final.outputs.items() if value == value})
+    if left_out is not None:
+        yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
+    yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(execution.verdict.reasons))))
+    yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
+
+
+def stop(execution: Execution) -> str:
+    """Why and when the run ended."""
+    reason, message = execution.stop.reason, execution.stop.message
+    when = "" if "t = " in message else f" at t = {number(execution.stop.time, 10)}"
+    return f"{reason}{when}: {message}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of transitions by `COLUMNS`; after the first ``cut`` of them ``left_out`` are missing."""
+
+    rows: Sequence[tuple[str, ...]]
+    cut: int
+    left_out: int
+
+    @staticmethod
+    def of(transitions: Sequence[Transition], limit: int) -> Table:
+        """Write the first and the last transitions, ``limit`` in all."""
+        count = len(transitions)
+        cut = (limit + 1) // 2 if count > limit else count
+        chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
+        instants = times([t.time for t in chosen])
+        rows = [
+            (str(t.index), instant, _delay(t), t.edge, f"{t.source} -> {t.target}", _changes(t))
+            for t, instant in zip(chosen, instants, strict=True)
+        ]
+        return Table(rows, cut, count - len(chosen))
 
 
 def times(values: Sequence[Any]) -> list[str]:
@@ -64,8 +110,25 @@ def times(values: Sequence[Any]) -> list[str]:
     return [f"{float(t):.{places}f}" for t in values]
 
 
-def changes(transition: Transition) -> str:
-    """Say what a transition did to the state: only what it changed, added or dropped."""
+def _delay(transition: Transition) -> str:
+    """The duration of the strip, ``-`` where there was none."""
+    if transition.resumed is None:
+        return "open"
+    waited = float(transition.resumed - transition.time)
+    return f"{waited:.2e}" if waited else "-"
+
+
+def _changes(transition: Transition) -> str:
+    """What a transition changed in the state, and what is special about it."""
+    words = [_state(transition)]
+    if transition.entry:
+        words.append("at once on entering the mode")
+    if transition.alternatives:
+        words.append("reached too: " + ", ".join(transition.alternatives))
+    return "; ".join(words)
+
+
+def _state(transition: Transition) -> str:
     before, after = transition.before, transition.after
     if after is None:
         return "the run ended in the strip"
@@ -77,62 +140,3 @@ def changes(transition: Transition) -> str:
     words += [f"{name}: {number(value)} (new)" for name, value in after.items() if name not in before]
     words += [f"{name} dropped" for name in before if name not in after]
     return ", ".join(words) or "unchanged"
-
-
-def remarks(transition: Transition) -> str:
-    """Say what is special about a transition."""
-    words = ["at once on entering the mode"] if transition.entry else []
-    if transition.alternatives:
-        words.append("reached too: " + ", ".join(transition.alternatives))
-    return "; ".join(words)
-
-
-def delay(transition: Transition) -> str:
-    """Write how long the strip took, ``-`` where there was none."""
-    if transition.resumed is None:
-        return "open"
-    waited = float(transition.resumed - transition.time)
-    return f"{waited:.2e}" if waited else "-"
-
-
-def stop(execution: Execution) -> str:
-    """Say why and when the run ended."""
-    reason, message = execution.stop.reason, execution.stop.message
-    when = "" if "t = " in message else f" at t = {number(execution.stop.time, 10)}"
-    return f"{reason}{when}: {message}"
-
-
-def values(named: Mapping[str, Any]) -> str:
-    """Write named values for reading."""
-    return ", ".join(f"{name} = {number(value, 10)}" for name, value in named.items())
-
-
-def outputs(point: Point) -> str:
-    """Write the outputs that have a value in the point's mode."""
-    return values({name: value for name, value in point.outputs.items() if value == value})
-
-
-def final(point: Point) -> str:
-    """Say in which mode the run ended."""
-    count = f"{point.jump} transition{'' if point.jump == 1 else 's'}"
-    waiting = ", waiting in a strip" if point.kind == "strip" else ""
-    return f"mode {point.mode} after {count}{waiting}"
-
-
-def verdict(execution: Execution) -> str:
-    """Say what is known of the theorem's hypotheses."""
-    reasons = "; ".join(execution.verdict.reasons)
-    return execution.verdict.theorem + (f": {reasons}" if reasons else "")
-
-
-def seconds(execution: Execution) -> str:
-    """Write how long each stage took."""
-    return ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
-
-
-def shortened(count: int, limit: int) -> tuple[range, range]:
-    """Choose which of ``count`` items are shown: the first and the last, ``limit`` in all."""
-    if count <= limit:
-        return range(count), range(0)
-    head = (limit + 1) // 2
-    return range(head), range(count - (limit - head), count)

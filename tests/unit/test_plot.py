@@ -16,9 +16,9 @@ from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Stop
 from hsdsl.plot import GuardLine, plot
-from hsdsl.plot.colours import colours
 from hsdsl.plot.curves import CELLS, SEVERAL, curves, limits, line
 from hsdsl.plot.figure import draw
+from hsdsl.plot.style import colours
 
 FIFTY = decimals.context_of(50)
 FLOOR = GuardLine("fly", "h", 0.0, "h <= 0")

@@ -14,7 +14,7 @@ import pytest
 
 from hsdsl import decimals, report
 from hsdsl.execution import Verdict
-from hsdsl.report.page import html
+from hsdsl.report.html import html
 
 FIFTY = decimals.context_of(50)
 
@@ -194,7 +194,7 @@ def test_times_of_very_different_size_keep_their_digits():
 def test_html_escapes_and_lists():
     run = hand_made.thermostat(100, heats="<on>", cools="a&b")
     page = html(run, limit=10)
-    assert "&lt;on&gt; &rarr; a&amp;b" in page
+    assert "&lt;on&gt; -&gt; a&amp;b" in page
     assert "<on>" not in page
     assert page.count("<tr><td>") == 10
     assert "90 more" in page

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hsdsl.execution import Execution
-from hsdsl.plot.colours import INK
+from hsdsl.plot.style import INK
 from paper.drawing.axes import shades
 
 NAMES = {

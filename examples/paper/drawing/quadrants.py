@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hsdsl.execution import Execution
-from hsdsl.plot.colours import INK, band, colours
+from hsdsl.plot.style import INK, band, colours
 from paper.drawing.axes import MARKERS, letter, loglog, order, shades
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hsdsl.execution import Execution
-from hsdsl.plot.colours import ALARM, FAINT, INK
+from hsdsl.plot.style import ALARM, FAINT, INK
 from paper.drawing.axes import letter
 
 ZOOM = (4.6, 5.1, -0.8125, -0.7985)  # the first impacts and the Zeno point of example 2
