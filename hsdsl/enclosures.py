@@ -1,7 +1,8 @@
 """Interval arithmetic for generated routines, many boxes at once: what a formula can be anywhere in a box.
 
 Every result contains every value that the formula takes there, rounding included. Where it has no value somewhere in a
-box the result is everything, so that nothing is concluded from it.
+box the result of `ENCLOSED` is everything, so that nothing is concluded from it. `RESTRICTED` encloses the values that
+there are. A sum or a product of numbers that are nowhere negative is nowhere negative.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,9 @@ class Range:
 
     def __add__(self, other: Any) -> Range:
         other = as_range(other)
-        return _outwards(self.low + other.low, self.high + other.high)
+        low, high = self.low + other.low, self.high + other.high
+        wide = _outwards(low, high)
+        return Range(np.where(low == 0, 0.0, wide.low), np.where(high == 0, 0.0, wide.high))  # a sum of 0 is exact
 
     def __sub__(self, other: Any) -> Range:
         return self + -as_range(other)
@@ -44,8 +47,9 @@ class Range:
         other = as_range(other)
         if other is self:
             return _square(self)
-        corners = [_product(a, b) for a in (self.low, self.high) for b in (other.low, other.high)]
-        return _outwards(_least(corners), -_least([-c for c in corners]))
+        found = _corners(_product, self, other)
+        alike = ((self.low >= 0) & (other.low >= 0)) | ((self.high <= 0) & (other.high <= 0))
+        return Range(np.where(alike, np.maximum(found.low, 0.0), found.low), found.high)
 
     def __truediv__(self, other: Any) -> Range:
         other = as_range(other)
@@ -70,8 +74,15 @@ def _outwards(low: Any, high: Any, steps: int = 1) -> Range:
     return Range(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
 
 
+def _corners(function: Callable[[Any, Any], Any], a: Range, b: Range, steps: int = 1) -> Range:
+    """A function with its extremes at the corners of a box."""
+    values = [function(x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
+    return _outwards(reduce(np.minimum, values), reduce(np.maximum, values), steps)
+
+
 def _product(a: Any, b: Any) -> Any:
-    return np.where((a == 0) | (b == 0), 0.0, a * b)  # also where the other is unbounded
+    product = a * b
+    return np.where(np.isnan(product), 0.0, product)  # zero times an unbounded end
 
 
 def _square(x: Range) -> Range:
@@ -85,14 +96,17 @@ def _unless(undefined: Any, known: Range) -> Range:
     return Range(np.where(undefined, -np.inf, known.low), np.where(undefined, np.inf, known.high))
 
 
-def _rising(function: Any, least: float = -np.inf, most: float = np.inf) -> Callable[[Any], Range]:
-    """An increasing function, defined between two numbers."""
+def _rising(
+    function: Any, least: float = -np.inf, most: float = np.inf, bottom: float = -np.inf
+) -> Callable[[Any], Range]:
+    """An increasing function, defined between two numbers, and nowhere below ``bottom``."""
 
     def enclose(value: Any) -> Range:
         x = as_range(value)
         outside = (x.low < least) | (x.high > most)
         low, high = np.clip(x.low, least, most), np.clip(x.high, least, most)
-        return _unless(outside, _outwards(function(low), function(high), STEPS))
+        found = _outwards(function(low), function(high), STEPS)
+        return _unless(outside, Range(np.maximum(found.low, bottom), found.high))
 
     return enclose
 
@@ -138,45 +152,47 @@ def _arc_cosine(value: Any) -> Range:
 
 def _cosh(value: Any) -> Range:
     x = _absolute(value)
-    return _outwards(np.cosh(x.low), np.cosh(x.high), STEPS)
+    found = _outwards(np.cosh(x.low), np.cosh(x.high), STEPS)
+    return Range(np.maximum(found.low, 1.0), found.high)
 
 
 def _angle(y: Any, x: Any) -> Range:
     """atan2: its extremes are at corners, unless the box meets the half line where it jumps."""
     y, x = as_range(y), as_range(x)
     jumps = (x.low <= 0) & (y.low <= 0) & (y.high >= 0)
-    corners = np.broadcast_arrays(*(np.arctan2(b, a) for a in (x.low, x.high) for b in (y.low, y.high)))
-    found = _outwards(np.minimum.reduce(corners), np.maximum.reduce(corners), STEPS)
+    found = _corners(np.arctan2, y, x, STEPS)
     return Range(np.where(jumps, -_PI.high, found.low), np.where(jumps, _PI.high, found.high))
 
 
+def whole_power(base: Range, exponent: int) -> Range:
+    """A positive whole power."""
+    low, high = base.low**exponent, base.high**exponent
+    if exponent % 2:
+        found = _outwards(low, high, STEPS)
+        below, above = np.maximum(found.low, 0.0), np.minimum(found.high, 0.0)
+        return Range(np.where(base.low >= 0, below, found.low), np.where(base.high <= 0, above, found.high))
+    through_zero = (base.low <= 0) & (base.high >= 0)
+    found = _outwards(np.where(through_zero, 0.0, np.minimum(low, high)), np.maximum(low, high), STEPS)
+    return Range(np.maximum(found.low, 0.0), found.high)
+
+
 def _power(base: Any, exponent: Any) -> Range:
-    """By logarithm where the base is positive; whole exponents of other bases by the ends."""
     b, e = as_range(base), as_range(exponent)
-    positive = b.low > 0
-    log = _rising(np.log)(Range(np.where(positive, b.low, 1.0), np.where(positive, b.high, 1.0)))
-    general = _rising(np.exp)(log * e)
-    whole = np.all(e.low == e.high) and np.all(np.mod(e.low, 1) == 0) and np.all(e.low > 0)
-    if not whole:
-        return _unless(~positive, general)
-    even = np.mod(e.low, 2) == 0
-    size = np.maximum(np.abs(b.low), np.abs(b.high)) ** e.low
-    rough = _outwards(np.where(even, 0.0, -size), size, STEPS)
-    return Range(np.where(positive, general.low, rough.low), np.where(positive, general.high, rough.high))
+    if np.ndim(e.low) == 0 and e.low == e.high and e.low > 0 and e.low % 1 == 0:
+        return whole_power(b, int(e.low))
+    undefined = ~(b.low > 0)
+    positive = Range(np.where(undefined, 1.0, b.low), np.where(undefined, 1.0, b.high))
+    return _unless(undefined, _corners(np.power, positive, e, STEPS))
 
 
-def _smaller(*values: Any) -> Range:
-    ranges = [as_range(v) for v in values]
-    return Range(_least([r.low for r in ranges]), _least([r.high for r in ranges]))
+def _extreme(function: Callable[[Any, Any], Any]) -> Callable[..., Range]:
+    """The smaller or the larger of several."""
 
+    def enclose(*values: Any) -> Range:
+        ranges = [as_range(v) for v in values]
+        return Range(reduce(function, [r.low for r in ranges]), reduce(function, [r.high for r in ranges]))
 
-def _larger(*values: Any) -> Range:
-    ranges = [as_range(v) for v in values]
-    return Range(-_least([-r.low for r in ranges]), -_least([-r.high for r in ranges]))
-
-
-def _least(values: list[Any]) -> Any:
-    return np.minimum.reduce(np.broadcast_arrays(*values))
+    return enclose
 
 
 def _constant(value: Fraction) -> Range:
@@ -200,15 +216,17 @@ ENCLOSED = Arithmetic(
     constant=_constant,
     isfinite=lambda value: bool(np.all(np.isfinite(value.low) & np.isfinite(value.high))),
     functions={
-        **{name: _rising(getattr(np, name)) for name in ("sinh", "tanh", "exp")},
+        "sinh": _rising(np.sinh),
+        "tanh": _rising(np.tanh, bottom=-1.0),
+        "exp": _rising(np.exp, bottom=0.0),
         "atan": _rising(np.arctan),
         "asinh": _rising(np.arcsinh),
         "asin": _ARC_SINE,
         "acos": _arc_cosine,
-        "acosh": _rising(np.arccosh, 1.0),
+        "acosh": _rising(np.arccosh, 1.0, bottom=0.0),
         "atanh": _rising(np.arctanh, -1.0, 1.0),
         "log": _rising(np.log, 0.0),
-        "sqrt": _rising(np.sqrt, 0.0),
+        "sqrt": _rising(np.sqrt, 0.0, bottom=0.0),
         "sin": _sine,
         "cos": partial(_sine, quarter=1.0),
         "tan": _tangent,
@@ -216,8 +234,8 @@ ENCLOSED = Arithmetic(
         "cosh": _cosh,
         "pow": _power,
         "abs": _absolute,
-        "min": _smaller,
-        "max": _larger,
+        "min": _extreme(np.minimum),
+        "max": _extreme(np.maximum),
         "sign": _step(np.sign),
         "floor": _step(np.floor),
         "heaviside": _step(lambda x: 0.5 * (1.0 + np.sign(x))),
@@ -226,3 +244,40 @@ ENCLOSED = Arithmetic(
         "nan": Range(-np.inf, np.inf),
     },
 )  # fmt: skip
+
+
+def _restricted(name: str, least: float, most: float) -> Callable[[Any], Range]:
+    """A function over the part of a box between the ends of its domain; everything where that is empty."""
+
+    def enclose(value: Any) -> Range:
+        x = as_range(value)
+        inside = Range(np.clip(x.low, least, most), np.clip(x.high, least, most))
+        return _unless((x.high < least) | (x.low > most), ENCLOSED.functions[name](inside))
+
+    return enclose
+
+
+def _power_of_positive(base: Any, exponent: Any) -> Range:
+    b = as_range(base)
+    found = _corners(np.power, Range(np.maximum(b.low, 0.0), np.maximum(b.high, 0.0)), as_range(exponent), STEPS)
+    return Range(np.maximum(found.low, 0.0), found.high)
+
+
+def _reciprocal(value: Any) -> Range:
+    """1/x, which is unbounded towards zero; everything where zero lies inside."""
+    x = as_range(value)
+    positive, negative = x.low >= 0, x.high <= 0
+    found = _outwards(1 / np.where(x.high == 0, -0.0, x.high), 1 / np.where(x.low == 0, 0.0, x.low))
+    below, above = np.maximum(found.low, 0.0), np.minimum(found.high, 0.0)
+    known = Range(np.where(positive, below, found.low), np.where(negative, above, found.high))
+    return _unless(positive == negative, known)
+
+
+RESTRICTED: dict[str, Callable[..., Range]] = {
+    **ENCLOSED.functions,
+    **{name: _restricted(name, -1.0, 1.0) for name in ("asin", "acos", "atanh")},
+    **{name: _restricted(name, 0.0, np.inf) for name in ("log", "sqrt")},
+    "acosh": _restricted("acosh", 1.0, np.inf),
+    "pow": _power_of_positive,
+    "reciprocal": _reciprocal,
+}

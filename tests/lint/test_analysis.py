@@ -13,7 +13,7 @@ from hsdsl.functions import FUNCTIONS
 from hsdsl.lint.analysis.decide import Decider
 from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.question import Range, at_most_zero, negative, positive, zero
-from hsdsl.lint.analysis.tape import Tape
+from hsdsl.lint.analysis.straight_line_program import StraightLine
 
 x, y, v, t = sp.symbols("x y v t", real=True)
 pi = sp.pi
@@ -65,7 +65,7 @@ def test_bounds_contain_every_value(expr, a, b, wide, high, p, q):
     exact = value(expr, (a + p * wide, b + q * high))
     if exact is None:
         return
-    found = Tape([expr], [x, y]).over(np.array([[a, b]]), np.array([[a + wide, b + high]]))
+    found = StraightLine([expr], [x, y]).over(np.array([[a, b]]), np.array([[a + wide, b + high]]))
     assert found.low[0, 0] <= exact <= found.high[0, 0], (expr, found)
 
 

@@ -2,6 +2,6 @@
 
 `dynamics` puts a model into expressions with its parameters' values; `decide` answers questions about them: by exact
 reasoning (`elimination` and `bound_propagation`, with `polynomial`, `normal_form` and `rational_bounds`), by a point
-(`rational_witness`, `newton_search`), or by interval arithmetic (`intervals`, `tape`, `branch_and_bound`). An answer
-says which of these decided it, and carries the point.
+(`rational_witness`, `newton_search`), or by interval arithmetic (`branch_and_bound`). An answer says which of these
+decided it, and carries the point.
 """

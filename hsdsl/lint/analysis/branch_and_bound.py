@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.lint.analysis.intervals import Array
 from hsdsl.lint.analysis.question import Relation
-from hsdsl.lint.analysis.tape import Tape
+from hsdsl.lint.analysis.straight_line_program import Array, StraightLine
 
 BATCH = 512
 MOST_BOXES = 30_000
 _SMALLEST = 2.0**-40
 
 
-def excluded(tape: Tape, relations: tuple[Relation, ...], low: Array, high: Array, most: int = MOST_BOXES) -> bool:
+def excluded(
+    program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array, most: int = MOST_BOXES
+) -> bool:
     """Whether no point of a box satisfies all constraints.
 
     Parameters
     ----------
-    tape : Tape
+    program : StraightLine
         The constraints' expressions.
     relations : tuple of str
         What each has to be.
@@ -39,7 +40,7 @@ def excluded(tape: Tape, relations: tuple[Relation, ...], low: Array, high: Arra
         if seen > most:
             return False
         first, last = lows[-BATCH:], highs[-BATCH:]
-        left = _possible(tape, relations, first, last)
+        left = _possible(program, relations, first, last)
         first, last = first[left], last[left]
         widths = (last - first) / whole
         if len(first) and (not first.shape[1] or widths.max(axis=1).min() < _SMALLEST):
@@ -49,8 +50,8 @@ def excluded(tape: Tape, relations: tuple[Relation, ...], low: Array, high: Arra
     return True
 
 
-def _possible(tape: Tape, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
-    bounds = tape.over(low, high)
+def _possible(program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
+    bounds = program.over(low, high)
     possible = np.ones(len(low), dtype=bool)
     for least, most, relation in zip(bounds.low, bounds.high, relations, strict=True):
         if relation == "= 0":

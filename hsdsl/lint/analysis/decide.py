@@ -16,12 +16,11 @@ import numpy as np
 from hsdsl.errors import Decided
 from hsdsl.lint.analysis import branch_and_bound, elimination, rational_witness
 from hsdsl.lint.analysis.elimination import Reduced
-from hsdsl.lint.analysis.intervals import Array
 from hsdsl.lint.analysis.newton_search import ROUNDS, STARTS, NewtonSearch
 from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.polynomial import Polynomial
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Range
-from hsdsl.lint.analysis.tape import Tape, too_large
+from hsdsl.lint.analysis.straight_line_program import Array, StraightLine, too_large
 from hsdsl.lower.straight import replaced
 
 MOST_PARTS = 1500  # of the expressions of one question
@@ -93,8 +92,8 @@ class Decider:
         points = self.sample(given, ranges)
         if len(points) < FEWEST_POINTS:
             return None
-        tape = Tape([expr, *(expr.diff(s) for s in ranges)], list(ranges))
-        value, *slopes = tape.at(points)
+        program = StraightLine([expr, *(expr.diff(s) for s in ranges)], list(ranges))
+        value, *slopes = program.at(points)
         size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
         return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
 
@@ -131,7 +130,7 @@ class Decider:
         if search is None:
             return UNKNOWN
         never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
-        if branch_and_bound.excluded(search.tape, search.relations, search.low, search.high, 1):
+        if branch_and_bound.excluded(search.program, search.relations, search.low, search.high, 1):
             return never
         found = search.point()
         if found is not None:
@@ -158,19 +157,20 @@ class Decider:
         """A search for points; None where that would cost more than there is left."""
         if too_large((c.expr for c in rest), MOST_PARTS):
             return None
-        tape = Tape([c.expr for c in rest], names)
-        cost = len(tape) * (OVERHEAD + STARTS) * (len(names) + 1) * ROUNDS
+        program = StraightLine([c.expr for c in rest], names)
+        cost = len(program) * (OVERHEAD + STARTS) * (len(names) + 1) * ROUNDS
         if cost > self.left:
             return None
         self.left -= cost
         low, high = _box(names, reduced, ranges)
         typical = np.array([min(max(ranges[s].typical, a), b) for s, a, b in zip(names, low, high, strict=True)])
-        return NewtonSearch(tape, tuple(c.relation for c in rest), low, high, typical)
+        return NewtonSearch(program, tuple(c.relation for c in rest), low, high, typical)
 
     def _excluded(self, search: NewtonSearch) -> bool:
-        most = min(branch_and_bound.MOST_BOXES, MOST_WORK // len(search.tape), self.left // (8 * len(search.tape)))
-        self.left -= 8 * len(search.tape) * most
-        return most > 0 and branch_and_bound.excluded(search.tape, search.relations, search.low, search.high, most)
+        length = len(search.program)
+        most = min(branch_and_bound.MOST_BOXES, MOST_WORK // length, self.left // (8 * length))
+        self.left -= 8 * length * most
+        return most > 0 and branch_and_bound.excluded(search.program, search.relations, search.low, search.high, most)
 
     def _somewhere(
         self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Mapping[Any, Range]
@@ -181,7 +181,7 @@ class Decider:
                 value = limits.typical if low is None else max(limits.typical, float(low))
                 point[symbol] = value if high is None else min(value, float(high))
         free = list(point)
-        values = Tape(solved.values(), free).at(np.array([[point[s] for s in free]]))[:, 0] if solved else ()
+        values = StraightLine(solved.values(), free).at(np.array([[point[s] for s in free]]))[:, 0] if solved else ()
         whole = {**point, **dict(zip(solved, map(float, values), strict=True))}
         if not all(np.isfinite(v) for v in whole.values()):
             return UNKNOWN

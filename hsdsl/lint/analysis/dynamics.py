@@ -21,7 +21,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
-from hsdsl.lint.analysis.tape import at_point, enclosure, parts_of, too_large
+from hsdsl.lint.analysis.straight_line_program import at_point, enclosure, parts_of, too_large
 from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 

@@ -19,7 +19,7 @@ from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.singularities import breaks
 from hsdsl.lint.analysis.smooth_pieces import SmoothPiece, pieces
-from hsdsl.lint.analysis.tape import Tape, too_large
+from hsdsl.lint.analysis.straight_line_program import StraightLine, too_large
 from hsdsl.system import TIME, Edge, Mode
 
 DEEPEST = 6  # derivatives along the flow that are looked at
@@ -53,10 +53,12 @@ class ModePoint:
     def sign(self, expr: Any) -> int:
         """-1, 0 or 1; 0 where round-off and the search's own error may be all there is."""
         names = sorted(expr.free_symbols, key=str)
-        tape = self.dynamics.remembered(("terms", expr), lambda: Tape([expr, *sp.Add.make_args(expr)], names))
+        program = self.dynamics.remembered(
+            ("terms", expr), lambda: StraightLine([expr, *sp.Add.make_args(expr)], names)
+        )
         here = np.array([float(self.point[s]) for s in names])
         steps = _STEP * np.diag([self.size(s) for s in names])
-        values = tape.at(np.vstack([here, here + steps]) if names else np.zeros((1, 0)))
+        values = program.at(np.vstack([here, here + steps]) if names else np.zeros((1, 0)))
         value, terms, slopes = values[0, 0], values[1:, 0], (values[0, 1:] - values[0, 0]) / _STEP
         if not np.isfinite(value):
             raise Unsure

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.lint.analysis.intervals import Array, silent
 from hsdsl.lint.analysis.question import Relation
-from hsdsl.lint.analysis.tape import Tape
+from hsdsl.lint.analysis.straight_line_program import Array, StraightLine, quiet
 
 STARTS = 96
 ROUNDS = 24
@@ -25,11 +24,11 @@ _STEP = 1e-7
 
 @dataclass(frozen=True)
 class NewtonSearch:
-    """Constraints as a tape over a box.
+    """Constraints as a program over a box.
 
     Attributes
     ----------
-    tape : Tape
+    program : StraightLine
         The constraints' expressions.
     relations : tuple of str
         What each of them has to be.
@@ -39,7 +38,7 @@ class NewtonSearch:
         A typical value of each name; the first start.
     """
 
-    tape: Tape
+    program: StraightLine
     relations: tuple[Relation, ...]
     low: Array
     high: Array
@@ -50,7 +49,7 @@ class NewtonSearch:
         if not len(self.low):
             found = self._good(np.zeros((1, 0)))
             return np.zeros(0) if found[0] else None
-        with silent():
+        with quiet():
             points = self._starts()
             for _ in range(ROUNDS):
                 good = self._good(points)
@@ -62,7 +61,7 @@ class NewtonSearch:
 
     def points(self) -> Array:
         """All the points that were found: array (n, names)."""
-        with silent():
+        with quiet():
             points = self._starts() if len(self.low) else np.zeros((1, 0))
             for _ in range(ROUNDS if len(self.low) else 0):
                 points = np.where(self._good(points)[:, None], points, self._moved(points))
@@ -86,12 +85,12 @@ class NewtonSearch:
             step = np.where(points[:, i] + step > self.high[i], -step, step)
             moved = points.copy()
             moved[:, i] += step
-            columns.append((self.tape.at(moved) - values) / step)
+            columns.append((self.program.at(moved) - values) / step)
         return np.stack(columns, axis=-1)
 
     def _good(self, points: Array) -> Array:
-        with silent():
-            values = self.tape.at(points)
+        with quiet():
+            values = self.program.at(points)
             good = np.isfinite(values).all(axis=0)
             if not good.any() or not points.shape[1]:
                 return good & self._hold(values, np.zeros_like(values))
@@ -110,7 +109,7 @@ class NewtonSearch:
         return good
 
     def _moved(self, points: Array) -> Array:
-        values = self.tape.at(points)
+        values = self.program.at(points)
         slopes = self._slopes(points, values)
         wanted = np.zeros_like(values)
         for k, relation in enumerate(self.relations):

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from hsdsl.lint.analysis.polynomial import UNIT, Atom, Polynomial
 from hsdsl.lint.analysis.question import Relation
-from hsdsl.lint.analysis.tape import enclosure
+from hsdsl.lint.analysis.straight_line_program import enclosure
 
 Bounds = tuple[Fraction | None, Fraction | None]  # None: without end
 _SIGNED = {"sin": (-1, 1), "cos": (-1, 1), "tanh": (-1, 1), "exp": (0, None), "cosh": (1, None), "absolute": (0, None)}

@@ -15,7 +15,7 @@ from hsdsl import functions
 from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, positive, zero
-from hsdsl.lint.analysis.tape import too_large
+from hsdsl.lint.analysis.straight_line_program import too_large
 
 _SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
 _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has

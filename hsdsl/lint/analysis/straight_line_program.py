@@ -1,78 +1,84 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""Expressions as lists of operations, every shared part once, that run on arrays of numbers and of intervals."""
+"""Straight-line programs: expressions as operations, shared parts once, on arrays of numbers and of intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from operator import add, mul
 from typing import Any
 
 import mpmath
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
+from hsdsl.enclosures import RESTRICTED, Range, hull, whole_power
 from hsdsl.functions import FUNCTIONS
-from hsdsl.lint.analysis import intervals
-from hsdsl.lint.analysis.intervals import Array, Intervals
 
 _NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name != "sqrt"}
 _NAMES |= {sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor", sp.Min: "min", sp.Max: "max"}  # where SymPy makes its own
+_NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
+_NUMPY |= {"asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh", "pow": "power"}
 _MANY = 10_000
 _NOTHING = (np.nan, -np.inf, np.inf)  # of what is no function of the language, nothing is known
+Array = NDArray[Any]  # of numbers, or of truth values
+Function = Callable[..., Any]
 
 
 @dataclass(frozen=True)
-class Step:
-    """One operation: its name, the earlier results it takes, and a number it may need."""
+class Operation:
+    """One operation on numbers and on intervals, and the earlier results that it takes."""
 
-    operation: str
     arguments: tuple[int, ...]
-    value: Any = None
+    on_numbers: Function
+    on_intervals: Function
 
 
-class Tape:
+class StraightLine:
     """Some expressions of the same names.
 
     Parameters
     ----------
     expressions : iterable of sympy.Expr
-        What to compute; they hold nothing but ``symbols``, numbers and the language's functions.
+        They hold nothing but ``symbols``, numbers and the language's functions.
     symbols : sequence of sympy.Symbol
         The columns of the points and boxes.
     """
 
     def __init__(self, expressions: Iterable[Any], symbols: Sequence[Any]) -> None:
-        self.steps: list[Step] = [Step("name", (), i) for i in range(len(symbols))]
+        self._operations: list[Operation] = []
+        self._names = len(symbols)
         self._known: dict[Any, int] = {symbol: i for i, symbol in enumerate(symbols)}
         self.results = [self._of(expr) for expr in expressions]
 
     def __len__(self) -> int:
-        return len(self.steps)
+        return self._names + len(self._operations)
 
     def at(self, points: Array) -> Array:
         """The values at points: array (n, symbols) to array (results, n); NaN where there is no real value."""
-        values: list[Array] = []
-        with intervals.silent():
-            for step in self.steps:
-                values.append(_number(step, values, points))
+        values: list[Array] = list(points.T)
+        with quiet():
+            for operation in self._operations:
+                values.append(operation.on_numbers(*(values[i] for i in operation.arguments)))
             rows = [np.broadcast_to(values[i], (len(points),)) for i in self.results]
         return np.array(rows).reshape(len(rows), len(points))
 
-    def over(self, low: Array, high: Array) -> Intervals:
+    def over(self, low: Array, high: Array) -> Range:
         """Bounds over boxes: arrays (n, symbols) to arrays (results, n)."""
-        values: list[Intervals] = []
-        shape = (len(low),)
-        with intervals.silent():
-            for step in self.steps:
-                values.append(_interval(step, values, low, high))
-            ends = [
-                np.array([np.broadcast_to(end(values[i]), shape) for i in self.results]).reshape(-1, len(low))
-                for end in (lambda v: v.low, lambda v: v.high)
-            ]
-        return Intervals(*ends)
+        values: list[Range] = hull(low, high)
+        with quiet():
+            for operation in self._operations:
+                values.append(operation.on_intervals(*(values[i] for i in operation.arguments)))
+        shape = (len(self.results), len(low))
+        ends = (np.array([np.broadcast_to(end, len(low)) for end in row]).reshape(shape) for row in self._ends(values))
+        return Range(*ends)
+
+    def _ends(self, values: list[Range]) -> tuple[list[Any], list[Any]]:
+        return [values[i].low for i in self.results], [values[i].high for i in self.results]
 
     def _of(self, expr: Any) -> int:
         found = self._known.get(expr)
@@ -80,70 +86,57 @@ class Tape:
             found = self._known[expr] = self._make(expr)
         return found
 
-    def _add(self, operation: str, *arguments: int, value: Any = None) -> int:
-        self.steps.append(Step(operation, arguments, value))
-        return len(self.steps) - 1
+    def _add(self, on_numbers: Function, on_intervals: Function, *arguments: int) -> int:
+        self._operations.append(Operation(arguments, on_numbers, on_intervals))
+        return len(self) - 1
+
+    def _call(self, name: str, *arguments: int) -> int:
+        return self._add(getattr(np, _NUMPY.get(name, name)), RESTRICTED[name], *arguments)
+
+    def _number(self, nearest: float, low: float, high: float) -> int:
+        return self._add(lambda: np.array([nearest]), lambda: Range(np.array([low]), np.array([high])))
 
     def _make(self, expr: Any) -> int:
         if expr.is_Atom:
-            return self._add("number", value=_enclosed(expr))
+            return self._number(*_enclosed(expr))
         if expr.is_Add or expr.is_Mul:
             result, *rest = map(self._of, expr.args)
+            operation = add if expr.is_Add else mul
             for part in rest:
-                result = self._add("add" if expr.is_Add else "multiply", result, part)
+                result = self._add(operation, operation, result, part)
             return result
         if expr.is_Pow:
-            base, exponent = expr.args
-            if exponent.is_Integer:
-                return self._add("power", self._of(base), value=int(exponent))
-            if abs(exponent) == sp.Rational(1, 2):
-                root = self._add("sqrt", self._of(base))
-                return root if exponent > 0 else self._add("power", root, value=-1)
-            if base is sp.E:
-                return self._add("exp", self._of(exponent))
-            return self._add("real power", self._of(base), self._of(exponent))
+            return self._power(*expr.args)
         if expr.func not in _NAMES:
-            return self._add("number", value=_NOTHING)
-        name, parts = _NAMES[expr.func], [self._of(argument) for argument in expr.args]
-        while name in ("min", "max") and len(parts) > 2:
-            parts = [self._add(name, *parts[:2]), *parts[2:]]
-        return self._add(name, *parts)
+            return self._number(*_NOTHING)
+        name, (result, *rest) = _NAMES[expr.func], [self._of(argument) for argument in expr.args]
+        if name not in ("min", "max"):
+            return self._call(name, result, *rest)
+        for part in rest:
+            result = self._call(name, result, part)
+        return result
+
+    def _power(self, base: Any, exponent: Any) -> int:
+        if exponent.is_Integer:
+            return self._whole_power(self._of(base), int(exponent))
+        if abs(exponent) == sp.Rational(1, 2):
+            root = self._call("sqrt", self._of(base))
+            return root if exponent > 0 else self._whole_power(root, -1)
+        if base is sp.E:
+            return self._call("exp", self._of(exponent))
+        return self._call("pow", self._of(base), self._of(exponent))
+
+    def _whole_power(self, base: int, exponent: int) -> int:
+        def on_intervals(x: Range) -> Range:
+            power = whole_power(x, abs(exponent)) if abs(exponent) > 1 else x
+            return power if exponent > 0 else RESTRICTED["reciprocal"](power)
+
+        return self._add(lambda x: x ** float(exponent), on_intervals, base)
 
 
-def _number(step: Step, values: Sequence[Array], points: Array) -> Array:
-    arguments = [values[i] for i in step.arguments]
-    match step.operation:
-        case "name":
-            return points[:, step.value]
-        case "number":
-            return np.array([step.value[0]])
-        case "add":
-            return arguments[0] + arguments[1]
-        case "multiply":
-            return arguments[0] * arguments[1]
-        case "power":
-            return arguments[0] ** float(step.value)
-        case "real power":
-            return arguments[0] ** arguments[1]
-    return intervals.FUNCTIONS[step.operation][0](*arguments)
-
-
-def _interval(step: Step, values: Sequence[Intervals], low: Array, high: Array) -> Intervals:
-    arguments = [values[i] for i in step.arguments]
-    match step.operation:
-        case "name":
-            return Intervals(low[:, step.value], high[:, step.value])
-        case "number":
-            return intervals.constant(*step.value)
-        case "add":
-            return intervals.add(*arguments)
-        case "multiply":
-            return intervals.multiply(*arguments)
-        case "power":
-            return intervals.integer_power(arguments[0], step.value)
-        case "real power":
-            return intervals.real_power(*arguments)
-    return intervals.FUNCTIONS[step.operation][1](*arguments)
+def quiet() -> Any:
+    """NumPy without warnings: infinities and values that are no numbers are expected."""
+    return np.errstate(all="ignore")
 
 
 def _enclosed(expr: Any) -> tuple[float, float, float]:
@@ -208,4 +201,4 @@ def parts_of(expr: Any) -> int:
 def at_point(expr: Any, point: Mapping[Any, float]) -> float:
     """One expression at one point."""
     symbols = list(point)
-    return float(Tape([expr], symbols).at(np.array([[float(point[s]) for s in symbols]]))[0, 0])
+    return float(StraightLine([expr], symbols).at(np.array([[float(point[s]) for s in symbols]]))[0, 0])
