@@ -85,17 +85,12 @@ def alone(folder: Path) -> Generator[None]:
 
 
 def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
-    try:
-        mode = target.stat().st_mode
-    except FileNotFoundError:
-        return
-    if stat.S_ISDIR(mode):
-        raise UsageError(f"cannot write {os.fspath(path)}: it is a folder")
+    mode = target.stat().st_mode if target.exists() else stat.S_IFREG
     if not stat.S_ISREG(mode):
-        raise UsageError(f"cannot write {os.fspath(path)}: it is not a regular file")
+        kind = "it is a folder" if stat.S_ISDIR(mode) else "it is not a regular file"
+        raise UsageError(f"cannot write {os.fspath(path)}: {kind}")
 
 
 def _sentence(path: str | os.PathLike[str], target: Path, error: OSError) -> str:
-    if not target.parent.is_dir():
-        return f"cannot write {os.fspath(path)}: there is no folder {Path(path).parent}"
-    return f"cannot write {os.fspath(path)}: {error.strerror or error}"
+    folder = None if target.parent.is_dir() else f"there is no folder {Path(path).parent}"
+    return f"cannot write {os.fspath(path)}: {folder or error.strerror or error}"

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import json
 import os
+import types
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
+from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -19,12 +22,11 @@ from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Arc, Array, Execution, Kind, Point, Stop, Transition, Verdict
 from hsdsl.files import open_regular
-from hsdsl.store.plain import Plain
-from hsdsl.store.sound import check
+from hsdsl.store.lossless import Lossless, numbers
 
 FORMAT = "hsdsl execution"
 VERSION = 1
-COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
+COLUMNS = {"times": 1, "values": 2, "outputs": 2, "depth": 1, "coefficients": 3}  # and their dimensions
 KINDS: tuple[Kind, ...] = ("flow", "strip")
 _TEXTS = ("model", "digest", "engine", "scheme", "method", "settings", "seconds", "digits", "title", "output_names")
 _BEGINNING = b"PK\x03\x04"
@@ -34,29 +36,27 @@ _DAMAGED = "it is damaged, or not an execution that hsdsl saved"
 def save_npz(execution: Execution, file: BinaryIO) -> None:
     """Write an execution, everything but its ``output_function``."""
     columns = {name: getattr(execution, name) for name in COLUMNS}
-    recorded = (execution.transitions, execution.final, execution.stop, execution.settings, execution.overrides)
-    loose = Plain.numbers(recorded)
+    records = [asdict(record) for record in (execution.final, execution.stop, *execution.transitions)]
+    loose = numbers([records, execution.settings, execution.overrides])
     packed = (x for column in columns.values() if column.dtype == object for x in column.ravel())
-    plain = Plain(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
+    form = Lossless(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
     layouts = list(dict.fromkeys((arc.mode, arc.states) for arc in execution.arcs))
-    number = {layout: i for i, layout in enumerate(layouts)}
-    arcs = [
-        (number[arc.mode, arc.states], KINDS.index(arc.kind), arc.jump, arc.first, arc.last) for arc in execution.arcs
-    ]
+    order = {layout: i for i, layout in enumerate(layouts)}
+    arcs = [(order[a.mode, a.states], KINDS.index(a.kind), a.jump, a.first, a.last) for a in execution.arcs]
     header = {
         "format": FORMAT,
         "version": VERSION,
-        "bits": plain.precision,
+        "bits": form.precision,
         "layouts": layouts,
-        **{name: plain.pack(getattr(execution, name)) for name in _TEXTS},
-        "overrides": plain.pack(execution.overrides),
-        "stop": plain.pack_fields(execution.stop),
-        "final": plain.pack_fields(execution.final),
-        "verdict": plain.pack_fields(execution.verdict),
-        "transitions": [plain.pack_fields(transition) for transition in execution.transitions],
+        **{name: form.pack(getattr(execution, name)) for name in _TEXTS},
+        "overrides": form.pack(execution.overrides),
+        "stop": form.pack_fields(execution.stop),
+        "final": form.pack_fields(execution.final),
+        "verdict": form.pack_fields(execution.verdict),
+        "transitions": [form.pack_fields(transition) for transition in execution.transitions],
     }
     text = np.frombuffer(json.dumps(header, allow_nan=False).encode(), dtype=np.uint8)
-    arrays: dict[str, Any] = {name: plain.pack_array(column) for name, column in columns.items()}
+    arrays: dict[str, Any] = {name: form.pack_array(column) for name, column in columns.items()}
     np.savez(file, **arrays, header=text, arcs=np.array(arcs, dtype=np.int64))
 
 
@@ -109,22 +109,73 @@ def _read(archive: Mapping[str, Array]) -> Execution:
     if header["version"] > VERSION:
         message = f"a later version of hsdsl saved it, in format {header['version']:.20g}; this one reads {VERSION}"
         raise UsageError(message, "update hsdsl")
-    plain = Plain(header["bits"], header["digits"])
+    form = Lossless(header["bits"], header["digits"])
     layouts = [(str(mode), tuple(states)) for mode, states in header["layouts"]]
     arcs = tuple(
         Arc(*layouts[layout], KINDS[kind], jump, first, last)
         for layout, kind, jump, first, last in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
     )
-    fields: dict[str, Any] = {name: plain.unpack(header[name]) for name in _TEXTS}
-    fields["overrides"] = plain.unpack(header.get("overrides", {}))  # files of earlier versions have none
-    fields |= {name: plain.unpack_array(archive[name]) for name in COLUMNS}
+    fields: dict[str, Any] = {name: form.unpack(header[name]) for name in _TEXTS}
+    fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have none
+    fields |= {name: form.unpack_array(archive[name]) for name in COLUMNS}
     execution = Execution(
-        stop=Stop(**plain.unpack_fields(header["stop"])),
-        final=Point(**plain.unpack_fields(header["final"])),
-        verdict=Verdict(**plain.unpack_fields(header["verdict"])),
-        transitions=tuple(Transition(**plain.unpack_fields(record)) for record in header["transitions"]),
+        stop=Stop(**form.unpack(header["stop"])),
+        final=Point(**form.unpack(header["final"])),
+        verdict=Verdict(**form.unpack(header["verdict"])),
+        transitions=tuple(Transition(**form.unpack(record)) for record in header["transitions"]),
         arcs=arcs,
         **fields,
     )
-    check(execution)
+    _check(execution)
     return execution
+
+
+def _check(execution: Execution) -> None:
+    """Check the declared types, which an execution does not check itself; TypeError where a part has another."""
+    _check_fields(execution, {*_TEXTS})
+    for record in (execution.stop, execution.final, execution.verdict, *execution.transitions, *execution.arcs):
+        _check_fields(record, {field.name for field in fields(record)})
+    for name, dimensions in COLUMNS.items():
+        column: Array = getattr(execution, name)
+        if column.ndim != dimensions or str(column.dtype) not in ("float64", "object"):
+            raise TypeError(f"{name} has another shape or type")
+    widths = {len(arc.states) for arc in execution.arcs}
+    if execution.values.shape[1] < max(widths) or execution.outputs.shape[1] != len(execution.output_names):
+        raise TypeError("columns are missing")
+    if execution.digits is not None and execution.digits < 1:
+        raise TypeError("no such precision")
+    left_out = execution.settings.get("left_out", {"states": (), "reason": ""})
+    if not (_fits(left_out["states"], tuple[str, ...]) and type(left_out["reason"]) is str):
+        raise TypeError("left_out has another form")
+
+
+def _check_fields(record: object, names: Iterable[str]) -> None:
+    hints = _hints(type(record))
+    for name in names:
+        if not _fits(getattr(record, name), dict if name == "settings" else hints[name]):
+            raise TypeError(f"{name} has another type")
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Whether a value is of a declared type; what is declared as anything is a number."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind in (Any, float):
+        return type(value) in (int, float) or decimals.is_multiprecision(value)
+    if kind is type(None):
+        return value is None
+    if origin is Literal:
+        return value in arguments
+    if origin is tuple:
+        items = cast("tuple[Any, ...]", value)
+        return isinstance(value, (tuple, list)) and all(_fits(item, arguments[0]) for item in items)
+    if origin is dict:
+        entries = cast("dict[Any, Any]", value)
+        return isinstance(value, dict) and all(type(k) is str and _fits(v, arguments[1]) for k, v in entries.items())
+    if origin in (Union, types.UnionType):
+        return any(_fits(value, one) for one in arguments)
+    return type(value) is kind

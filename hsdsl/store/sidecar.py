@@ -1,4 +1,4 @@
-"""The JSON beside a table: what was run, with what settings and versions, and what the table cannot say."""
+"""The JSON file of a table: model, settings and versions of the run, and what the table cannot hold."""
 
 from __future__ import annotations
 
@@ -20,13 +20,11 @@ LIBRARIES = ("hsdsl", "numpy", "mpmath", "sympy")
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that numbers can depend on."""
-    found = {"python": platform.python_version()}
+    known = {"python": platform.python_version()}
     for library in LIBRARIES:
-        try:
-            found[library] = metadata.version(library)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
+        with suppress(metadata.PackageNotFoundError):
+            known[library] = metadata.version(library)
+    return known
 
 
 def sidecar_of(table: Path) -> Path:
@@ -44,14 +42,14 @@ def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
     """
     path = sidecar_of(Path(table))
     try:
-        found, content = _parsed(path), _checksum(Path(table))
+        sidecar, checksum = _parsed(path), _checksum(Path(table))
     except OSError as error:
         raise UsageError(f"cannot read {os.fspath(table)} and its sidecar: {error.strerror or error}") from None
-    if found is None:
+    if sidecar is None:
         raise UsageError(f"{path} is damaged, or not the sidecar of a table")
-    if found.get("table_sha256") != content:
+    if sidecar.get("table_sha256") != checksum:
         raise UsageError(f"{path} does not belong to {os.fspath(table)}, which was changed or replaced since")
-    return found
+    return sidecar
 
 
 def forget_sidecar(table: Path) -> None:
@@ -64,11 +62,11 @@ def forget_sidecar(table: Path) -> None:
 
 def _parsed(path: Path) -> dict[str, Any] | None:
     try:
-        found: Any = json.loads(path.read_bytes())
-        known = isinstance(found["table"]["file"], str) and isinstance(found["versions"], dict)
+        content: Any = json.loads(path.read_bytes())
+        known = isinstance(content["table"]["file"], str) and isinstance(content["versions"], dict)
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
-    return cast("dict[str, Any]", found) if known else None
+    return cast("dict[str, Any]", content) if known else None
 
 
 def _checksum(path: Path) -> str:
@@ -76,23 +74,20 @@ def _checksum(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def describe(execution: Execution, table: Samples, name: str, content: str) -> dict[str, Any]:
-    """Return the sidecar's object: that of `run --json`, with the model's hash, versions and the table's shape and
-    hash.
+def write_sidecar(execution: Execution, table: Samples, name: str, written: Path, file: BinaryIO) -> None:
+    """Write the sidecar of the table that will be called ``name`` and is ``written`` already.
+
+    Its object is that of `run --json`, with the model's hash, versions and the table's shape and hash.
     """
     run = as_json(execution)
-    return {
+    content = {
         "model": run.pop("model"),
         "sha256": execution.digest,
         "title": execution.title,
         "versions": versions(),
         "table": {"file": name, "rows": len(table), "columns": list(table.labels)},
-        "table_sha256": content,
+        "table_sha256": _checksum(written),
         "digits": execution.digits,
         **run,
     }
-
-
-def write_sidecar(execution: Execution, table: Samples, name: str, written: Path, file: BinaryIO) -> None:
-    """Write the sidecar of the table that will be called ``name`` and is ``written`` already."""
-    file.write((dumps(describe(execution, table, name, _checksum(written))) + "\n").encode())
+    file.write((dumps(content) + "\n").encode())
