@@ -85,7 +85,9 @@ def alone(folder: Path) -> Generator[None]:
 
 
 def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
-    mode = target.stat().st_mode if target.exists() else stat.S_IFREG
+    mode = stat.S_IFREG
+    with suppress(FileNotFoundError):
+        mode = target.stat().st_mode
     if not stat.S_ISREG(mode):
         kind = "it is a folder" if stat.S_ISDIR(mode) else "it is not a regular file"
         raise UsageError(f"cannot write {os.fspath(path)}: {kind}")
