@@ -1,6 +1,6 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
-"""The functions of the language, as SymPy knows them.
+"""The functions of the language, as SymPy functions.
 
 The smooth ones are SymPy's own, but for the hyperbolic three: SymPy asks whether they are real by splitting their
 argument into real and imaginary parts, which in a nest of them takes for ever; ours are real. The kinked and jumping
@@ -15,85 +15,62 @@ from __future__ import annotations
 import sympy as sp
 
 
-class _Real(sp.Function):
-    is_real = True
-    is_extended_real = True
-    is_finite = True
+class _Kinked(sp.Function):
+    """A function of ours: it folds fractions by one of SymPy's, and its derivative holds almost everywhere."""
 
-
-class absolute(_Real):
-    """|x|."""
-
-    nargs = 1
+    is_real = is_extended_real = is_finite = True
+    fold: object
 
     @classmethod
-    def eval(cls, x):
-        """Fold a number."""
-        return sp.Abs(x) if x.is_Rational else None
+    def eval(cls, *arguments):
+        """Fold fractions."""
+        return cls.fold(*arguments) if all(x.is_Rational for x in arguments) else None
 
     def fdiff(self, argindex=1):
-        """Almost everywhere."""
+        """The derivative."""
+        return sp.S.Zero
+
+
+class absolute(_Kinked):
+    """|x|."""
+
+    nargs, fold = 1, sp.Abs
+
+    def fdiff(self, argindex=1):
+        """The sign of x."""
         return sign(self.args[0])
 
 
-class sign(_Real):
+class sign(_Kinked):
     """-1, 0 or 1."""
 
-    nargs = 1
-
-    @classmethod
-    def eval(cls, x):
-        """Fold a number."""
-        return sp.sign(x) if x.is_Rational else None
-
-    def fdiff(self, argindex=1):
-        """Almost everywhere."""
-        return sp.S.Zero
+    nargs, fold = 1, sp.sign
 
 
-class floor(_Real):
+class floor(_Kinked):
     """The largest integer not above x."""
 
-    nargs = 1
-
-    @classmethod
-    def eval(cls, x):
-        """Fold a number."""
-        return sp.floor(x) if x.is_Rational else None
-
-    def fdiff(self, argindex=1):
-        """Almost everywhere."""
-        return sp.S.Zero
+    nargs, fold = 1, sp.floor
 
 
-class minimum(_Real):
+class minimum(_Kinked):
     """The smaller of two."""
 
-    nargs = 2
-
-    @classmethod
-    def eval(cls, x, y):
-        """Fold numbers."""
-        return sp.Min(x, y) if x.is_Rational and y.is_Rational else None
+    nargs, fold = 2, sp.Min
 
     def fdiff(self, argindex=1):
-        """Almost everywhere; half of each side where they are equal."""
+        """1 or 0; half where both are equal."""
         x, y = self.args
         return (1 - (1 if argindex == 1 else -1) * sign(x - y)) / 2
 
 
-class maximum(_Real):
+class maximum(_Kinked):
     """The larger of two."""
 
-    nargs = 2
-
-    @classmethod
-    def eval(cls, x, y):
-        """Fold numbers."""
-        return sp.Max(x, y) if x.is_Rational and y.is_Rational else None
+    nargs, fold = 2, sp.Max
 
     def fdiff(self, argindex=1):
-        """Almost everywhere; half of each side where they are equal."""
+        """1 or 0; half where both are equal."""
         x, y = self.args
         return (1 + (1 if argindex == 1 else -1) * sign(x - y)) / 2
 
@@ -155,22 +132,10 @@ def rebuilt(expr, arguments):
 
 # name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)
 FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
-    "sin": (sp.sin, 1, 1),
-    "cos": (sp.cos, 1, 1),
-    "tan": (sp.tan, 1, 1),
-    "asin": (sp.asin, 1, 1),
-    "acos": (sp.acos, 1, 1),
-    "atan": (sp.atan, 1, 1),
+    **{name: (getattr(sp, name), 1, 1) for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
     "atan2": (sp.atan2, 2, 2),
-    "sinh": (sinh, 1, 1),
-    "cosh": (cosh, 1, 1),
-    "tanh": (tanh, 1, 1),
-    "asinh": (sp.asinh, 1, 1),
-    "acosh": (sp.acosh, 1, 1),
-    "atanh": (sp.atanh, 1, 1),
-    "exp": (sp.exp, 1, 1),
-    "log": (sp.log, 1, 1),
-    "sqrt": (sp.sqrt, 1, 1),
+    **{function.__name__: (function, 1, 1) for function in (sinh, cosh, tanh)},
+    **{name: (getattr(sp, name), 1, 1) for name in ("asinh", "acosh", "atanh", "exp", "log", "sqrt")},
     "abs": (absolute, 1, 1),
     "sign": (sign, 1, 1),
     "floor": (floor, 1, 1),

@@ -1,218 +1,115 @@
-"""What other languages write, with the right form here: signs, and names of functions and constants."""
+"""Hints for signs and names of other languages: their right form here."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 
 from hsdsl.functions import FUNCTIONS
 
 CASES = "write a mode for each case, or use min, max, abs or sign"
 _DEGREES = "angles are in radians: write 30*pi/180 for 30 degrees"
 _SAMPLES = "give it as samples, under `inputs`"
-_UNITS = frozenset(
-    (
-        "s",
-        "ms",
-        "us",
-        "ns",
-        "min",
-        "h",
-        "hr",
-        "hz",
-        "khz",
-        "mhz",
-        "ghz",
-        "m",
-        "mm",
-        "cm",
-        "km",
-        "um",
-        "kg",
-        "g",
-        "mg",
-        "n",
-        "kn",
-        "nm",
-        "j",
-        "kj",
-        "w",
-        "kw",
-        "mw",
-        "v",
-        "mv",
-        "kv",
-        "a",
-        "ma",
-        "ohm",
-        "mh",
-        "uf",
-        "nf",
-        "deg",
-        "degc",
-        "degf",
-        "c",
-        "k",
-        "pa",
-        "kpa",
-        "mpa",
-        "bar",
-        "psi",
-        "l",
-        "ml",
-        "rpm",
-        "mol",
-        "ev",
-        "sec",
-        "secs",
-        "second",
-        "seconds",
-        "minute",
-        "minutes",
-        "hour",
-        "hours",
-        "day",
-        "days",
-        "meter",
-        "meters",
-        "metre",
-        "metres",
-        "volt",
-        "volts",
-        "amp",
-        "amps",
-        "watt",
-        "watts",
-        "newton",
-        "newtons",
-        "kelvin",
-        "celsius",
-    )
+_UNIT_NAMES = (
+    "s ms us ns min h hr hz khz mhz ghz m mm cm km um kg g mg n kn nm j kj w kw mw v mv kv a ma ohm mh uf nf deg "
+    "degc degf c k pa kpa mpa bar psi l ml rpm mol ev sec secs second seconds minute minutes hour hours day days meter "
+    "meters metre metres volt volts amp amps watt watts newton newtons kelvin celsius"
 )
+_UNITS = frozenset(_UNIT_NAMES.split())
 _QUANTITY = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*((?:[^\W\d]+\s*[*/·]\s*)*)([^\W\d]+)\s*")
 _DERIVATIVE = "a derivative is what `flow` gives a state: write that, or name it under `let`"
-_MEMORY = "nothing is remembered but states; a reset sees the values before the jump"
 
-# names: what to write instead
-NAMES = {
-    "e": "write exp(x) for a power of e, and exp(1) for e itself",
-    "π": "write pi",
-    "PI": "write pi",
-    "Pi": "write pi",
-    "time": "write t for the time",
-    "tau": "the time is t",
-    "inf": "every number is finite here",
-    "nan": "every number is finite here",
-    **dict.fromkeys(("on", "yes"), "write true for a condition, 1 for a number"),
-    **dict.fromkeys(("off", "no"), "write false for a condition, 0 for a number"),
-    "deg": _DEGREES,
-    "degrees": _DEGREES,
-    "rad": "angles are in radians: leave the unit out",
-    "arcsin": "write asin",
-    "arccos": "write acos",
-    "arctan": "write atan",
-    "arctan2": "write atan2",
-    "arcsinh": "write asinh",
-    "arccosh": "write acosh",
-    "arctanh": "write atanh",
-    "tg": "write tan",
-    "cot": "write 1/tan(x)",
-    "sec": "write 1/cos(x)",
-    "csc": "write 1/sin(x)",
-    "sind": _DEGREES,
-    "cosd": _DEGREES,
-    "ln": "write log",
-    "log10": "write log(x)/log(10)",
-    "log2": "write log(x)/log(2)",
-    "log1p": "write log(1 + x)",
-    "expm1": "write exp(x) - 1",
-    "fabs": "write abs",
-    "sgn": "write sign",
-    "signum": "write sign",
-    "pow": "write x**y",
-    "power": "write x**y",
-    "sqr": "write x**2",
-    "square": "write x**2",
-    "norm": "write sqrt(x**2 + y**2)",
-    "hypot": "write sqrt(x**2 + y**2)",
-    "ceil": "write -floor(-x)",
-    "round": "write floor(x + 1/2)",
-    "int": "write floor(x)",
-    "mod": "write x - y*floor(x/y) for a remainder",
-    "fmod": "write x - y*floor(x/y) for a remainder",
-    "rem": "write x - y*floor(x/y) for a remainder",
-    "cbrt": "write x**(1/3), for x that is not negative",
-    "clip": "write min(max(x, low), high)",
-    "sat": "write min(max(x, low), high)",
-    "saturate": "write min(max(x, low), high)",
-    "der": _DERIVATIVE,
-    "diff": _DERIVATIVE,
-    "dt": _DERIVATIVE,
-    "integral": "an integral is a state whose flow is the integrand",
-    "pre": _MEMORY,
-    "delay": _MEMORY,
-    "edge": _MEMORY,
-    "reinit": "a state is set by `reset` in a transition",
-    "interp": _SAMPLES,
-    "interp1": _SAMPLES,
-    "lookup": _SAMPLES,
-    "rand": "a model has no chance in it; " + _SAMPLES,
-    "random": "a model has no chance in it; " + _SAMPLES,
-    "randn": "a model has no chance in it; " + _SAMPLES,
-    "noise": "a model has no chance in it; " + _SAMPLES,
-    **dict.fromkeys(("if", "ifelse", "where", "piecewise", "Piecewise", "heaviside", "Heaviside", "step"), CASES),
+_HINTS = {  # what to write instead of names
+    "write exp(x) for a power of e, and exp(1) for e itself": "e",
+    "write pi": "π PI Pi",
+    "write t for the time": "time",
+    "the time is t": "tau",
+    "every number is finite here": "inf nan",
+    "write true for a condition, 1 for a number": "on yes",
+    "write false for a condition, 0 for a number": "off no",
+    _DEGREES: "deg degrees sind cosd",
+    "angles are in radians: leave the unit out": "rad",
+    **{f"write a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")},
+    "write tan": "tg",
+    "write 1/tan(x)": "cot",
+    "write 1/cos(x)": "sec",
+    "write 1/sin(x)": "csc",
+    "write log": "ln",
+    "write log(x)/log(10)": "log10",
+    "write log(x)/log(2)": "log2",
+    "write log(1 + x)": "log1p",
+    "write exp(x) - 1": "expm1",
+    "write abs": "fabs",
+    "write sign": "sgn signum",
+    "write x**y": "pow power",
+    "write x**2": "sqr square",
+    "write sqrt(x**2 + y**2)": "norm hypot",
+    "write -floor(-x)": "ceil",
+    "write floor(x + 1/2)": "round",
+    "write floor(x)": "int",
+    "write x - y*floor(x/y) for a remainder": "mod fmod rem",
+    "write x**(1/3), for x that is not negative": "cbrt",
+    "write min(max(x, low), high)": "clip sat saturate",
+    _DERIVATIVE: "der diff dt",
+    "an integral is a state whose flow is the integrand": "integral",
+    "nothing is remembered but states; a reset sees the values before the jump": "pre delay edge",
+    "a state is set by `reset` in a transition": "reinit",
+    _SAMPLES: "interp interp1 lookup",
+    "a model has no chance in it; " + _SAMPLES: "rand random randn noise",
+    CASES: "if ifelse where piecewise Piecewise heaviside Heaviside step",
 }
+NAMES = {name: hint for hint, names in _HINTS.items() for name in names.split()}
 
-# signs: its characters, a code, a sentence, the right form
-SIGNS: tuple[tuple[str, str, str, str], ...] = (
-    ("&&", "HS108", "`&&` is not an operator of the language", "write `and`"),
-    ("||", "HS108", "`||` is not an operator of the language", "write `or`"),
-    ("&", "HS108", "`&` is not an operator of the language", "write `and`"),
-    ("|", "HS108", "`|` is not an operator of the language", "write `or`, and abs(x) for an absolute value"),
-    ("!", "HS108", "`!` is not an operator of the language", "write `not`"),
-    ("~", "HS108", "`~` is not an operator of the language", "write `not`"),
-    ("^", "HS106", "`^` is not an operator of the language", "write `**` for a power"),
-    ("'", "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
-    ('"', "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
-    ("[", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
-    ("]", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
-    ("{", "HS109", "braces have no meaning in an expression", "use parentheses"),
-    ("}", "HS109", "braces have no meaning in an expression", "use parentheses"),
-    (".^", "HS106", "`.^` is not an operator of the language", "write `**` for a power"),
-    (".*", "HS109", "`.*` is not an operator of the language", "write `*`"),
-    ("./", "HS109", "`./` is not an operator of the language", "write `/`"),
+_OPERATORS = {  # of other languages, by the code of their error: what to write instead
+    "HS108": {
+        "&&": "`and`",
+        "||": "`or`",
+        "&": "`and`",
+        "|": "`or`, and abs(x) for an absolute value",
+        "!": "`not`",
+        "~": "`not`",
+        "∧": "`and`",
+        "∨": "`or`",
+        "¬": "`not`",
+    },
+    "HS106": {".^": "`**` for a power", "^": "`**` for a power"},
+    "HS109": {".*": "`*`", "./": "`/`", "%": "x - y*floor(x/y) for a remainder"},
+    "HS101": {
+        "×": "`*`",
+        "·": "`*`",
+        "⋅": "`*`",
+        "÷": "`/`",
+        "≥": "`>=`",
+        "≤": "`<=`",
+        "≠": "`!=`",
+        "²": "`**2`",
+        "³": "`**3`",
+    },
+}
+_OTHER_SIGNS = (  # signs, a code, a sentence, the right form
+    ("'\"", "HS109", "a quote mark has no meaning in an expression", "names have no quotes"),
+    ("[]", "HS109", "nothing is indexed in an expression", "write every component as a name of its own"),
+    ("{}", "HS109", "braces have no meaning in an expression", "use parentheses"),
     (".", "HS109", "names have no dots in an expression", "write the name or the function alone: sin(x)"),
-    ("%", "HS109", "`%` is not an operator of the language", "write x - y*floor(x/y) for a remainder"),
     (":", "HS109", "a colon has no meaning in an expression", "write plain arithmetic"),
     (";", "HS109", "a semicolon has no meaning in an expression", "write one expression"),
     ("?", "HS109", "a question mark has no meaning in an expression", CASES),
-    ("−", "HS101", "this is not the minus sign of expressions", "write `-`"),
-    ("–", "HS101", "this is not the minus sign of expressions", "write `-`"),
-    ("×", "HS101", "`×` is not an operator of the language", "write `*`"),
-    ("·", "HS101", "`·` is not an operator of the language", "write `*`"),
-    ("⋅", "HS101", "`⋅` is not an operator of the language", "write `*`"),
-    ("÷", "HS101", "`÷` is not an operator of the language", "write `/`"),
-    ("≥", "HS101", "`≥` is not an operator of the language", "write `>=`"),
-    ("≤", "HS101", "`≤` is not an operator of the language", "write `<=`"),
-    ("≠", "HS101", "`≠` is not an operator of the language", "write `!=`"),
-    ("²", "HS101", "`²` is not an operator of the language", "write `**2`"),
-    ("³", "HS101", "`³` is not an operator of the language", "write `**3`"),
-    (
-        "°",
-        "HS101",
-        "a degree sign has no meaning in an expression",
-        "angles are in radians: write 30*pi/180 for 30 degrees",
-    ),
+    ("−–", "HS101", "this is not the minus sign of expressions", "write `-`"),
+    ("°", "HS101", "a degree sign has no meaning in an expression", _DEGREES),
     ("\\", "HS101", "a backslash has no meaning in an expression", "write the name alone: omega"),
     ("$", "HS101", "a dollar sign has no meaning in an expression", "write the name alone"),
-    ("“", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
-    ("”", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
-    ("‘", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
-    ("’", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
+    ("“”‘’", "HS101", "this is a typographic quote mark", "write plain quotes around the whole value, or none"),
     ("∞", "HS101", "every number is finite here", "write a number"),
-    ("∧", "HS108", "`∧` is not an operator of the language", "write `and`"),
-    ("∨", "HS108", "`∨` is not an operator of the language", "write `or`"),
-    ("¬", "HS108", "`¬` is not an operator of the language", "write `not`"),
     ("√", "HS101", "`√` is not a function of the language", "write `sqrt(x)`"),
+)
+# signs: their characters, a code, a sentence, the right form; longer signs come before their beginnings
+SIGNS = (
+    *(
+        (sign, code, f"`{sign}` is not an operator of the language", f"write {right}")
+        for code, signs in _OPERATORS.items()
+        for sign, right in signs.items()
+    ),
+    *((sign, code, sentence, right) for signs, code, sentence, right in _OTHER_SIGNS for sign in signs),
 )
 
 _TIMED = {**dict.fromkeys(("after", "at", "wait"), ">="), "before": "<"}
@@ -231,12 +128,8 @@ def better(sign: str, text: str, at: int) -> str | None:
     name = word.group(1) if word else ""
     if sign == "'" and name:
         return f"write {name}: a reset sees the values before the jump, and derivatives are what `flow` gives"
-    if (
-        sign == "^"
-        and at < _FAR
-        and (quantity := _QUANTITY.fullmatch(text[:at]))
-        and quantity.group(3).lower() in _UNITS
-    ):
+    quantity = _QUANTITY.fullmatch(text[:at]) if sign == "^" and at < _FAR else None
+    if quantity and quantity.group(3).lower() in _UNITS:
         return f"write {quantity.group(1)} alone: units stand under `units`"
     if sign == "%" and not text[at + 1 :].strip() and (number := _NUMBER_BEFORE.search(text, max(0, at - _FAR), at)):
         return f"write {number.group(1)}/100"
@@ -297,8 +190,7 @@ def compared(left: str, word: str) -> str | None:
     return f"write {left} <= and the value" if word in ("below", "under") else None
 
 
-def derivative_of(name: str, known: object) -> str | None:
+def derivative_of(name: str, known: Container[str]) -> str | None:
     """The hint for ``dx`` and ``xdot``, where ``x`` is known."""
-    found = re.fullmatch(r"d_?(\w+)|(\w+?)_?d?dot|d(\w+)dt", name)
-    states = [part for part in found.groups() if part] if found else []
-    return _DERIVATIVE if any(part in known for part in states) else None  # pyright: ignore
+    match = re.fullmatch(r"d_?(\w+)|(\w+?)_?d?dot|d(\w+)dt", name)
+    return _DERIVATIVE if match and any(part in known for part in match.groups() if part) else None

@@ -32,6 +32,7 @@ from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import shown
 
 _RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
+_DECIMAL, _SIMPLIFY = "write its value as a decimal", "make it a state or simplify it"
 _NOT_REAL = frozenset((sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I))
 # functions that SymPy makes by itself (tan(x + pi/2) is a cotangent), against those the rest of the house knows
 _FOREIGN: dict[Any, Any] = {
@@ -54,7 +55,7 @@ def number(tree: Tree, scope: Scope, text: str) -> Value:
     Raises
     ------
     ExpressionError
-        Where a condition stands for a number, a constant has no finite real value, or the expression is too large.
+        A condition in place of a number, a constant without a finite real value, or an expression that is too large.
     """
     builder = _Builder(scope, text)
     builder.refuse_deep(tree)
@@ -62,13 +63,7 @@ def number(tree: Tree, scope: Scope, text: str) -> Value:
 
 
 def condition(tree: Tree, scope: Scope, text: str) -> Any:
-    """The SymPy Boolean of a condition whose names the scope has.
-
-    Raises
-    ------
-    ExpressionError
-        As :func:`number`, and where a number stands for a condition.
-    """
+    """The SymPy Boolean of a condition whose names the scope has; errors as for :func:`number`."""
     return _Builder(scope, text).condition(tree)
 
 
@@ -92,9 +87,8 @@ class _Builder:
     def number(self, tree: Tree) -> Value:
         """The value of a node that must be a number."""
         if isinstance(tree, CONDITIONS):
-            message = f"`{self.said(tree)}` is a condition where a number is wanted"
             hint = f"write {int(tree.value)}" if isinstance(tree, Truth) else CASES
-            raise ExpressionError("HS114", message, tree.start, tree.end, hint)
+            raise self.error("HS114", tree, f"expected a number, got the condition `{self.text_of(tree)}`", hint)
         match tree:
             case Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
@@ -128,10 +122,8 @@ class _Builder:
         terms = [-v.expr if minus else v.expr for v, (minus, _) in zip(values, tree.terms, strict=True)]
         if bounds.sum_bits(terms) > bounds.MOST_BITS:
             raise self.too_long(tree)
-        numbers = [
-            v.number if v.number is None or not minus else -v.number
-            for v, (minus, _) in zip(values, tree.terms, strict=True)
-        ]
+        signed = zip(values, tree.terms, strict=True)
+        numbers = [v.number if v.number is None or not minus else -v.number for v, (minus, _) in signed]
         return self.value(tree, self.made(tree, sp.Add, *terms), numeric.total(numbers), values)
 
     def product(self, tree: Product) -> Value:
@@ -139,9 +131,9 @@ class _Builder:
         values = [self.number(factor) for _, factor in tree.factors]
         for value, (divided, factor) in zip(values, tree.factors, strict=True):
             if divided and value.expr.is_zero and value.expr.is_number:
-                text = self.said(factor)
+                text = self.text_of(factor)
                 message = "nothing can be divided by 0" + (f", and `{text}` is 0" if text != "0" else "")
-                raise ExpressionError("HS118", message, factor.start, factor.end)
+                raise self.error("HS118", factor, message)
         divided = [d for d, _ in tree.factors]
         numbers = [numeric.inverse(v.number) if d else v.number for v, d in zip(values, divided, strict=True)]
         number = numeric.product(numbers)
@@ -156,8 +148,9 @@ class _Builder:
         """A power; what it would make SymPy compute is measured first."""
         base, exponent = self.number(tree.base), self.number(tree.exponent)
         if bounds.large_exponent(exponent.expr):
-            message = f"the exponent `{self.said(tree.exponent)}` is above {bounds.LARGEST_EXPONENT:,} in magnitude"
-            raise ExpressionError("HS119", message, tree.exponent.start, tree.exponent.end)
+            text = self.text_of(tree.exponent)
+            message = f"the exponent `{text}` is above {bounds.LARGEST_EXPONENT:,} in magnitude"
+            raise self.error("HS119", tree.exponent, message)
         number = numeric.power(base.number, exponent.number)
         if base.constant and exponent.constant:
             self.refuse_unless_finite(tree, number)
@@ -173,13 +166,11 @@ class _Builder:
             self.refuse_unless_finite(tree, number)
         exprs = [v.expr for v in values]
         if tree.function == "exp" and bounds.large_exponent(exprs[0]):
-            message = f"`{self.said(tree)}` is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
-            raise ExpressionError("HS119", message, tree.start, tree.end)
+            sentence = f"is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
+            raise self.error("HS119", tree, f"`{self.text_of(tree)}` {sentence}")
         function: Any = FUNCTIONS[tree.function][0]
-        if tree.function in ("min", "max"):
-            expr = self.made(tree, _pairwise, function, exprs)
-        else:
-            expr = self.made(tree, function, *exprs)
+        pairwise = tree.function in ("min", "max")
+        expr = self.made(tree, _pairwise, function, exprs) if pairwise else self.made(tree, function, *exprs)
         return self.value(tree, expr, number, values)
 
     def made(self, tree: Tree, function: Any, *arguments: Any) -> Any:
@@ -187,8 +178,8 @@ class _Builder:
         try:
             return function(*arguments)
         except (TypeError, AttributeError, ValueError, NotImplementedError, ArithmeticError, RecursionError):
-            message = f"`{self.said(tree)}` cannot be worked out exactly"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal") from None
+            message = f"`{self.text_of(tree)}` cannot be worked out exactly"
+            raise self.error("HS120", tree, message, _DECIMAL) from None
 
     def value(self, tree: Tree, expr: Any, number: Any, parts: list[Value]) -> Value:
         """A value made of parts, checked."""
@@ -206,47 +197,50 @@ class _Builder:
         size, depth = 1 + sum(p.size for p in parts), _levels(tree, expr, parts)
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+            raise self.error("HS120", tree, message, _SIMPLIFY)
         if constant and not expr.is_Rational:
             self.refuse_large_constant(tree, size, depth)
         within = _bits_within(tree, parts)
         most = bounds.MOST_BITS_WITHIN_A_POWER if isinstance(tree, Power) else bounds.MOST_BITS_WITHIN
         if within > most:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "make it a state or simplify it")
+            raise self.error("HS120", tree, message, _SIMPLIFY)
         if depth > bounds.MOST_LEVELS:
             raise self.too_deep(tree)
         return Value(expr, number, constant, uses, size, depth, within)
 
-    def too_deep(self, tree: Tree) -> ExpressionError:
-        """The error for a nest that SymPy would need too long for."""
-        message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
-        return ExpressionError("HS120", message, tree.start, tree.end, "this counts what is written under `let`")
-
     def refuse_large_constant(self, tree: Tree, size: int, depth: int) -> None:
         """Raise where SymPy would compute a constant for ever."""
+        sentence = None
         if size > bounds.MOST_NODES_OF_A_CONSTANT:
-            message = f"`{self.said(tree)}` is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
-        if depth > bounds.MOST_LEVELS_OF_A_CONSTANT:
-            most = bounds.MOST_LEVELS_OF_A_CONSTANT
-            message = f"`{self.said(tree)}` is a constant whose functions are nested more than {most} deep"
-            raise ExpressionError("HS120", message, tree.start, tree.end, "write its value as a decimal")
+            sentence = f"is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
+        elif depth > bounds.MOST_LEVELS_OF_A_CONSTANT:
+            sentence = f"is a constant whose functions are nested more than {bounds.MOST_LEVELS_OF_A_CONSTANT} deep"
+        if sentence:
+            raise self.error("HS120", tree, f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
         if number is not None and not numeric.finite(number):
             raise self.not_finite(tree)
 
+    def error(self, code: str, tree: Tree, message: str, hint: str | None = None) -> ExpressionError:
+        """An error at a node."""
+        return ExpressionError(code, message, tree.start, tree.end, hint)
+
+    def too_deep(self, tree: Tree) -> ExpressionError:
+        """The error for a nest that SymPy would need too long for."""
+        message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
+        return self.error("HS120", tree, message, "this counts what is written under `let`")
+
     def not_finite(self, tree: Tree) -> ExpressionError:
         """The error for something like 1/0 or sqrt(-1)."""
-        message = f"`{self.said(tree)}` has no finite real value"
-        return ExpressionError("HS118", message, tree.start, tree.end)
+        return self.error("HS118", tree, f"`{self.text_of(tree)}` has no finite real value")
 
     def too_long(self, tree: Tree) -> ExpressionError:
         """The error for an exact number that would fill the memory."""
-        message = f"`{self.said(tree)}` contains an exact number of more than {bounds.MOST_BITS:,} bits"
-        return ExpressionError("HS120", message, tree.start, tree.end, "write it as a decimal")
+        message = f"`{self.text_of(tree)}` contains an exact number of more than {bounds.MOST_BITS:,} bits"
+        return self.error("HS120", tree, message, "write it as a decimal")
 
     def condition(self, tree: Tree) -> Any:
         """The Boolean of a node that must be a condition."""
@@ -262,14 +256,13 @@ class _Builder:
                 values = [self.number(operand).expr for operand in tree.operands]
                 pairs = zip(tree.operators, values, values[1:], strict=False)
                 return sp.And(*(_RELATIONS[operator](a, b, evaluate=False) for operator, a, b in pairs))
-        message = f"`{self.said(tree)}` is a number where a condition is wanted"
-        hint = f"compare it with something: {self.said(tree)} > 0"
+        hint = f"compare it with something: {self.text_of(tree)} > 0"
         if isinstance(tree, Number) and tree.value in (0, 1):
             hint = f"write {'true' if tree.value else 'false'}"
-        raise ExpressionError("HS115", message, tree.start, tree.end, hint)
+        raise self.error("HS115", tree, f"expected a condition, got the number `{self.text_of(tree)}`", hint)
 
-    def said(self, tree: Tree) -> str:
-        """The text of a node, cut to what a sentence carries."""
+    def text_of(self, tree: Tree) -> str:
+        """The text of a node, cut for a sentence."""
         return shown(self.text[tree.start : tree.end], 40)
 
 

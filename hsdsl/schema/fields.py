@@ -1,6 +1,6 @@
-"""What stands at the ends of a document: expressions, names, texts, and the shapes of mappings and lists.
+"""The fields of a document: expressions, names, texts, and the shapes of mappings and lists.
 
-A leaf keeps its `Scalar`, and so its place. Every refusal is a `PydanticCustomError` whose type is our own code.
+A field keeps its `Scalar`, and so its place. Every refusal is a `PydanticCustomError` whose type is our own code.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from pydantic_core import PydanticCustomError
 
 from hsdsl.expression.scope import RESERVED
 from hsdsl.names import WORDS, did_you_mean, is_identifier, shown
-from hsdsl.schema.forms import as_list, as_mapping, as_name, assigned, in_brackets
-from hsdsl.source import ABSENT, Key, Scalar
+from hsdsl.schema.value_suggestions import as_list, as_mapping, as_name, assigned, in_brackets
+from hsdsl.source import ABSENT, Key, Scalar, is_empty
 
 T = TypeVar("T")
 
@@ -24,29 +24,29 @@ def refuse(code: str, message: str, hint: str | None = None) -> PydanticCustomEr
     return PydanticCustomError(cast(LiteralString, code), "{message}", {"message": message, "hint": hint})
 
 
+def _unexpected(expected: str, value: Any, hint: str | None = None, code: str = "HS203") -> PydanticCustomError:
+    return refuse(code, f"expected {expected}, got {described(value)}", hint)
+
+
 def described(value: Any) -> str:
-    """What a value is, for a sentence."""
+    """A value in a sentence."""
     if isinstance(value, dict):
         return "a mapping"
     if isinstance(value, list):
         return "a list"
-    if isinstance(value, Scalar) and value.kind != "null":
-        return f"'{shown(value.value, 40)}'"
-    return "nothing"
+    return f"'{shown(value.value, 40)}'" if isinstance(value, Scalar) and not is_empty(value) else "nothing"
 
 
-def _single(value: Any, wanted: str) -> Scalar:
+def _single(value: Any, expected: str) -> Scalar:
     if not isinstance(value, Scalar):
-        hint = in_brackets(value) if isinstance(value, list) else None
-        raise refuse("HS203", f"{wanted} is wanted here, not {described(value)}", hint)
+        raise _unexpected(expected, value, in_brackets(value) if isinstance(value, list) else None)
     return value
 
 
 def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
     if isinstance(value, (dict, list)):
-        hint = in_brackets(value) or "write every component as a name of its own"
-        raise refuse("HS203", f"an expression is wanted here, not {described(value)}", hint)
-    if isinstance(value, Scalar) and value.kind == "null":
+        raise _unexpected("an expression", value, in_brackets(value) or "write every component as a name of its own")
+    if is_empty(value):
         raise refuse("HS121", f"{kind} is missing here", kind)
     return _single(value, "an expression")
 
@@ -54,21 +54,20 @@ def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
 def _condition(value: Any) -> Scalar:
     if isinstance(value, list):
         parts = [part.value for part in value if isinstance(part, Scalar)]  # pyright: ignore[reportUnknownVariableType]
-        hint = in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}"
-        raise refuse("HS203", "a condition is wanted here, not a list", hint)
+        raise _unexpected("a condition", value, in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}")
     return _expression(value, "a condition, such as v > 0")
 
 
 def _inequality(value: Any) -> Scalar:
     if isinstance(value, list):
-        hint = in_brackets(value) or "under `when`, put the rest under `if`; under `domain`, make each an item"
-        raise refuse("HS203", "one inequality is wanted here, not a list", hint)
+        hint = "under `when`, put the rest under `if`; under `domain`, make each an item"
+        raise _unexpected("one inequality", value, in_brackets(value) or hint)
     return _expression(value, "an inequality, such as x >= 1")
 
 
 def _text(value: Any) -> Scalar | None:
     scalar = _single(value, "a text")
-    return None if scalar.kind == "null" else scalar
+    return None if is_empty(scalar) else scalar
 
 
 def _label(value: Any) -> Scalar:
@@ -82,10 +81,8 @@ def _flag(value: Any) -> bool:
     scalar = _single(value, "true or false")
     if scalar.kind != "boolean":
         words = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
-        hint = words.get(scalar.value.lower())
-        raise refuse(
-            "HS204", f"true or false is wanted here, not {described(scalar)}", f"write {hint}" if hint else None
-        )
+        meant = words.get(scalar.value.lower())
+        raise _unexpected("true or false", scalar, f"write {meant}" if meant else None, "HS204")
     return scalar.value.lower() == "true"
 
 
@@ -93,7 +90,7 @@ def _whole(value: Any) -> int:
     scalar = _single(value, "a whole number")
     digits = scalar.value[1:] if scalar.value[:1] in "+-" else scalar.value
     if not (scalar.kind == "number" and digits.isdigit() and len(digits) <= 9):
-        raise refuse("HS204", f"a whole number is wanted here, not {described(scalar)}", "such as 1 or -2")
+        raise _unexpected("a whole number", scalar, "such as 1 or -2", "HS204")
     return int(scalar.value)
 
 
@@ -103,8 +100,7 @@ def choice(*words: str) -> Callable[[Any], Scalar]:
     def check(value: Any) -> Scalar:
         scalar = _single(value, " or ".join(words))
         if scalar.value not in words:
-            hint = did_you_mean(scalar.value, words)
-            raise refuse("HS204", f"{' or '.join(words)} is wanted here, not {described(scalar)}", hint)
+            raise _unexpected(" or ".join(words), scalar, did_you_mean(scalar.value, words), "HS204")
         return scalar
 
     return check
@@ -113,7 +109,7 @@ def choice(*words: str) -> Callable[[Any], Scalar]:
 def _identifier(value: Any) -> Scalar:
     scalar = _single(value, "a word")
     if not is_identifier(scalar.value):
-        raise refuse("HS204", f"a word is wanted here, not {described(scalar)}")
+        raise _unexpected("a word", scalar, code="HS204")
     return scalar
 
 
@@ -126,8 +122,7 @@ def _version(value: Any) -> Scalar:
 
 def _name(key: Any) -> Key:
     if not is_identifier(key):
-        message = f"'{shown(key)}' cannot be a name"
-        raise refuse("HS205", message, as_name(key))
+        raise refuse("HS205", f"'{shown(key)}' cannot be a name", as_name(key))
     if key in RESERVED:
         kind = "a word of the language" if key in WORDS else "a function"
         kind = {"t": "the time", "pi": "a constant"}.get(key, kind)
@@ -153,26 +148,22 @@ def _any_key(key: Any) -> Key:
     return key
 
 
-def _empty(value: Any) -> bool:
-    return isinstance(value, Scalar) and (value.kind == "null" or value.value == ABSENT)
+def _is_left_out(value: Any) -> bool:
+    return is_empty(value) or (isinstance(value, Scalar) and value.value == ABSENT)
 
 
 def shaped_as_mapping(value: Any) -> Any:
-    """A mapping; what is left empty is an empty one."""
-    if _empty(value):
-        return {}
-    if not isinstance(value, dict):
-        raise refuse("HS203", f"a mapping (name: value) is wanted here, not {described(value)}", as_mapping(value))
-    return value  # pyright: ignore[reportUnknownVariableType]
+    """A mapping, empty where the value is left out."""
+    if not (_is_left_out(value) or isinstance(value, dict)):
+        raise _unexpected("a mapping (name: value)", value, as_mapping(value))
+    return dict[Any, Any]() if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 
 def shaped_as_list(value: Any) -> Any:
-    """A list; what is left empty is an empty one."""
-    if _empty(value):
-        return []
-    if not isinstance(value, list):
-        raise refuse("HS203", f"a list is wanted here, not {described(value)}", as_list(value))
-    return value  # pyright: ignore[reportUnknownVariableType]
+    """A list, empty where the value is left out."""
+    if not (_is_left_out(value) or isinstance(value, list)):
+        raise _unexpected("a list", value, as_list(value))
+    return [] if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 
 def required(description: str, *examples: Any) -> Any:

@@ -1,14 +1,12 @@
-"""Which key was meant: the names that other tools give, keys that stand in the wrong place, and what to add."""
+"""Suggestions for keys: those of other tools, keys in the wrong place, and missing ones."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
 from hsdsl.names import closest
-from hsdsl.schema.documents import SHAPES
-from hsdsl.source import Mapping, Node, Scalar, Sequence
-
-Location = tuple[int | str, ...]
+from hsdsl.schema.documents import keys_of
+from hsdsl.source import Key, Mapping, Node, Path, Sequence, child, is_empty, keys
 
 _OF_OTHERS = {
     "when": "guard trigger event on condition",
@@ -34,9 +32,9 @@ _OF_OTHERS = {
     "value": "default val number",
 }
 _BY_NAME: dict[str, list[str]] = {}
-for _key, _names in _OF_OTHERS.items():
-    for _name in _names.split():
-        _BY_NAME.setdefault(_name, []).append(_key)
+for _key, _others in _OF_OTHERS.items():
+    for _other in _others.split():
+        _BY_NAME.setdefault(_other, []).append(_key)
 _NOT_NEEDED = {
     "states": "the states are the keys of `flow`, and `initial` gives their values",
     "variables": "the states are the keys of `flow`, and `initial` gives their values",
@@ -62,7 +60,6 @@ _ADD = {
 _MODE = ("modes", "*")
 _MOST_PARTS = 6  # a transition has so many keys
 _HOMES: tuple[tuple[tuple[str, ...], str], ...] = (
-    ((), "at the beginning of a line, beside `modes`"),
     (_MODE, "in a mode"),
     ((*_MODE, "transitions", "*"), "in a transition of a mode"),
     (("experiment",), "under `experiment`"),
@@ -70,12 +67,12 @@ _HOMES: tuple[tuple[tuple[str, ...], str], ...] = (
 
 
 def key_meant(key: str, fields: Iterable[str], parent: Node | None) -> str | None:
-    """The field that an unknown key was probably meant to be: by its name in other tools, or by how it looks."""
-    fields, present = list(fields), parent.entries if isinstance(parent, Mapping) else {}
+    """The field that an unknown key was probably meant to be: by its name in other tools, or by its spelling."""
+    fields, present = list(fields), keys(parent)
     named = [field for field in _BY_NAME.get(key, ()) if field in fields and field not in present]
     if named:
         return named[0]
-    elsewhere = key in _NOT_NEEDED or home(key, ()) or is_a_mode(present[key][1] if key in present else None)
+    elsewhere = key in _NOT_NEEDED or _home(key) or _is_a_mode(child(parent, key))
     return None if elsewhere else closest(key, fields)
 
 
@@ -84,7 +81,7 @@ def named_elsewhere(key: str, fields: Collection[str]) -> bool:
     return any(field in fields for field in _BY_NAME.get(key, ()))
 
 
-def advice(key: str, meant: str | None, fields: Iterable[str], value: Node | None) -> str:
+def unknown_key_hint(key: str, meant: str | None, fields: Iterable[str], value: Node | None) -> str:
     """The hint for an unknown key."""
     if ":" in key:
         return "write a space after the colon"
@@ -92,68 +89,58 @@ def advice(key: str, meant: str | None, fields: Iterable[str], value: Node | Non
         return f"did you mean '{meant}'?"
     if key in _NOT_NEEDED:
         return _NOT_NEEDED[key]
-    if is_a_mode(value):
+    if _is_a_mode(value):
         return f"a mode stands under `modes`: indent '{key}' like the others"
-    where = dict(_HOMES).get(home(key, ()) or ("none",))
+    where = dict(_HOMES).get(_home(key) or ("none",))
     return f"`{key}` stands {where}" if where else "keys here: " + ", ".join(fields)
 
 
-def home(key: str, here: tuple[str, ...]) -> tuple[str, ...] | None:
-    """The kind of place that has a key of this name, where it is not the one here."""
-    for pattern, _ in _HOMES:
-        fields = SHAPES[pattern].model_fields
-        if pattern != here and key in {field.alias or name for name, field in fields.items()}:
-            return pattern
-    return None
+def _home(key: str) -> tuple[str, ...] | None:
+    """The kind of mapping that has a key of this name; of the model's own keys none."""
+    return next((pattern for pattern, _ in _HOMES if key in keys_of(*pattern)), None)
 
 
-def moves_to(root: Node, key: str, value: Node | None) -> Location | None:
-    """Where a key belongs that stands in the wrong place, if there is one such place and it is free."""
-    if not isinstance(root, Mapping):
-        return None
-    place: Location | None = ("modes", key) if is_a_mode(value) else home(key, ())
-    if place not in ((), ("experiment",), ("modes", key)):
-        return None
-    place = place if place == ("modes", key) else (*place, key)
-    above = root if len(place) == 1 else root.entries.get(str(place[0]), (None, None))[1]
-    if isinstance(above, Scalar) and above.kind == "null":
-        return place
-    return place if isinstance(above, Mapping) and key not in above.entries else None
+def path_meant(root: Node, key: str, value: Node | None) -> Path:
+    """The path that a key in the wrong place belongs to, if there is one and it is free; else an empty one."""
+    pattern = ("modes",) if _is_a_mode(value) else _home(key)
+    if not isinstance(root, Mapping) or pattern not in (("modes",), ("experiment",)):
+        return ()
+    above = child(root, pattern[0])
+    if above is not None and is_empty(above):
+        return (*pattern, key)
+    return (*pattern, key) if isinstance(above, Mapping) and key not in above.entries else ()
 
 
-def is_a_mode(value: Node | None) -> bool:
+def _is_a_mode(value: Node | None) -> bool:
     """Whether a mapping looks like a mode."""
-    return isinstance(value, Mapping) and bool({"flow", "transitions"} & set(value.entries))
+    return not {"flow", "transitions"}.isdisjoint(keys(value))
 
 
-def to_add(root: Node, key: str, parent: Node | None) -> str:
-    """What to write where a key is missing."""
-    if key == "when" and isinstance(parent, Mapping) and "if" in parent.entries:
+def missing_key_hint(root: Node, key: str, parent: Node | None) -> str:
+    """The hint for a missing key."""
+    if key == "when" and "if" in keys(parent):
         return "write when: and the inequality at which it fires; `if` only says which part of it counts"
     if key != "mode":
         return _ADD[key]
-    modes = root.entries["modes"][1] if isinstance(root, Mapping) and "modes" in root.entries else root
-    names = [str(name) for name, _ in modes] if isinstance(modes, Mapping) else []
+    modes = child(root, "modes")
+    names = keys(root if modes is None else modes)
     return f"write mode: {names[0]}" if len(names) == 1 else "write mode: and the mode that a run starts in"
 
 
-def torn(transitions: Node | None, index: int) -> int:
-    """Which part of one transition an item of ``transitions`` is that dashes too many make several items of.
+def part_of_transition(transitions: Node | None, index: int) -> int:
+    """Which part, from 0, of a transition that dashes too many make several items of an item of ``transitions`` is.
 
-    From 0; -1 where the item is whole, or what it lacks is nowhere near.
+    It is -1 where the item is whole, or where its missing keys are nowhere near.
     """
     items = transitions.items if isinstance(transitions, Sequence) else ()
-    near = {n: _keys(items[n]) for n in range(max(0, index - _MOST_PARTS), min(len(items), index + _MOST_PARTS))}
-    first, seen = index, near.get(index, set[str]())
-    while first - 1 in near and near[first - 1] and not near[first - 1] & seen:
-        first, seen = first - 1, seen | near[first - 1]
-    last = index
-    while last + 1 in near and near[last + 1] and not near[last + 1] & seen:
-        last, seen = last + 1, seen | near[last + 1]
+    near = {n: set(keys(items[n])) for n in range(max(0, index - _MOST_PARTS), min(len(items), index + _MOST_PARTS))}
+    present = near.get(index, set[Key]())
+    ends = [index, index]
+    for side, step in ((0, -1), (1, 1)):
+        while near.get(ends[side] + step) and not near[ends[side] + step] & present:
+            ends[side] += step
+            present = present | near[ends[side]]
+    first, last = ends
     needed = {"when", "to"}
-    parts = first < last and needed <= seen and all(needed - near[n] for n in range(first + 1, last + 1))
+    parts = first < last and needed <= present and all(needed - near[n] for n in range(first + 1, last + 1))
     return index - first if parts and near[index] else -1
-
-
-def _keys(item: Node) -> set[str]:
-    return set(item.entries) if isinstance(item, Mapping) else set()

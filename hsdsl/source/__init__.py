@@ -1,7 +1,22 @@
 """YAML files as nodes with a line and a column: the core rules of YAML 1.2, capped before anything recurses."""
 
 from hsdsl.source.compose import compose
-from hsdsl.source.nodes import ABSENT, Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
+from hsdsl.source.nodes import (
+    ABSENT,
+    Key,
+    Mapping,
+    Node,
+    Path,
+    Scalar,
+    Sequence,
+    SourceRange,
+    absent,
+    child,
+    children,
+    descend,
+    is_empty,
+    keys,
+)
 from hsdsl.source.text import Text, decode
 
 __all__ = [
@@ -9,11 +24,17 @@ __all__ = [
     "Key",
     "Mapping",
     "Node",
+    "Path",
     "Scalar",
     "Sequence",
     "SourceRange",
     "Text",
     "absent",
+    "child",
+    "children",
     "compose",
     "decode",
+    "descend",
+    "is_empty",
+    "keys",
 ]

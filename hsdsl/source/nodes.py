@@ -110,11 +110,56 @@ class Mapping:
     def __iter__(self) -> Iterator[tuple[Key, Node]]:
         return iter(self.entries.values())
 
+    def rename(self, key: str, name: str, value: Node | None = None) -> None:
+        """Give an entry another name, and another value if there is one, in its place."""
+        entries = list(self.entries.items())
+        self.entries.clear()
+        for old, (found, node) in entries:
+            renamed = (Key.at(name, found.place), node if value is None else value)
+            self.entries[name if old == key else old] = renamed if old == key else (found, node)
+
 
 Node = Scalar | Sequence | Mapping
-ABSENT = "\0"  # the value of a scalar that stands for one already reported; no text can contain it, written or escaped
+Path = tuple[int | str, ...]  # keys and indices from the root to a node
+ABSENT = "\0"  # the value of a scalar in place of one already reported; no text can contain it, written or escaped
 
 
 def absent(place: SourceRange) -> Scalar:
-    """A scalar in the place of something already reported, which nothing more is to be said about."""
+    """A scalar in the place of something already reported; nothing more is reported of it."""
     return Scalar(ABSENT, False, place)
+
+
+def is_empty(value: object) -> bool:
+    """Whether a value is left out, or null."""
+    return isinstance(value, Scalar) and value.kind == "null"
+
+
+def child(node: Node | None, key: str) -> Node | None:
+    """The value of a key, where there is one."""
+    return node.entries[key][1] if isinstance(node, Mapping) and key in node.entries else None
+
+
+def children(node: Node | None) -> Iterator[Node]:
+    """The values of a mapping, the items of a list."""
+    if isinstance(node, Mapping):
+        yield from (value for _, value in node)
+    elif isinstance(node, Sequence):
+        yield from node.items
+
+
+def keys(node: Node | None) -> list[Key]:
+    """The keys of a mapping; none of anything else."""
+    return [key for key, _ in node] if isinstance(node, Mapping) else []
+
+
+def descend(root: Node, path: Path) -> Node | None:
+    """The node at the end of a path, if there is one."""
+    node: Node | None = root
+    for step in path:
+        if isinstance(node, Mapping) and step in node.entries:
+            node = node.entries[str(step)][1]
+        elif isinstance(node, Sequence) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+        elif not (step == 0 and isinstance(node, Mapping)):  # a single reference is a list of one
+            return None
+    return node

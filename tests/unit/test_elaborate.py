@@ -268,7 +268,7 @@ class TestOverrides:
             ("2^3", "--set c: `^` is not an operator of the language", "write `**` for a power"),
             (
                 "omega > 1",
-                "--set c: `omega > 1` is a condition where a number is wanted",
+                "--set c: expected a number, got the condition `omega > 1`",
                 "write a mode for each case, or use min, max, abs or sign",
             ),
         ],

@@ -1,4 +1,4 @@
-"""Keys that stand too far left, beside the section they belong to: told once, and taken to stand in it."""
+"""Keys indented too little, at the level of the section they belong to: reported once, and moved into it."""
 
 from __future__ import annotations
 
@@ -6,30 +6,23 @@ from collections.abc import Iterable
 
 from hsdsl.errors import Findings
 from hsdsl.names import closest, shown
-from hsdsl.schema.documents import SHAPES
-from hsdsl.schema.habits import under
+from hsdsl.schema.documents import keys_of
 from hsdsl.schema.suggestions import named_elsewhere
-from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
+from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, child, is_empty, keys
 
 _OF_MAPPINGS = ("parameters", "inputs", "experiment")
 _REQUIRED = frozenset(("modes", "initial", "experiment", "when", "to"))
 _SECTIONS = ("parameters", "inputs", "let", "outputs", "units", "initial", "experiment", "flow", "reset")
+_MODEL, _MODE = frozenset(keys_of()), frozenset(keys_of("modes", "*"))
+_TRANSITION = frozenset(keys_of("modes", "*", "transitions", "*"))
 
 
-def _fields(*pattern: str) -> frozenset[str]:
-    return frozenset(field.alias or name for name, field in SHAPES[pattern].model_fields.items())
-
-
-_MODEL, _MODE = _fields(), _fields("modes", "*")
-_TRANSITION = _fields("modes", "*", "transitions", "*")
-
-
-def reindent(root: Node, findings: Findings) -> None:
+def correct_indentation(root: Node, findings: Findings) -> None:
     """Move such keys where they belong; the faults go to ``findings``."""
     if not isinstance(root, Mapping):
         return
     _below_empty(root, _MODEL, findings)
-    modes = under(root, "modes")
+    modes = child(root, "modes")
     if not isinstance(modes, Mapping):
         return
     _among_modes(modes, findings)
@@ -43,7 +36,7 @@ def reindent(root: Node, findings: Findings) -> None:
 
 def _in_mode(mode: Mapping, findings: Findings) -> None:
     _below_empty(mode, _MODE, findings)
-    transitions = under(mode, "transitions")
+    transitions = child(mode, "transitions")
     items = transitions.items if isinstance(transitions, Sequence) else ()
     if items:
         _behind(mode, "transitions", items[-1], _TRANSITION - _MODE, "in the transition above", findings)
@@ -53,22 +46,18 @@ def _in_mode(mode: Mapping, findings: Findings) -> None:
 
 
 def _below_empty(parent: Mapping, fields: frozenset[str], findings: Findings) -> None:
-    """Take the keys behind an empty section that the mapping does not have for those of the section."""
+    """Take unknown keys after an empty section for those of the section."""
     section, below = "", dict[str, list[Key]]()
     for key, value in parent:
         if key in fields:
-            section = str(key) if key in _SECTIONS and _empty(value) else ""
-        elif section and _fits(section, value) and not _misnamed(key, parent, fields):
+            section = str(key) if key in _SECTIONS and is_empty(value) else ""
+        elif section and (isinstance(value, Scalar) or section in _OF_MAPPINGS) and not _misnamed(key, parent, fields):
             below.setdefault(section, []).append(key)
-    for section, keys in below.items():
+    for section, strays in below.items():
         inner = Mapping({}, parent.entries[section][0].place)
         parent.entries[section] = (parent.entries[section][0], inner)
-        message = f"`{shown(keys[0])}` stands beside `{section}`, and nothing stands under `{section}`"
-        _moved(parent, keys, inner, message, f"under `{section}`", findings)
-
-
-def _fits(section: str, value: Node) -> bool:
-    return isinstance(value, Scalar) or section in _OF_MAPPINGS
+        message = f"`{shown(strays[0])}` stands beside `{section}`, and nothing stands under `{section}`"
+        _move(parent, strays, inner, message, f"under `{section}`", findings)
 
 
 def _misnamed(key: str, parent: Mapping, fields: frozenset[str]) -> bool:
@@ -78,7 +67,7 @@ def _misnamed(key: str, parent: Mapping, fields: frozenset[str]) -> bool:
 
 
 def _among_modes(modes: Mapping, findings: Findings) -> None:
-    """Take ``transitions`` beside the modes for that of the mode above."""
+    """Take ``transitions`` among the modes for that of the mode above."""
     above: Key | None = None
     strays: dict[str, list[Key]] = {}
     for key, value in modes:
@@ -86,41 +75,38 @@ def _among_modes(modes: Mapping, findings: Findings) -> None:
             strays.setdefault(str(above), []).append(key)
         else:
             above = key
-    for name, keys in strays.items():
-        found, mode = modes.entries[name]
-        if _empty(mode):
-            mode = Mapping({}, found.place)
-            modes.entries[name] = (found, mode)
-        if isinstance(mode, Mapping) and not any(key in mode.entries for key in keys):
-            message = f"`{keys[0]}` stands among the modes, as if it were one"
-            _moved(modes, keys, mode, message, f"in the mode '{shown(name)}'", findings)
+    for name, moved in strays.items():
+        key, mode = modes.entries[name]
+        if is_empty(mode):
+            mode = Mapping({}, key.place)
+            modes.entries[name] = (key, mode)
+        if isinstance(mode, Mapping) and not any(key in mode.entries for key in moved):
+            message = f"`{moved[0]}` stands among the modes, as if it were one"
+            _move(modes, moved, mode, message, f"in the mode '{shown(name)}'", findings)
 
 
 def _behind(parent: Mapping, section: str, last: Node, fields: frozenset[str], where: str, findings: Findings) -> None:
-    """Take the keys right behind a section that its last part can have for those of that part."""
-    keys = list(parent.entries)
-    behind = [parent.entries[key][0] for key in keys[keys.index(section) + 1 :]]
-    strays = [key for key in behind if key in fields]
-    if not strays or strays != behind[: len(strays)] or not isinstance(last, Mapping):
+    """Take the keys right after a section that its last part can have for those of that part."""
+    after = keys(parent)[list(parent.entries).index(section) + 1 :]
+    strays = [key for key in after if key in fields]
+    if not strays or strays != after[: len(strays)] or not isinstance(last, Mapping):
         return
     if not any(key in last.entries for key in strays):
-        _moved(parent, strays, last, f"`{strays[0]}` stands beside `{section}`", where, findings)
+        _move(parent, strays, last, f"`{strays[0]}` stands beside `{section}`", where, findings)
 
 
-def _moved(parent: Mapping, keys: Iterable[Key], target: Mapping, message: str, where: str, findings: Findings) -> None:
-    first, *more = keys
+def _move(
+    parent: Mapping, strays: Iterable[Key], target: Mapping, message: str, where: str, findings: Findings
+) -> None:
+    first, *more = strays
     hint = f"indent {'it' if not more else 'these lines'}, to stand {where}"
     findings.add(first.place.diagnostic("HS201", message, hint))
     for key in (first, *more):
         target.entries[str(key)] = parent.entries.pop(str(key))
 
 
-def _empty(value: Node) -> bool:
-    return isinstance(value, Scalar) and value.kind == "null"
-
-
 def _may_be_mode(value: Node) -> bool:
     """Whether a value could be that of a mode: empty, or with a key that modes have."""
     if isinstance(value, Mapping):
         return not value.entries or not _MODE.isdisjoint(value.entries)
-    return _empty(value)
+    return is_empty(value)

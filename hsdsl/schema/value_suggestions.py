@@ -1,4 +1,4 @@
-"""The right form of what people write for a name, a mapping or a list who come from another tool."""
+"""Suggestions for values: a name, a mapping or a list in the form of another tool."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from typing import Any, cast
 
 from hsdsl.names import is_identifier, shown
-from hsdsl.source import Key, Scalar
+from hsdsl.source import Key, Scalar, is_empty
 
 _LONGEST = 1000  # of texts that are looked at for a better form
 _TARGET = r"([^\W\d]\w*)(?:'|\+|\(t\))?|d([^\W\d]\w*)/dt|der\(\s*([^\W\d]\w*)\s*\)"
@@ -93,7 +93,7 @@ def in_brackets(value: Any) -> str | None:
     match value:
         case [Scalar() as only]:
             return f"write it without brackets: {shown(only.value)}"
-        case {**entries} if len(entries) == 1 and all(_nothing(inner) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
+        case {**entries} if len(entries) == 1 and all(is_empty(inner) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
             return f"write it without braces: {shown(next(iter(entries)))}"
         case dict():
             return "quote the expression, if it is one"
@@ -125,10 +125,6 @@ def _braces(items: list[Any]) -> str | None:
             case _:
                 return None
     return f"write {{{shown(', '.join(said))}}}"
-
-
-def _nothing(value: Any) -> bool:
-    return isinstance(value, Scalar) and value.kind == "null"
 
 
 def _on_its_own_line(scalar: Scalar) -> bool:

@@ -1,0 +1,92 @@
+"""Idioms of other tools that only the document as a whole shows; each is reported once, and translated."""
+
+from __future__ import annotations
+
+import re
+
+from hsdsl.errors import Findings
+from hsdsl.names import is_identifier, shown
+from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, child, children, keys
+
+_NESTED = ("state", "states", "values", "x0", "variables", "continuous")
+_LONGEST = 100  # names that are looked at
+_SURFACES = ("when", "guard", "event", "trigger", "on", "condition")  # `when` and its names in other tools
+_COMPARED = re.compile("[<>=]")
+_DIRECTIONS = {
+    "<=": ("-1", "-1.0", "falling", "fall", "down", "negative", "decreasing"),
+    ">=": ("1", "+1", "1.0", "rising", "rise", "up", "positive", "increasing"),
+}
+_NAMED_AFTER = re.compile(r"d_?(\w+?)(?:_?dt)?|(\w+?)_?dot|(\w+)_(?:prime|p|d)")
+
+
+def translate_idioms(root: Node, findings: Findings) -> None:
+    """Change the nodes that have such an idiom; the faults go to ``findings``."""
+    initial, modes = child(root, "initial"), child(root, "modes")
+    transitions = [edge for mode in children(modes) for edge in children(child(mode, "transitions"))]
+    for transition in transitions:
+        if isinstance(transition, Mapping) and "direction" in transition.entries:
+            _direction(transition, findings)
+    if not (isinstance(initial, Mapping) and isinstance(modes, Mapping)):
+        return
+    start = child(initial, "mode")
+    flow = child(child(modes, start.value), "flow") if isinstance(start, Scalar) else None
+    _nested_values(initial, [str(key) for key in keys(flow)], findings)
+    known = set(map(str, keys(initial)))
+    reset = {str(key) for transition in transitions for key in keys(child(transition, "reset"))}
+    for mode in children(modes):
+        states = child(mode, "flow")
+        if isinstance(states, Mapping):
+            _dotted_names(states, known, reset, findings)
+
+
+def _nested_values(initial: Mapping, states: list[str], findings: Findings) -> None:
+    """Take ``initial: {mode: A, state: {x: 1}}`` for ``initial: {mode: A, x: 1}``."""
+    for name in _NESTED:
+        value = child(initial, name)
+        if name in states or not isinstance(value, (Mapping, Sequence)):
+            continue
+        key, _ = initial.entries.pop(name)
+        entries = list(value) if isinstance(value, Mapping) else _paired(states, value)
+        text = ", ".join(f"{state}: {v.value if isinstance(v, Scalar) else '...'}" for state, v in entries)
+        hint = f"write the values beside `mode`: {shown(text or 'x: 0')}"
+        findings.add(key.place.diagnostic("HS201", f"unknown key '{name}' in `initial`", hint))
+        for state, part in entries:
+            initial.entries.setdefault(str(state), (state, part))
+
+
+def _paired(states: list[str], values: Sequence) -> list[tuple[Key, Node]]:
+    if len(states) != len(values.items):
+        return []
+    return [(Key.at(state, value.place), value) for state, value in zip(states, values.items, strict=True)]
+
+
+def _dotted_names(flow: Mapping, known: set[str], reset: set[str], findings: Findings) -> None:
+    """Take the keys ``xdot``, ``dx`` and ``dxdt`` of a flow for ``x``, where the start is given as ``x``."""
+    for key in keys(flow):
+        match = _NAMED_AFTER.fullmatch(key) if len(key) < _LONGEST else None
+        name = next(filter(None, match.groups()), "") if match else ""
+        if not name or key in known or key in reset:
+            continue
+        if name in known and name not in flow.entries and name != "mode" and is_identifier(name):
+            message = f"the flow says '{shown(key)}', and `initial` says '{shown(name)}'"
+            hint = f"write {shown(name)}: what stands under a state's name is its derivative"
+            findings.add(key.place.diagnostic("HS205", message, hint))
+            flow.rename(str(key), name)
+
+
+def _direction(transition: Mapping, findings: Findings) -> None:
+    """Take ``direction: -1`` for the sign of the inequality; a bare expression becomes that inequality."""
+    key, value = transition.entries.pop("direction")
+    word = value.value.strip().lower() if isinstance(value, Scalar) else ""
+    sign = next((sign for sign, words in _DIRECTIONS.items() if word in words), None)
+    name = next((k for k in _SURFACES if isinstance(child(transition, k), Scalar)), "")
+    surface = child(transition, name)
+    hint = "leave it out: `x <= 0` fires where x falls through 0, `x >= 0` where it rises"
+    if isinstance(surface, Scalar) and not _COMPARED.search(surface.value):
+        text, operator = surface.value.strip(), sign or "<="
+        both = "and a second transition with >= for where it rises"
+        more = f"which fires where {shown(text, 30)} {'falls' if sign == '<=' else 'rises'}" if sign else both
+        hint = f"leave it out, and write when: {shown(text, 30)} {operator} 0, {more}"
+        inequality = Scalar(f"{text} {operator} 0", surface.plain, surface.place)
+        transition.entries[name] = (transition.entries[name][0], inequality)
+    findings.add(key.place.diagnostic("HS201", "unknown key 'direction' in a transition", hint))
