@@ -107,6 +107,11 @@ class Mode:
         if not len(self.states) == len(self.flow) == len(self.flow_texts):
             raise ValueError(f"mode {self.name}: one flow expression a state")
 
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The surfaces of all edges, then the walls."""
+        return (*(edge.surface for edge in self.edges), *self.walls)
+
 
 @dataclass(frozen=True)
 class Initial:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from hsdsl import limits
-from hsdsl.elaborate.definitions import define_lets, define_parameters
+from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.inputs import define_inputs
 from hsdsl.elaborate.modes import elaborate_modes
@@ -17,7 +17,6 @@ from hsdsl.elaborate.outputs import elaborate_outputs
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
 from hsdsl.elaborate.symbols import SymbolTable
-from hsdsl.elaborate.units import elaborate_units
 from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
@@ -89,7 +88,7 @@ def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
     message = "working this expression out takes too long"
     hint = "make parts of it states, or allow more time with --limit seconds=600"
     if resolver.at is not None:
-        resolver.add(resolver.at.place, TOO_LONG, message, hint)
+        resolver.report(resolver.at.place, TOO_LONG, message, hint)
     resolver.findings.raise_if_any()
     raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
 

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Parameters and the named subexpressions of `let`: each may use the ones before it."""
+"""Parameters, the named subexpressions of `let`, and the units of names."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections import ChainMap
 
 from hsdsl.elaborate.symbols import SymbolTable, Values, definition_order
 from hsdsl.expression.scope import Scope, Value, symbol
+from hsdsl.names import did_you_mean, shown
 from hsdsl.schema import ParameterEntry
 from hsdsl.source import Scalar
 from hsdsl.system import Parameter
@@ -20,38 +21,34 @@ def define_parameters(symbols: SymbolTable) -> tuple[Parameter, ...]:
     refused: Values = {}
     earlier: Values = {}
     scope = Scope(ChainMap(refused, earlier, symbols.scope((), _ONLY_PARAMETERS, hint=_UNDER_LET).values))  # pyright: ignore[reportArgumentType]
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     for name in definition_order(symbols.document.parameters, "parameters", refused):
         entry = symbols.document.parameters[name]
-        scalar = entry.value if isinstance(entry, ParameterEntry) else entry
-        value = symbols.resolver.number(scalar, scope, finite_now=True)
+        entry = entry if isinstance(entry, ParameterEntry) else ParameterEntry.model_construct(value=entry)
+        value = symbols.number(entry.value, scope, finite_now=True)
         symbols.values[name] = earlier[name] = None if value is None else Value(symbol(name), value.number)
-        extra = _extra(symbols, entry, scope) if isinstance(entry, ParameterEntry) else {}
+        bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
         if value is not None:
-            _check_bounds(symbols, name, scalar, value, extra)
-            exprs = {key: part.expr if isinstance(part, Value) else part for key, part in extra.items()}
-            unit = exprs.pop("unit", None) or symbols.text(symbols.document.units.get(name))
-            found.append(Parameter(name, value.expr, scalar.value, unit, **exprs))
-    return tuple(found)
+            _check_bounds(symbols, name, entry.value, value, *bounds)
+            least, most = (None if bound is None else bound.expr for bound in bounds)
+            unit = symbols.text(entry.unit) or symbols.text(symbols.document.units.get(name))
+            about = symbols.text(entry.about)
+            parameters.append(Parameter(name, value.expr, entry.value.value, unit, least, most, about))
+    return tuple(parameters)
 
 
-def _extra(symbols: SymbolTable, entry: ParameterEntry, scope: Scope) -> dict:
-    bounds = {"minimum": entry.min, "maximum": entry.max}
-    read = {k: symbols.resolver.number(s, scope, finite_now=True) for k, s in bounds.items() if s is not None}
-    return {**read, "unit": symbols.text(entry.unit), "about": symbols.text(entry.about)}
-
-
-def _check_bounds(symbols: SymbolTable, name: str, scalar: Scalar, value: Value, extra: dict) -> None:
-    least, most = extra.get("minimum"), extra.get("maximum")
+def _check_bounds(
+    symbols: SymbolTable, name: str, scalar: Scalar, value: Value, least: Value | None, most: Value | None
+) -> None:
+    message, hint = None, None
     if least is not None and most is not None and least.number > most.number:
-        message = f"the least value of '{name}' is above its largest"
-        symbols.resolver.add(scalar.place, "HS309", message, "exchange `min` and `max`")
+        message, hint = f"the least value of '{name}' is above its largest", "exchange `min` and `max`"
     elif least is not None and value.number < least.number:
         message = f"'{name}' is {_number(value)}, below its least value {_number(least)}"
-        symbols.resolver.add(scalar.place, "HS309", message)
     elif most is not None and value.number > most.number:
         message = f"'{name}' is {_number(value)}, above its largest value {_number(most)}"
-        symbols.resolver.add(scalar.place, "HS309", message)
+    if message:
+        symbols.report(scalar.place, "HS309", message, hint)
 
 
 def _number(value: Value) -> str:
@@ -65,4 +62,25 @@ def define_lets(symbols: SymbolTable) -> None:
     earlier: Values = {}
     scope = Scope(ChainMap(refused, earlier, base))  # pyright: ignore[reportArgumentType]
     for name in definition_order(symbols.document.let, "`let` names", refused):
-        symbols.values[name] = earlier[name] = symbols.resolver.number(symbols.document.let[name], scope)
+        symbols.values[name] = earlier[name] = symbols.number(symbols.document.let[name], scope)
+
+
+def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
+    """The unit of each name that has one."""
+    known = [name for name, kind in symbols.names.items() if kind != "let"] + [*symbols.all_outputs, "t"]
+    units: dict[str, str] = {}
+    for key, scalar in symbols.document.units.items():
+        if key not in known:
+            message = f"'{shown(key)}' is neither a state nor a parameter, an input or an output"
+            symbols.report(key.place, "HS313", message, did_you_mean(key, known))
+        unit = symbols.text(scalar)
+        if unit is not None:
+            units[str(key)] = unit
+    for key, entry in symbols.document.parameters.items():
+        unit = symbols.text(entry.unit) if isinstance(entry, ParameterEntry) else None
+        if unit is None:
+            continue
+        if units.setdefault(str(key), unit) != unit:
+            message = f"the parameter '{key}' has the unit '{shown(unit)}' here and '{shown(units[key])}' in `units`"
+            symbols.report(key.place, "HS316", message, "keep one of them")
+    return units

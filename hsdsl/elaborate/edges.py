@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import re
 
-from hsdsl.elaborate.resolver import ExpressionResolver, all_of
+from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
 from hsdsl.names import did_you_mean, shown
 from hsdsl.schema import ModeDocument, TransitionDocument
-from hsdsl.source import ABSENT, Key, Scalar, SourceRange
+from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Edge, Surface
 
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
@@ -46,7 +46,7 @@ def _names(symbols: SymbolTable, source: Key, transitions: list[TransitionDocume
         name = symbols.text(transition.name)
         if name in given and transition.name is not None:
             message = f"the mode '{source}' has a transition '{shown(name)}' already"
-            symbols.resolver.add(transition.name.place, "HS307", message, "give it another name")
+            symbols.report(transition.name.place, "HS307", message, "give it another name")
         elif name is not None:
             given.add(name)
     counts: dict[str, int] = {}
@@ -65,7 +65,7 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
     resolver = symbols.resolver
     crossed = surface(resolver, transition.when, scope, "when")
     condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
-    values = all_of([resolver.number(scalar, scope) for scalar in transition.reset.values()])
+    values = symbols.numbers(transition.reset.values(), scope)
     target = known_mode(symbols, transition.to)
     if target is None:
         return None
@@ -99,7 +99,7 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
     hint = did_you_mean(label.value, symbols.document.modes)
     if guarded and guarded.group(1) in symbols.document.modes:
         hint = f"write {guarded.group(1)} alone, and if: {shown(guarded.group(2))}"
-    symbols.resolver.add(label.place, "HS303", message, hint)
+    symbols.report(label.place, "HS303", message, hint)
     return None
 
 
@@ -122,7 +122,7 @@ def _check_reset(
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             name, equals, value = (part.strip() for part in key.partition("="))
             written = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
-            symbols.resolver.add(key.place, "HS306", message, written)
+            symbols.report(key.place, "HS306", message, written)
             complete = False
     own = symbols.states[source]
     for state in states:
@@ -130,10 +130,6 @@ def _check_reset(
             message = (
                 f"the transition to '{target}' gives its state '{state}' no value, and '{source}' has no such state"
             )
-            symbols.resolver.add(_place(transition), "HS305", message, f"write reset: {{{state}: ...}}")
+            symbols.report(transition.to.place, "HS305", message, f"write reset: {{{state}: ...}}")
             complete = False
     return complete
-
-
-def _place(transition: TransitionDocument) -> SourceRange:
-    return transition.to.place

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Where a run starts, and what the file asks of it."""
+"""The initial mode and state, and the experiment."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def elaborate_initial(symbols: SymbolTable) -> Initial:
     hint = "name the value under `parameters`, and write that name for both"
     scope = symbols.parameter_scope("an initial value is an expression of parameters", hint)
     given: dict[Key, Scalar] = document.__pydantic_extra__
-    values = {str(key): symbols.resolver.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
+    values = {str(key): symbols.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
     mode = known_mode(symbols, document.mode)
     if mode is not None:
         _check_states(symbols, mode, given)
@@ -37,7 +37,7 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
     for key in given:
         if key not in symbols.states[mode]:
             message = f"the mode '{mode}' has no state '{shown(key)}'"
-            symbols.resolver.add(key.place, "HS308", message, did_you_mean(key, lacking) or _without_flow(mode, key))
+            symbols.report(key.place, "HS308", message, did_you_mean(key, lacking) or _without_flow(mode, key))
             meant = closest(key, lacking)
             lacking = [s for s in lacking if s != meant]
     if lacking:
@@ -45,7 +45,7 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
         names = ", ".join(f"'{s}'" for s in lacking)
         message = f"the {noun} {names} of the mode '{mode}' {verb} no initial value"
         hint = "add " + ", ".join(f"{s}: ..." for s in lacking)
-        symbols.resolver.add(symbols.document.initial.mode.place, "HS308", message, hint)
+        symbols.report(symbols.document.initial.mode.place, "HS308", message, hint)
 
 
 def _without_flow(mode: str, key: str) -> str:
@@ -60,41 +60,35 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     if document.step is not None and document.tolerance is not None:
         message = "a run has either a `step` or a `tolerance`, not both"
         last = max((document.step, document.tolerance), key=lambda scalar: scalar.place.start)
-        symbols.resolver.add(last.place, STEP_AND_TOLERANCE, message, "keep the one that the method works with")
+        symbols.report(last.place, STEP_AND_TOLERANCE, message, "keep the one that the method works with")
     end = symbols.parameter_scope(sentence, "to end with an event, let a transition lead to a mode with final: true")
+    method = document.method  # checked where methods are known, with its place
     until = _setting(symbols, end, "until", document.until)
     numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_POSITIVE, "max_transitions")}
     return Experiment(
         until=until,
         scheme=symbols.text(document.scheme),
-        method=_placed(document.method),
+        method=Key.at(method.value, method.place) if method and method.value != ABSENT else None,
         samples=_samples(symbols, scope, document.samples),
         scale=_scale(symbols, scope, document.scale),
         **numbers,
     )
 
 
-def _placed(scalar: Scalar | None) -> Key | None:
-    """A word that knows its place: whether there is such a method only those above know."""
-    return None if scalar is None or scalar.value == ABSENT else Key.at(scalar.value, scalar.place)
-
-
 def _setting(symbols: SymbolTable, scope: Scope, key: str, scalar: Scalar | None) -> Any:
     if scalar is None:
         return None
-    value = symbols.resolver.number(scalar, scope, finite_now=True)
+    value = symbols.number(scalar, scope, finite_now=True)
     if value is None:
         return None
-    wanted = None
-    if value.constant:
-        wanted = _wanted(key, value)
-    if wanted:
-        symbols.resolver.add(scalar.place, "HS321", f"`{key}` must be {wanted}, not {shown(scalar.value, 40)}")
+    range_ = _missed_range(key, value) if value.constant else None
+    if range_:
+        symbols.report(scalar.place, "HS321", f"`{key}` must be {range_}, not {shown(scalar.value, 40)}")
     return value.expr
 
 
-def _wanted(key: str, value: Value) -> str | None:
-    """What a constant setting must be, where it is not."""
+def _missed_range(key: str, value: Value) -> str | None:
+    """The range of a constant setting that is outside of it."""
     whole = value.number == int(value.number)
     if (key in _POSITIVE or key.startswith("scale.")) and not value.number > 0:
         return "positive"
@@ -112,9 +106,7 @@ def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tupl
     states = symbols.all_states()
     for key in given:
         if key not in states:
-            symbols.resolver.add(
-                key.place, "HS322", f"the model has no state '{shown(key)}'", did_you_mean(key, states)
-            )
+            symbols.report(key.place, "HS322", f"the model has no state '{shown(key)}'", did_you_mean(key, states))
     sizes = {str(key): _setting(symbols, scope, f"scale.{key}", scalar) for key, scalar in given.items()}
     return tuple((name, size) for name, size in sizes.items() if size is not None)
 
@@ -122,5 +114,5 @@ def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tupl
 def _samples(symbols: SymbolTable, scope: Scope, given: Scalar | list[Scalar] | None) -> Any:
     if not isinstance(given, list):
         return _setting(symbols, scope, "samples", given)
-    values = [symbols.resolver.number(scalar, scope, finite_now=True) for scalar in given]
+    values = [symbols.number(scalar, scope, finite_now=True) for scalar in given]
     return tuple(v.expr for v in values if v is not None)

@@ -7,7 +7,6 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.elaborate.resolver import all_of
 from hsdsl.elaborate.samples import read_samples
 from hsdsl.elaborate.symbols import SymbolTable, Values
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
@@ -29,7 +28,7 @@ def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
     found: list[SampledInput] = []
     for name, entry in symbols.document.inputs.items():
         if isinstance(entry, Scalar):
-            symbols.values[name] = symbols.resolver.number(entry, timed)
+            symbols.values[name] = symbols.number(entry, timed)
             continue
         symbols.values[name] = Value(symbol(name))
         sampled = (
@@ -48,21 +47,21 @@ def _file(symbols: SymbolTable, name: Key, entry: InputFile) -> SampledInput | N
 
 
 def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
-    times = all_of([symbols.resolver.number(scalar, scope, finite_now=True) for scalar in entry.times])
-    values = all_of([symbols.resolver.number(scalar, scope, finite_now=True) for scalar in entry.values])
+    times = symbols.numbers(entry.times, scope, finite_now=True)
+    values = symbols.numbers(entry.values, scope, finite_now=True)
     if len(entry.times) != len(entry.values):
         message = f"the input '{name}' has {len(entry.times)} times and {len(entry.values)} values"
-        symbols.resolver.add(name.place, "HS310", message, "give one value for each time")
+        symbols.report(name.place, "HS310", message, "give one value for each time")
         return None
     if not entry.times:
-        symbols.resolver.add(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
+        symbols.report(name.place, "HS310", f"the input '{name}' has no samples", "give at least one")
         return None
     if times is None or values is None:
         return None
     for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
         if before.constant and after.constant and not before.number < after.number:
             message = f"the times of the input '{name}' do not increase here"
-            symbols.resolver.add(scalar.place, "HS310", message, "give each time once, the earliest first")
+            symbols.report(scalar.place, "HS310", message, "give each time once, the earliest first")
     unit = symbols.text(symbols.document.units.get(name))
     return SampledInput(name, entry.hold, tuple(map(_exact, times)), tuple(map(_exact, values)), unit)
 

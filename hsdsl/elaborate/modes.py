@@ -24,16 +24,14 @@ def elaborate_modes(symbols: SymbolTable, outputs: dict[str, Value | None]) -> t
 def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[str, Value | None]) -> Mode | None:
     if document.flow is None and not document.final:
         message = f"the mode '{name}' has no `flow`"
-        symbols.resolver.add(
-            name.place, "HS304", message, "write `flow: {}` for a mode without states, or `final: true`"
-        )
+        symbols.report(name.place, "HS304", message, "write `flow: {}` for a mode without states, or `final: true`")
         return None
     if symbols.without_states(document) and (document.transitions or document.domain or document.outputs):
         message = f"the final mode '{name}' has no states of its own, and so no domain, transitions or outputs"
-        symbols.resolver.add(name.place, "HS315", message, "give it a `flow`, or leave them out")
+        symbols.report(name.place, "HS315", message, "give it a `flow`, or leave them out")
         return None
     scope = symbols.scopes[str(name)] = mode_scope(symbols, name, document)
-    flow = all_of([symbols.resolver.number(scalar, scope) for scalar in (document.flow or {}).values()])
+    flow = symbols.numbers((document.flow or {}).values(), scope)
     walls = all_of([surface(symbols.resolver, scalar, scope, "domain") for scalar in document.domain])
     edges = all_of(elaborate_edges(symbols, name, document, scope))
     outputs = outputs_of(symbols, shared, document, scope)
@@ -62,6 +60,6 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
         kind = symbols.names.get(key)
         if kind not in (None, "let"):
             message = f"'{key}' is a `let` name of {place}, and also {KINDS[kind]}"
-            symbols.resolver.add(key.place, "HS301", message, "give one of them another name")
-        own[key] = symbols.resolver.number(document.let[key], scope)
+            symbols.report(key.place, "HS301", message, "give one of them another name")
+        own[key] = symbols.number(document.let[key], scope)
     return scope

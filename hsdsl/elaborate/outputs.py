@@ -26,7 +26,7 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
     found: dict[str, Value | None] = {}
     for name, scalar in symbols.document.outputs.items():
         _check_name(symbols, name)
-        found[name] = symbols.resolver.number(scalar, scope)
+        found[name] = symbols.number(scalar, scope)
     for mode in symbols.document.modes.values():
         for name in mode.outputs:
             _check_name(symbols, name)
@@ -36,13 +36,13 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
 def _check_name(symbols: SymbolTable, name: Key) -> None:
     if symbols.names.get(name) == "states":
         message = f"the output '{name}' has the name of a state"
-        symbols.resolver.add(name.place, "HS301", message, "states are recorded anyway")
+        symbols.report(name.place, "HS301", message, "states are recorded anyway")
 
 
 def outputs_of(symbols: SymbolTable, shared: dict[str, Value | None], document: ModeDocument, scope: Scope) -> tuple:
     """The outputs of a mode, in the order of `SymbolTable.all_outputs`; None for one that it does not have."""
     found = {name: _here(symbols, name, value, scope) for name, value in shared.items()}
-    found |= {str(name): symbols.resolver.number(scalar, scope) for name, scalar in document.outputs.items()}
+    found |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
     values = (found.get(name) for name in symbols.all_outputs)
     return tuple(None if value is None else value.expr for value in values)
 
@@ -55,5 +55,5 @@ def _here(symbols: SymbolTable, name: str, value: Value | None, scope: Scope) ->
     if any(isinstance(scope.values[name], Refusal) for name in inner):
         return None
     if inner:
-        value = symbols.resolver.number(symbols.document.outputs[name], replace(scope, states=None))  # pyright: ignore[reportArgumentType]
+        value = symbols.number(symbols.document.outputs[name], replace(scope, states=None))  # pyright: ignore[reportArgumentType]
     return value if value is not None and value.uses <= (scope.states or frozenset()) else None

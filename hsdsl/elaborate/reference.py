@@ -98,11 +98,11 @@ class _Checker:
 
     def number(self, scalar: Scalar) -> str:
         """The text of an expression of parameters."""
-        self.symbols.resolver.number(scalar, self.scope)
+        self.symbols.number(scalar, self.scope)
         return scalar.value
 
     def known(self, name: str, place: SourceRange, kind: str, names: list[str]) -> None:
         """Report a name that nothing has."""
         if name not in names:
             message = f"there is no {kind} '{shown(name)}'"
-            self.symbols.resolver.add(place, "HS314", message, did_you_mean(name, names))
+            self.symbols.report(place, "HS314", message, did_you_mean(name, names))

@@ -54,7 +54,7 @@ class ExpressionResolver:
     box: Box | None = None
     at: Scalar | None = None
 
-    def add(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
+    def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
         """Report a fault at a place."""
         self.findings.add(place.diagnostic(code, message, hint))
 
@@ -68,7 +68,7 @@ class ExpressionResolver:
             return None
         if value and finite_now and value.number is not None and not numeric.finite(value.number):
             message = f"`{shown(scalar.value, 40)}` has no finite real value with the parameters of this file"
-            self.add(scalar.place, "HS118", message)
+            self.report(scalar.place, "HS118", message)
             return None
         return value
 

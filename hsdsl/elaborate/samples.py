@@ -23,23 +23,22 @@ def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | Non
         return None
     try:
         data = symbols.content(file.value)
-    except DataRefused as refusal:
-        symbols.resolver.add(file.place, refusal.code, refusal.message, refusal.hint)
-        return None
-    try:
         lines = data.decode("utf-8-sig").splitlines()
+    except DataRefused as refusal:
+        symbols.report(file.place, refusal.code, refusal.message, refusal.hint)
+        return None
     except UnicodeDecodeError:
-        symbols.resolver.add(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
+        symbols.report(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
     table = _Table(str(symbols.files.folder / file.value), lines)
-    samples = table.samples(name)
+    table.read(name)
     for diagnostic in table.faults:
         symbols.resolver.findings.add(diagnostic)
-    return None if table.faults else samples
+    return None if table.faults else (tuple(table.times), tuple(table.values))
 
 
 def _hint(name: str, columns: list[str]) -> str | None:
-    """What a header probably meant."""
+    """The hint for a wrong header."""
     if any(mark in column for column in columns for mark in ";\t"):
         return "columns are separated by commas, and numbers have decimal points"
     if name in columns:
@@ -48,68 +47,61 @@ def _hint(name: str, columns: list[str]) -> str | None:
 
 
 class _Table:
-    """A comma-separated table, and what is wrong with it."""
+    """The samples of a comma-separated table, and its faults."""
 
     def __init__(self, path: str, lines: list[str]) -> None:
-        self.path = path
-        self.lines = lines
+        self.path, self.lines = path, lines
+        self.times: list[Fraction] = []
+        self.values: list[Fraction] = []
         self.faults: list[Diagnostic] = []
 
-    def samples(self, name: str) -> Samples | None:
-        """The columns ``time`` and ``name``."""
-        columns = [cell.strip().strip('"') for cell in self.lines[0].split(",")] if self.lines else []
+    def read(self, name: str) -> None:
+        """Read the columns ``time`` and ``name``."""
+        header = self.lines[0] if self.lines else ""
+        columns = [cell.strip().strip('"') for cell in header.split(",")] if self.lines else []
         if "time" not in columns or name not in columns:
-            there = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
-            message = f"the header must be `time,{name}`, and has {there}"
-            self.fault(1, 1, len(self.lines[0]) if self.lines else 1, message, _hint(name, columns))
-            return None
-        wanted = (columns.index("time"), columns.index(name))
-        times: list[Fraction] = []
-        values: list[Fraction] = []
+            present = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
+            message = f"the header must be `time,{name}`, and has {present}"
+            self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns))
+            return
         for number, line in enumerate(self.lines[1:], start=2):
             if line.strip() and len(self.faults) < _MOST_FAULTS:
-                self.row(number, line, len(columns), wanted, times, values)
-        if not times and not self.faults:
-            self.fault(1, 1, len(self.lines[0]), "the file has no rows below its header")
-        return tuple(times), tuple(values)
+                self.row(number, line, len(columns), columns.index("time"), columns.index(name))
+        if not self.times and not self.faults:
+            self.fault(1, 1, len(header), "the file has no rows below its header")
 
-    def row(
-        self,
-        number: int,
-        line: str,
-        width: int,
-        wanted: tuple[int, int],
-        times: list[Fraction],
-        values: list[Fraction],
-    ) -> None:
-        """One sample."""
+    def row(self, number: int, line: str, width: int, at: int, own: int) -> None:
+        """Read one sample: its time and its value are in these columns."""
         cells = line.split(",")
         if len(cells) != width:
             self.fault(number, 1, len(line), f"this row has {len(cells)} columns and the header {width}")
             return
-        time, value = (self.cell(number, cells, column) for column in wanted)
+        time, value = self.cell(number, cells, at), self.cell(number, cells, own)
         if time is None or value is None:
             return
-        if times and time <= times[-1]:
-            start = len(",".join(cells[: wanted[0]])) + (1 if wanted[0] else 0)
-            self.fault(number, start + 1, len(cells[wanted[0]]), "the times do not increase here")
+        if self.times and time <= self.times[-1]:
+            self.fault(number, _start(cells, at), len(cells[at]), "the times do not increase here")
             return
-        times.append(time)
-        values.append(value)
+        self.times.append(time)
+        self.values.append(value)
 
     def cell(self, number: int, cells: list[str], column: int) -> Fraction | None:
-        """One number, exactly."""
+        """Read one number, exactly."""
         text = cells[column].strip().strip('"').strip()
         if _NUMBER.fullmatch(text):
             value = Fraction(text)
             if abs(value) < 2**1024:
                 return value
-        start = sum(len(cell) + 1 for cell in cells[:column])
         message = f"'{shown(text, 40)}' in column {column + 1} is not a finite number"
-        self.fault(number, start + 1, max(1, len(cells[column])), message)
+        self.fault(number, _start(cells, column), len(cells[column]), message)
         return None
 
     def fault(self, line: int, column: int, length: int, message: str, hint: str | None = None) -> None:
         """Report something at a place of the table."""
         text = self.lines[line - 1] if line <= len(self.lines) else ""
         self.faults.append(Diagnostic("HS312", message, Span(self.path, line, column, max(1, length)), hint, text))
+
+
+def _start(cells: list[str], column: int) -> int:
+    """The place of a cell in its line, from 1."""
+    return 1 + sum(len(cell) + 1 for cell in cells[:column])

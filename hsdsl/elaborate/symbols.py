@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hsdsl.elaborate.resolver import ExpressionResolver
+from hsdsl.elaborate.resolver import ExpressionResolver, all_of
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.files import ModelFiles
 from hsdsl.names import closest
 from hsdsl.schema import ModeDocument, ModelDocument
-from hsdsl.source import ABSENT, Key, Scalar
+from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
 
 KINDS = {"parameters": "a parameter", "inputs": "an input", "states": "a state", "let": "a `let` name"}
@@ -59,7 +59,7 @@ class SymbolTable:
                 taken = self.names.setdefault(key, kind)
                 if taken != kind:
                     message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
-                    self.resolver.add(key.place, "HS301", message, "give one of them another name")
+                    self.report(key.place, "HS301", message, "give one of them another name")
         self.values["t"] = Value(TIME)
         self.values |= {name: state(name) for name in self.all_states()}
         self.undeclared = frozenset(self._undeclared())
@@ -92,6 +92,18 @@ class SymbolTable:
     def parameter_scope(self, sentence: str, hint: str | None = None) -> Scope:
         """A scope with the parameters alone."""
         return self.scope(("parameters",), sentence, hint=hint)
+
+    def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
+        """The value of an expression; see `ExpressionResolver.number`."""
+        return self.resolver.number(scalar, scope, finite_now)
+
+    def numbers(self, scalars: Iterable[Scalar], scope: Scope, finite_now: bool = False) -> list[Value] | None:
+        """The values of expressions; None where one of them is broken."""
+        return all_of([self.resolver.number(scalar, scope, finite_now) for scalar in scalars])
+
+    def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
+        """Report a fault at a place."""
+        self.resolver.report(place, code, message, hint)
 
     def content(self, name: str) -> bytes:
         """The content of a data file, which is read once; raises DataRefused."""

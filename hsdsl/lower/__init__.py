@@ -14,6 +14,7 @@ import sympy as sp
 from hsdsl import limits
 from hsdsl import program as lowered
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
+from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.functions import absolute, maximum
@@ -21,26 +22,21 @@ from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
 from hsdsl.lower.tape import make_tape
-from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput
 
-_NAN = sp.Symbol("nan", real=True)
+_NAN = symbol("nan")
 
 
 @dataclass(frozen=True)
 class Names:
-    """The numbered symbols that stand for the file's names in generated code."""
+    """The numbered symbols that stand for the file's names in generated code.
+
+    ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs and switches.
+    """
 
     parameters: tuple[sp.Symbol, ...]
     data: tuple[sp.Symbol, ...]
-    shared: dict[sp.Symbol, sp.Expr]  # parameters, sampled inputs and switches
-
-    def of_states(self, states: tuple[str, ...], letter: str = "x") -> tuple[sp.Symbol, ...]:
-        """Number a mode's states."""
-        return tuple(_symbol(f"{letter}{i}") for i in range(len(states)))
-
-    def mapping(self, states: tuple[str, ...]) -> dict[sp.Symbol, sp.Expr]:
-        """Everything an expression of a mode with these states may name."""
-        return self.shared | dict(zip(map(_symbol, states), self.of_states(states), strict=True))
+    shared: dict[sp.Symbol, sp.Expr]
 
 
 def lower(system: HybridSystem) -> lowered.Program:
@@ -64,16 +60,17 @@ def _lower(system: HybridSystem) -> lowered.Program:
     system, switches = with_switches(system)
     names = _number(system, switches.symbols)
     experiment = system.experiment
+    indices = {mode.name: i for i, mode in enumerate(system.modes)}
     return lowered.Program(
         path=system.path,
         digest=system.digest,
         title=system.title,
         parameters=tuple(p.name for p in system.parameters),
         inputs=tuple(_sampled(i) for i in system.inputs),
-        modes=tuple(_mode(system, mode, names) for mode in system.modes),
+        modes=tuple(_Mode(mode, names).program(indices) for mode in system.modes),
         outputs=system.outputs,
         units=system.units,
-        initial_mode=[m.name for m in system.modes].index(system.initial.mode),
+        initial_mode=indices[system.initial.mode],
         initial_states=tuple(name for name, _ in system.initial.values),
         scheme=experiment.scheme,
         method=experiment.method,
@@ -93,19 +90,15 @@ def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> 
         )
 
 
-def _symbol(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
-
-
 def _number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
-    parameters = tuple(_symbol(f"p{i}") for i in range(len(system.parameters)))
+    parameters = tuple(symbol(f"p{i}") for i in range(len(system.parameters)))
     shared: dict[sp.Symbol, sp.Expr] = dict(zip(system.parameter_symbols, parameters, strict=True))
     data = list(parameters)
     for i, sampled in enumerate(system.inputs):
-        start, slope, since = (_symbol(f"{letter}{i}") for letter in "abc")
-        shared[_symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
+        start, slope, since = (symbol(f"{letter}{i}") for letter in "abc")
+        shared[symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
         data += [start, slope, since]
-    numbers = tuple(_symbol(f"k{i}") for i in range(len(switches)))
+    numbers = tuple(symbol(f"k{i}") for i in range(len(switches)))
     shared.update(zip(switches, numbers, strict=True))
     data += numbers
     return Names(parameters, tuple(data), shared)
@@ -146,72 +139,101 @@ def _constants(system: HybridSystem, names: Names):
         yield define("sample_count", experiment.samples)
 
 
-def _mode(system: HybridSystem, mode: Mode, names: Names) -> lowered.ModeProgram:
-    indices = {m.name: i for i, m in enumerate(system.modes)}
-    edges = tuple(
-        lowered.EdgeProgram(
-            name=edge.name,
-            source=indices[edge.source],
-            target=indices[edge.target],
-            target_states=edge.target_states,
-            conditional=edge.condition is not None,
-            priority=edge.priority,
-            text=edge.surface.text,
-            reset_texts=edge.reset_texts,
+class _Mode:
+    """A mode over numbered symbols."""
+
+    def __init__(self, mode: Mode, names: Names) -> None:
+        self.mode, self.names = mode, names
+        self.states = tuple(symbol(f"x{i}") for i in range(len(mode.states)))
+        self.arguments = (TIME, *self.states)
+        self._mapping = names.shared | dict(zip(map(symbol, mode.states), self.states, strict=True))
+        self._done: dict[sp.Basic, sp.Basic] = {}
+        self.flow = self.place(mode.flow)
+        self.residuals = self.place(s.residual for s in mode.surfaces)
+
+    def place(self, expressions) -> tuple[sp.Basic, ...]:
+        """Expressions of the file's names over numbered symbols."""
+        return tuple(replaced(sp.sympify(e), self._mapping, self._done) for e in expressions)
+
+    def program(self, indices: dict[str, int]) -> lowered.ModeProgram:
+        """The mode's routines, and what a loop must know about it."""
+        mode, data = self.mode, self.names.data
+        texts, expressions = zip(*_labelled(mode), strict=True) if mode.states or mode.surfaces else ((), ())
+        return lowered.ModeProgram(
+            name=mode.name,
+            states=mode.states,
+            final=mode.final,
+            edges=tuple(_edge(edge, indices) for edge in mode.edges),
+            walls=tuple(wall.text for wall in mode.walls),
+            flow_texts=mode.flow_texts,
+            routines=print_routines(self._routines(), data),
+            affine=all(r.is_polynomial(*self.arguments) and self._has_constant_slopes(r) for r in self.residuals),
+            jacobian=self._jacobian(),
+            tape=make_tape(self.flow, self.residuals, self.states, data),
+            expressions=tuple(texts),
+            diagnosis=print_routines(self._diagnosis(expressions), data),
         )
-        for edge in mode.edges
+
+    def _has_constant_slopes(self, residual: sp.Basic) -> bool:
+        slopes = Gradient((residual,), self.arguments)
+        own = set(self.arguments)
+        return not slopes.statements and not any(slope.free_symbols & own for slope in slopes.sparse[0].values())
+
+    def _jacobian(self) -> lowered.Jacobian:
+        slopes = Gradient(self.flow, self.states)
+        column = {state: i for i, state in enumerate(self.states)}
+        places = [k * len(self.states) + column[state] for k, row in enumerate(slopes.sparse) for state in row]
+        values = tuple(slope for row in slopes.sparse for slope in row.values())
+        definition = Definition("jacobian", self.arguments, values, slopes.statements)
+        return lowered.Jacobian(print_routines((definition,), self.names.data), tuple(places))
+
+    def _diagnosis(self, expressions):
+        places = {argument: i for i, argument in enumerate(self.arguments)}
+        for k, result in enumerate(self.place(expressions)):
+            yield Definition(f"expression_{k}", self.arguments, (result,), places=places)
+
+    def _routines(self):
+        mode, arguments = self.mode, self.arguments
+        outputs = self.place(_NAN if output is None else output for output in mode.outputs)
+        yield Definition("flow", arguments, self.flow)
+        yield Definition("surfaces", arguments, self.residuals)
+        sides = self.place(absolute(s.left) + absolute(s.right) for s in mode.surfaces)
+        yield Definition("magnitudes", arguments, sides)
+        yield Definition("outputs", arguments, outputs)
+        for k, residual in enumerate(self.residuals):
+            slope = Gradient((residual,), arguments)
+            row, along = slope.sparse[0], dict(zip(arguments, (sp.S.One, *self.flow), strict=True))
+            rate = sp.Add(*(d * along[argument] for argument, d in row.items()))
+            yield Definition(f"gradient_{k}", arguments, slope.rows[0], slope.statements)
+            yield Definition(f"rate_{k}", arguments, (rate,), slope.statements)
+        for k, edge in enumerate(mode.edges):
+            condition = sp.true if edge.condition is None else edge.condition
+            for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
+                yield Definition(f"condition_{k}_{i}", arguments, self.place([part]))
+        scales = {state: symbol(f"s{i}") for i, state in enumerate(self.states)}
+        for k, edge in enumerate(mode.edges):
+            reset = self.place(edge.reset)
+            yield Definition(f"reset_{k}", arguments, reset)
+            changes = Gradient(reset, self.states)
+            spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=True))
+            yield Definition(f"spread_{k}", (*arguments, *scales.values()), spreads, changes.statements)
+
+
+def _edge(edge: Edge, indices: dict[str, int]) -> lowered.EdgeProgram:
+    return lowered.EdgeProgram(
+        name=edge.name,
+        source=indices[edge.source],
+        target=indices[edge.target],
+        target_states=edge.target_states,
+        conditional=edge.condition is not None,
+        priority=edge.priority,
+        text=edge.surface.text,
+        reset_texts=edge.reset_texts,
     )
-    return lowered.ModeProgram(
-        name=mode.name,
-        states=mode.states,
-        final=mode.final,
-        edges=edges,
-        walls=tuple(wall.text for wall in mode.walls),
-        flow_texts=mode.flow_texts,
-        routines=print_routines(_mode_routines(mode, names), names.data),
-        affine=_affine(mode, names),
-        jacobian=_jacobian(mode, names),
-        tape=_tape(mode, names),
-        expressions=tuple(text for text, _ in _expressions(mode)),
-        diagnosis=print_routines(_diagnosis(mode, names), names.data),
-    )
 
 
-def _affine(mode: Mode, names: Names) -> bool:
-    """Whether all surfaces of a mode are affine functions of time and the states, as far as can be told at sight."""
-    arguments, mapping, done = (TIME, *names.of_states(mode.states)), names.mapping(mode.states), {}
-    residuals = [replaced(sp.sympify(r), mapping, done) for r in _residuals(mode)]
-    return all(r.is_polynomial(*arguments) and _constant_slopes(r, arguments) for r in residuals)
-
-
-def _constant_slopes(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> bool:
-    slopes = Gradient((expression,), arguments)
-    own = set(arguments)
-    return not slopes.statements and not any(slope.free_symbols & own for slope in slopes.sparse[0].values())
-
-
-def _residuals(mode: Mode) -> list[sp.Expr]:
-    return [edge.surface.residual for edge in mode.edges] + [wall.residual for wall in mode.walls]
-
-
-def _jacobian(mode: Mode, names: Names) -> lowered.Jacobian:
-    states, mapping, done = names.of_states(mode.states), names.mapping(mode.states), {}
-    slopes = Gradient([replaced(sp.sympify(e), mapping, done) for e in mode.flow], states)
-    column = {state: i for i, state in enumerate(states)}
-    places = [k * len(states) + column[state] for k, row in enumerate(slopes.sparse) for state in row]
-    values = tuple(slope for row in slopes.sparse for slope in row.values())
-    definition = Definition("jacobian", (TIME, *states), values, slopes.statements)
-    return lowered.Jacobian(print_routines((definition,), names.data), tuple(places))
-
-
-def _tape(mode: Mode, names: Names) -> lowered.Tape | None:
-    mapping, done = names.mapping(mode.states), {}
-    parts = mode.flow, _residuals(mode)
-    flow, surfaces = ([replaced(sp.sympify(e), mapping, done) for e in part] for part in parts)
-    return make_tape(flow, surfaces, names.of_states(mode.states), names.data)
-
-
-def _expressions(mode: Mode):
+def _labelled(mode: Mode):
+    """The expressions of a mode, each with a description for people."""
     for state, text, expression in zip(mode.states, mode.flow_texts, mode.flow, strict=True):
         yield f"the flow of {state}, {text}", expression
     for edge in mode.edges:
@@ -222,54 +244,6 @@ def _expressions(mode: Mode):
         yield f"the domain's {wall.text}", wall.residual
 
 
-def _diagnosis(mode: Mode, names: Names):
-    mapping, arguments = names.mapping(mode.states), (TIME, *names.of_states(mode.states))
-    done: dict[sp.Basic, sp.Basic] = {}
-    places = {argument: i for i, argument in enumerate(arguments)}
-    for k, (_, expression) in enumerate(_expressions(mode)):
-        result = replaced(sp.sympify(expression), mapping, done)
-        yield Definition(f"expression_{k}", arguments, (result,), places=places)
-
-
-def _mode_routines(mode: Mode, names: Names):
-    states = names.of_states(mode.states)
-    mapping = names.mapping(mode.states)
-    arguments = (TIME, *states)
-    done: dict[sp.Basic, sp.Basic] = {}
-
-    def place(expressions):
-        return tuple(replaced(sp.sympify(e), mapping, done) for e in expressions)
-
-    surfaces = [edge.surface for edge in mode.edges] + list(mode.walls)
-    flow = place(mode.flow)
-    residuals = place(s.residual for s in surfaces)
-    sides = place(absolute(s.left) + absolute(s.right) for s in surfaces)
-    outputs = place(_NAN if output is None else output for output in mode.outputs)
-
-    yield Definition("flow", arguments, flow)
-    yield Definition("surfaces", arguments, residuals)
-    yield Definition("magnitudes", arguments, sides)
-    yield Definition("outputs", arguments, outputs)
-    for k, residual in enumerate(residuals):
-        slope = Gradient((residual,), arguments)
-        row, along = slope.sparse[0], dict(zip(arguments, (sp.S.One, *flow), strict=True))
-        rate = sp.Add(*(d * along[argument] for argument, d in row.items()))
-        yield Definition(f"gradient_{k}", arguments, slope.rows[0], slope.statements)
-        yield Definition(f"rate_{k}", arguments, (rate,), slope.statements)
-    for k, edge in enumerate(mode.edges):
-        condition = sp.true if edge.condition is None else edge.condition
-        for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
-            yield Definition(f"condition_{k}_{i}", arguments, place([part]))
-    scales = names.of_states(mode.states, "s")
-    for k, edge in enumerate(mode.edges):
-        reset = place(edge.reset)
-        yield Definition(f"reset_{k}", arguments, reset)
-        changes = Gradient(reset, states)
-        sizes, own = dict(zip(states, scales, strict=True)), set(states)
-        spreads = tuple(_spread(r, row, own, sizes) for r, row in zip(reset, changes.sparse, strict=True))
-        yield Definition(f"spread_{k}", (*arguments, *scales), spreads, changes.statements)
-
-
-def _spread(value: sp.Expr, slopes, states, scales):
+def _spread(value: sp.Expr, slopes, scales):
     parts = sp.Add(*(absolute(slope) * scales[state] for state, slope in slopes.items()))
-    return parts if value in states else maximum(absolute(value), parts)
+    return parts if value in scales else maximum(absolute(value), parts)

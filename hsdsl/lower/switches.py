@@ -16,6 +16,7 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.expression.scope import symbol
 from hsdsl.functions import absolute, floor, maximum, minimum, rebuilt, sign
 from hsdsl.lower.routines import Definition
 from hsdsl.lower.straight import Gradient, replaced
@@ -23,10 +24,6 @@ from hsdsl.program import Switch
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
 
 _HALF = sp.Rational(1, 2)
-
-
-def _symbol(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 @dataclass
@@ -71,10 +68,10 @@ class Switches:
         """The number of a switch: the floor or the sign of its argument."""
         if not argument.free_symbols & self.moving:  # what moves has cancelled
             return {"floor": floor, "sign": sign}[kind](argument)
-        symbol = self.arguments.setdefault((kind, argument), _symbol(f"switch {len(self.arguments)}"))
+        switch = self.arguments.setdefault((kind, argument), symbol(f"switch {len(self.arguments)}"))
         if jumps:
-            self.jumping.add(symbol)
-        return symbol
+            self.jumping.add(switch)
+        return switch
 
     def between(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
         """The larger of two."""
@@ -99,11 +96,11 @@ _BRANCHES: dict[type, Callable[..., sp.Expr]] = {
 
 def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     """Write a system's expressions with switches, and return these."""
-    inputs = {_symbol(i.name): i.hold for i in system.inputs}
-    moving = frozenset({TIME, *(symbol for symbol, hold in inputs.items() if hold == "linear")})
-    found = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
-    modes = tuple(_mode(mode, found.out_of) for mode in system.modes)
-    return replace(system, modes=modes), found
+    inputs = {symbol(i.name): i.hold for i in system.inputs}
+    moving = frozenset({TIME, *(name for name, hold in inputs.items() if hold == "linear")})
+    switches = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
+    modes = tuple(_mode(mode, switches.out_of) for mode in system.modes)
+    return replace(system, modes=modes), switches
 
 
 def _mode(mode: Mode, out_of: Callable[[Any], Any]) -> Mode:
@@ -128,7 +125,7 @@ def _edge(edge: Edge, out_of: Callable[[Any], Any]) -> Edge:
 
 def switch_programs(switches: Switches) -> tuple[Switch, ...]:
     """What a simulator knows of the switches without numbers."""
-    return tuple(Switch(kind, symbol in switches.jumping) for (kind, _), symbol in switches.arguments.items())
+    return tuple(Switch(kind, switch in switches.jumping) for (kind, _), switch in switches.arguments.items())
 
 
 def switch_routines(switches: Switches, mapping: dict):

@@ -7,6 +7,7 @@ from __future__ import annotations
 import sympy as sp
 
 from hsdsl.backends.python import compile_routines
+from hsdsl.expression.scope import symbol
 from hsdsl.lower import lower_expressions
 from hsdsl.model.values import Values
 from hsdsl.plot import GuardLine
@@ -18,7 +19,7 @@ def guard_lines(values: Values) -> list[GuardLine]:
     parameters = set(system.parameter_symbols)
     found: list[tuple[str, str, sp.Expr, str]] = []
     for mode in system.modes:
-        states = {sp.Symbol(name, real=True): name for name in mode.states}
+        states = {symbol(name): name for name in mode.states}
         labelled = [(edge.surface, edge.name) for edge in mode.edges] + [(wall, wall.text) for wall in mode.walls]
         for surface, label in labelled:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):

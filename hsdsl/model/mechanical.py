@@ -9,6 +9,7 @@ import sympy as sp
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.backends.python import compile_routines
 from hsdsl.errors import UsageError
+from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.lower import lower_expressions
 from hsdsl.model.values import Values
@@ -55,7 +56,7 @@ def _refusal(reason: str) -> UsageError:
 def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
     """Return which of the two states is the position, and the numbers as expressions of parameters."""
     mode, edge = _only(system)
-    symbols = [sp.Symbol(name, real=True) for name in mode.states]
+    symbols = [symbol(name) for name in mode.states]
     known = set(system.parameter_symbols)
     position = _position(edge, symbols, known)
     x, v = symbols[position], symbols[1 - position]
