@@ -185,6 +185,6 @@ def chain_of(space: Space, indices: tuple[int, ...]) -> Chain:
     key = ("chain", indices)
     found = space.cache.get(key)
     if not isinstance(found, Chain):
-        found = Chain(space, [space.passages[i] for i in indices])
+        found = Chain(space, [space.passages[i] if i >= 0 else space.planes[~i] for i in indices])
         space.cache[key] = found
     return found

@@ -18,6 +18,7 @@ from hsdsl.metrics.line import on_line
 from hsdsl.metrics.rounding import brought_inside, charge, norm, proved_above, proved_below
 
 GAP = 1e-10  # relative
+SOLVED, ROUGHLY = 1e-12, 1e-8  # what the solver is asked for, and where one round has to do
 ROUNDS = 3
 
 
@@ -47,7 +48,7 @@ def _refined(problem: Problem, numbers: Array, rounds: int) -> tuple[float, floa
     unit = max(problem.length(center), float(charge(shape, numbers, norm(center[None]))[0]), 1e-300)
     lower, upper, best = 0.0, np.inf, center
     for _ in range(rounds):
-        found = _around(problem, center, unit)
+        found = _around(problem, center, unit, SOLVED if rounds > 1 else ROUGHLY)
         if found is None:
             break
         proposal, vectors, weights = (x[None] for x in found)
@@ -63,7 +64,7 @@ def _refined(problem: Problem, numbers: Array, rounds: int) -> tuple[float, floa
     return lower, upper, best
 
 
-def _around(problem: Problem, center: Array, unit: float) -> tuple[Array, Array, Array] | None:
+def _around(problem: Problem, center: Array, unit: float, tolerance: float) -> tuple[Array, Array, Array] | None:
     """Solve for ``s = center + unit * sigma``; returns proposals: unknowns, the legs' vectors, and weights."""
     clarabel: Any = import_module("clarabel")  # heavy, so not before it is needed
     shape = problem.shape
@@ -76,7 +77,7 @@ def _around(problem: Problem, center: Array, unit: float) -> tuple[Array, Array,
     right = np.concatenate(right)
     if not np.all(np.isfinite(right)):
         return None
-    answer: Any = clarabel.DefaultSolver(cost, objective, matrix, right, cones, _settings(clarabel)).solve()
+    answer: Any = clarabel.DefaultSolver(cost, objective, matrix, right, cones, _settings(clarabel, tolerance)).solve()
     primal: Array = np.array(answer.x, dtype=float)
     dual: Array = np.array(answer.z, dtype=float)
     if not (np.all(np.isfinite(primal)) and np.all(np.isfinite(dual))):
@@ -110,10 +111,9 @@ def _cone(shape: Shape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
 
 
 @cache
-def _settings(clarabel: Any) -> Any:
+def _settings(clarabel: Any, tolerance: float) -> Any:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = 1e-12
-    settings.tol_feas = 1e-12
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     settings.max_iter = 60
     return settings

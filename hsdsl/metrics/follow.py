@@ -8,12 +8,17 @@ Three rules, each proved from the geometry alone, whatever the ends of the path 
 2. a passage g that stays in its mode, after f: useless where every point at which f can leave is as near to where
    g leaves as to where g is entered.
 3. such a g before h: useless where every point at which h can be entered is as near to where g is entered.
+
+A fourth rule bounds runs back and forth through one gate, which could go on for ever. Moves on one side of a gate add
+up, so a run longer than ``RUN`` is no shorter than two or three passages, of which the second need not keep the gate's
+inequalities. That passage is written ``~i`` for passage i.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -26,7 +31,43 @@ SLACK = Fraction(1, 10**40)
 
 SEEN = 1e-6  # relative: what is longer by so much is so in floats too
 
+RUN = 3  # passages back and forth through one gate, one after the other
+
 Side = tuple[Vector, tuple[Vector, ...]]
+
+
+def passage_number(i: int) -> int:
+    """A passage's index, of itself or of its plane."""
+    return i if i >= 0 else ~i
+
+
+def hops_of(sequence: Sequence[int]) -> int:
+    """The fewest passages that a sequence stands for."""
+    return len(sequence) + (RUN - 1) * sum(i < 0 for i in sequence)
+
+
+def followers(space: Space, sequence: tuple[int, ...]) -> Iterator[int]:
+    """The passages into the mode that a sequence leads to, by rule 4 alone."""
+    numbers = [passage_number(i) for i in reversed(sequence)]
+    turned = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1] ^ 1, pairwise(numbers)))
+    mode = space.passages[numbers[0]].target
+    for passage in space.passages:
+        back = passage.index == numbers[0] ^ 1
+        if passage.source == mode and (not back or turned < RUN - 1):
+            yield passage.index
+        if back and not turned and may_run(space, passage.index):
+            yield ~passage.index
+
+
+def may_run(space: Space, i: int) -> bool:
+    """Whether a shortest path may go back and forth through a gate more often than ``RUN``."""
+    key = ("run", i | 1)
+    found: bool | None = space.cache.get(key)
+    if found is None:
+        gate = space.passages[i].gate
+        found = bool(gate.normals.size) and all(may_follow(space, f, f ^ 1)[0] for f in (i, i ^ 1))
+        space.cache[key] = found
+    return found
 
 
 def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]:
@@ -36,6 +77,7 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
     or ends in the second one's is bound to it, so the rule that takes it away must not be used (rule 1: unless one
     of the two is free, when going back out of the strip is no longer than going on and coming back).
     """
+    first, second = passage_number(first), passage_number(second)
     key = ("follow", first, second)
     found: tuple[bool, bool, bool] | None = space.cache.get(key)
     if found is None:

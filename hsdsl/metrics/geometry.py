@@ -7,7 +7,7 @@ the point is allowed, so that the polyhedra contain the sets they stand for: low
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -93,6 +93,13 @@ class Gate:
     def size(self) -> int:
         """Dimension of the guard."""
         return self.frame.shape[1]
+
+    @cached_property
+    def plane(self) -> Gate:
+        """The same gate without inequalities."""
+        none = np.zeros((0, self.size))
+        exact = replace(self.exact, rows=())
+        return replace(self, normals=none, levels=np.zeros(0), room=np.zeros(0), exact=exact, curved=())
 
     @cached_property
     def radius(self) -> float:
@@ -222,6 +229,11 @@ class Space:
         """Every gate in both directions; gate i forwards is 2 i, backwards 2 i + 1."""
         both = [(gate, forward) for gate in self.gates for forward in (True, False)]
         return tuple(Passage(i, gate, forward) for i, (gate, forward) in enumerate(both))
+
+    @cached_property
+    def planes(self) -> tuple[Passage, ...]:
+        """The passages without the inequalities of their gates."""
+        return tuple(replace(passage, gate=passage.gate.plane) for passage in self.passages)
 
     def fewest(self, source: int) -> tuple[int, ...]:
         """For each mode the fewest passages that lead there from another; 0 where none do."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.chain import Chain, chain_of
-from hsdsl.metrics.follow import may_follow
+from hsdsl.metrics.follow import followers, hops_of, may_follow, passage_number
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, Interval, up_to_hops, weakest
 from hsdsl.metrics.line import on_line
@@ -107,13 +107,13 @@ def search_many(pairs: Pairs, hops: int, budget: Budget) -> None:
                 pairs.leave(floor[candidates], candidates)
                 continue
             active = _promising(pairs, sequence, candidates, floor, ways)
-            if len(sequence) > hops:
+            if hops_of(sequence) > hops:
                 if active.size:
                     pairs.cut(_through(pairs, sequence, active, ways), active, hops)
                 continue
-            if active.size and space.passages[sequence[-1]].target == pairs.target:
+            if active.size and space.passages[passage_number(sequence[-1])].target == pairs.target:
                 _finish(pairs, sequence, active)
-            longer = [(*sequence, g) for g in followers(space, sequence[-1])]
+            longer = [(*sequence, g) for g in followers(space, sequence) if all(may_follow(space, sequence[-1], g))]
             active = pairs.open(floor[active], active) if longer else active[:0]
             if active.size:
                 active = pairs.open(_through(pairs, sequence, active, ways), active)
@@ -135,12 +135,6 @@ def around_guards(pairs: Pairs, budget: Budget) -> Array:
     return best * (1 - ROUNDING)
 
 
-def followers(space: Space, last: int) -> list[int]:
-    """The passages that may come after one."""
-    mode = space.passages[last].target
-    return [g.index for g in space.passages if g.source == mode and all(may_follow(space, last, g.index))]
-
-
 def _promising(
     pairs: Pairs,
     sequence: tuple[int, ...],
@@ -149,18 +143,18 @@ def _promising(
     ways: Ways,
 ) -> Indices:
     """Drop by the cheapest bound: from p to the first guard, from guard to guard, from some last guard to q."""
-    tolls = pairs.toll * len(sequence)
-    fixed = sum(float(ways.inner[a, b]) for a, b in pairwise(sequence)) + tolls
-    rest = ways.rest(sequence[-1], candidates)
-    bound = np.maximum(ways.enters[sequence[0], candidates] + fixed + rest, floor[candidates] + tolls)
+    tolls, numbers = pairs.toll * hops_of(sequence), [passage_number(i) for i in sequence]
+    fixed = sum(float(ways.inner[a, b]) for a, b in pairwise(numbers)) + tolls
+    rest = ways.rest(numbers[-1], candidates)
+    bound = np.maximum(ways.enters[numbers[0], candidates] + fixed + rest, floor[candidates] + tolls)
     return pairs.open(bound * (1 - ROUNDING * len(sequence)), candidates)
 
 
 def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Ways) -> Array:
     """The least that paths beginning with a sequence can have."""
-    space, toll = pairs.space, pairs.toll * len(sequence)
+    space, toll = pairs.space, pairs.toll * hops_of(sequence)
     chain = chain_of(space, sequence)
-    rest = ways.rest(sequence[-1], active)
+    rest = ways.rest(passage_number(sequence[-1]), active)
     bound = _shortest(pairs, chain, active, None)[0] + toll + rest
     if space.kept is not None:
         goals: Array = pairs.q[active][:, list(space.kept[pairs.target])]
@@ -171,8 +165,10 @@ def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Way
 def _finish(pairs: Pairs, sequence: tuple[int, ...], active: Indices) -> None:
     """The paths through exactly this sequence."""
     lower, upper = _shortest(pairs, chain_of(pairs.space, sequence), active, pairs.q[active])
-    toll = pairs.toll * len(sequence)
+    toll = pairs.toll * hops_of(sequence)
     pairs.lower[active] = np.minimum(pairs.lower[active], (lower + toll) * (1 - ROUNDING))
+    if min(sequence) < 0:
+        return
     pairs.upper[active] = np.minimum(pairs.upper[active], (upper + toll) * (1 + ROUNDING))
 
 

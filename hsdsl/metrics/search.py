@@ -9,14 +9,15 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.chain import Problem, Shape, chain_of
-from hsdsl.metrics.cones import solve
-from hsdsl.metrics.follow import may_follow
+from hsdsl.metrics.cones import ROUNDS, solve
+from hsdsl.metrics.follow import followers, hops_of, may_follow, passage_number
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.serial import one_thread
 from hsdsl.metrics.sides import to_entry, to_exit
@@ -24,6 +25,8 @@ from hsdsl.metrics.sides import to_entry, to_exit
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
 ROUNDING = 4 * 2.0**-53  # of a sum of bounds, for each of them
 NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
+NEIGHBOURS_AT = {16, 128, 1024}  # sequences looked at: when the best path's neighbours are
+MOST_CHANGES = 20
 HOPS = 8  # more than the fewest that lead from one mode to the other
 
 
@@ -111,28 +114,62 @@ class _Search:
         self.rest = remaining(self.space, self.end, self.relaxation, self.budget)
         self._straight_there()
         self._go_on((), least)
-        while self.heap:
+        for looked_at in count(1):
+            if not self.heap:
+                return
             bound, _, sequence = heapq.heappop(self.heap)
             if self._left_out(bound):
                 break
             if self.budget.spent():
                 self._open(bound)
                 break
-            self._finish(sequence)
+            self._finish(sequence, bound)
             self._go_on(sequence, bound)
+            if looked_at in NEIGHBOURS_AT:
+                self._shorten()
 
     def _straight_there(self) -> None:
         """Try the sequence that the bounds between passages make look shortest, so that some path is known early."""
         inner, sequence = gaps(self.space, self.budget), tuple[int, ...]()
         while len(sequence) < self.hops:
             far = np.zeros(len(self.rest)) if not sequence else inner[sequence[-1]]
-            open_ = [i for i in self._following(sequence) if i not in sequence and self.rest[i] < np.inf]
+            open_ = [i for i in self._following(sequence) if i >= 0 and i not in sequence and self.rest[i] < np.inf]
             if not open_:
                 return
             sequence = (*sequence, min(open_, key=lambda i: float(far[i] + self.rest[i])))
             if self.space.passages[sequence[-1]].target == self.end.mode:
                 self._finish(sequence)
                 return
+
+    def _shorten(self) -> None:
+        """Replace the best path by shorter ones whose sequences differ by one passage, as long as there are any."""
+        if (self.start.bound, self.end.bound) != (None, None):
+            return
+        tried: set[tuple[int, ...]] = set()
+        for _ in range(MOST_CHANGES):
+            best = self.found.sequence
+            for changed in self._changed(best):
+                if self.budget.spent():
+                    return
+                if changed not in tried and hops_of(changed) <= self.hops:
+                    tried.add(changed)
+                    self._keep(changed, 1)
+                    if self.found.sequence != best:
+                        break
+            else:
+                return
+
+    def _changed(self, sequence: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        """The sequences from mode to mode that differ by one passage."""
+        passages = self.space.passages
+        for k in range(len(sequence) + 1):
+            for shorter in {k, min(k + 1, len(sequence))}:
+                before, after = sequence[:k], sequence[shorter:]
+                source = passages[before[-1]].target if before else self.start.mode
+                target = passages[after[0]].source if after else self.end.mode
+                fitting = [(p.index,) for p in passages if (p.source, p.target) == (source, target)]
+                for middle in [()] * (source == target and shorter > k) + fitting:
+                    yield before + middle + after
 
     def _left_out(self, bound: float) -> bool:
         """Whether no path that is at least so long is worth a look; the lower end remembers it."""
@@ -154,51 +191,54 @@ class _Search:
             least = max(bound, self._bound(longer))
             if least == np.inf or self._left_out(least):
                 continue
-            if len(sequence) < self.hops:
+            if hops_of(longer) <= self.hops:
                 heapq.heappush(self.heap, (least, len(longer), longer))
             else:
                 self.found.cut = min(self.found.cut, least)
 
-    def _finish(self, sequence: tuple[int, ...]) -> None:
-        """The path through exactly this sequence."""
-        last = self.space.passages[sequence[-1]].target if sequence else self.start.mode
+    def _finish(self, sequence: tuple[int, ...], least: float = 0.0) -> None:
+        """The path through exactly this sequence, which is at least so long."""
+        last = self.space.passages[passage_number(sequence[-1])].target if sequence else self.start.mode
         if last != self.end.mode:
             return
         if not sequence and (self.start.bound, self.end.bound) != (None, None):
             return
         if sequence and not self._bound_end(sequence):
             return
+        lower = self._keep(sequence)
+        self.found.lower = min(self.found.lower, max(lower, least))
+
+    def _keep(self, sequence: tuple[int, ...], rounds: int = ROUNDS) -> float:
+        """Keep the shortest path through a sequence where it is the best; a lower bound on it."""
         if sequence:
             problem = chain_of(self.space, sequence).problem(self.start.x, self.end.x)
         else:
             problem = straight(self.start.x, self.end.x)
-        lower, upper, s = solve(problem)
-        toll = self.fixed + self.relaxation * len(sequence)
-        self.found.lower = min(self.found.lower, lower + toll)
-        if upper + toll < self.found.upper:
+        lower, upper, s = solve(problem, rounds)
+        toll = self.fixed + self.relaxation * hops_of(sequence)
+        if min(sequence, default=0) >= 0 and upper + toll < self.found.upper:
             self.found.upper, self.found.sequence, self.found.unknowns = upper + toll, sequence, s
             self.found.start, self.found.end = self.start, self.end
+        return lower + toll
 
     def _bound_end(self, sequence: tuple[int, ...]) -> bool:
-        if self.end.bound is not None and sequence[-1] != self.end.bound:
+        if self.end.bound is not None and passage_number(sequence[-1]) != self.end.bound:
             return False
         return len(sequence) < 2 or self._pair(
             sequence[-2], sequence[-1], len(sequence) - 2, self.end.bound is not None
         )
 
     def _following(self, sequence: tuple[int, ...]) -> Iterator[int]:
-        if not sequence:
-            if self.start.bound is not None:
-                yield self.start.bound
-                return
-            yield from (p.index for p in self.space.passages if p.source == self.start.mode)
+        if sequence:
+            for i in followers(self.space, sequence):
+                last = passage_number(i) == self.end.bound
+                if self._pair(sequence[-1], i, len(sequence) - 1, last):
+                    yield i
             return
-        mode = self.space.passages[sequence[-1]].target
         for passage in self.space.passages:
-            if passage.source == mode:
-                last = passage.index == self.end.bound
-                if self._pair(sequence[-1], passage.index, len(sequence) - 1, last):
-                    yield passage.index
+            i = passage.index
+            if i == self.start.bound or (self.start.bound is None and passage.source == self.start.mode):
+                yield i
 
     def _pair(self, first: int, second: int, position: int, last: bool) -> bool:
         worth, after, before = may_follow(self.space, first, second)
@@ -207,9 +247,8 @@ class _Search:
 
     def _bound(self, sequence: tuple[int, ...]) -> float:
         """The least any path beginning with this sequence can have."""
-        last = self.space.passages[sequence[-1]]
-        toll = self.fixed + self.relaxation * len(sequence)
-        rest = float(self.rest[last.index])
+        toll = self.fixed + self.relaxation * hops_of(sequence)
+        rest = float(self.rest[passage_number(sequence[-1])])
         if rest == np.inf:
             return np.inf
         chain = chain_of(self.space, sequence)
@@ -249,8 +288,8 @@ def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:
 
 def remaining(space: Space, end: End, relaxation: float, budget: Budget) -> Array:
     """For each passage, a lower bound on what is left to the end once it has been left (Bellman's recursion)."""
-    count = len(space.passages)
-    rest = np.full(count, np.inf)
+    total = len(space.passages)
+    rest = np.full(total, np.inf)
     for passage in space.passages:
         if passage.target == end.mode:
             rest[passage.index] = to_exit(passage, end.x[None])[0]
@@ -258,13 +297,13 @@ def remaining(space: Space, end: End, relaxation: float, budget: Budget) -> Arra
                 goal = chain_of(space, (passage.index,)).problem(None, end.x)
                 rest[passage.index] = max(rest[passage.index], solve(goal)[0])
     between = gaps(space, budget)
-    for _ in range(count):
+    for _ in range(total):
         through = np.min(between + (rest + relaxation)[None, :], axis=1, initial=np.inf)
         closer = np.minimum(rest, through)
         if np.array_equal(closer, rest):
             break
         rest = closer
-    return rest * (1 - count * ROUNDING)
+    return rest * (1 - total * ROUNDING)
 
 
 def gaps(space: Space, budget: Budget) -> Array:
@@ -274,8 +313,8 @@ def gaps(space: Space, budget: Budget) -> Array:
     """
     found: Array | None = space.cache.get("gaps")
     if found is None:
-        count = len(space.passages)
-        found = np.full((count, count), np.inf)
+        total = len(space.passages)
+        found = np.full((total, total), np.inf)
         for f in space.passages:
             for g in space.passages:
                 if f.target == g.source and np.isinf(found[f.index, g.index]):

@@ -11,6 +11,7 @@ from hsdsl.errors import UsageError
 from hsdsl.metrics import search
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.cones import solve
+from hsdsl.metrics.follow import followers, hops_of
 from hsdsl.metrics.interval import EndsCross, Interval, weakest
 from hsdsl.metrics.points import Place, distance, distances
 from hsdsl.metrics.space import make_space
@@ -238,3 +239,23 @@ def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path
         if 0 < found.interval.upper < np.inf:
             ends = ((m, tuple(map(float, x))) for m, x in (p, q))
             assert path_fault(scene, *ends, found.path, found.interval.upper) is None
+
+
+def test_runs_back_and_forth_through_one_gate_are_bounded_at_once(tmp_path):
+    """A reset that shortens one direction and lengthens the other: no path is left out, and none goes on for ever."""
+    space = space_of(
+        tmp_path,
+        f"{HEAD}  a:\n    flow: {{x: u, y: u, z: u}}\n    domain: [y <= 1, y >= -1, z <= 1, z >= -1]\n"
+        "    transitions: [{when: x >= 0, to: b, reset: {x: 0, y: 2*y, z: z/2}}]\n"
+        "  b: {flow: {x: u, y: u, z: u}, domain: [y <= 2, y >= -2, z <= 2, z >= -2]}\n"
+        "initial: {mode: a, x: -1, y: 0, z: 0}\nexperiment: {until: 1}\n",
+    )
+    assert list(followers(space, (0,))) == [1, ~1]
+    assert list(followers(space, (0, ~1))) == [0]
+    assert list(followers(space, (0, 1))) == [0]
+    assert list(followers(space, (0, ~1, 0))) == list(followers(space, (0, 1, 0))) == []
+    assert [hops_of(s) for s in ((0,), (0, 1), (0, ~1), (0, ~1, 0))] == [1, 2, 4, 5]
+    found = distance(space, Place("a", (0, -1, -1)), Place("a", (0, 1, 1)))
+    assert found.status == "certified"
+    assert found.interval.lower == pytest.approx(found.interval.upper)
+    assert found.interval.upper == pytest.approx(6 / 5**0.5)  # steepest linear function of both sides
