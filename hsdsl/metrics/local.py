@@ -56,11 +56,11 @@ def search_locally(
                 for number, sequence in enumerate(_sequences(space, start, end, hops)):
                     if found.upper <= enough or (number and budget.spent()):
                         return found
-                    _try(space, sequence, start, end, relaxation, found)
+                    _try(space, sequence, start, end, relaxation, found, budget)
     return found
 
 
-def improve(route: Route, guess: Array, relaxation: float) -> tuple[float, Route, Array] | None:
+def improve(route: Route, guess: Array, relaxation: float, budget: Budget) -> tuple[float, Route, Array] | None:
     """The shortest path near a guess through a given sequence, None where none is found.
 
     Returns
@@ -71,7 +71,8 @@ def improve(route: Route, guess: Array, relaxation: float) -> tuple[float, Route
     found = Found(upper=np.inf)
     ends = End(*route.start), End(*route.end)
     with one_thread():
-        _try_from(route, guess, *ends, relaxation * sum(c.edge is not None for c in route.sequence), found)
+        toll = relaxation * sum(c.edge is not None for c in route.sequence)
+        _try_from(route, guess, *ends, toll, found, budget)
     return None if found.upper == np.inf else (found.upper, found.through, found.unknowns)
 
 
@@ -94,7 +95,15 @@ def _back(sequence: tuple[Crossing, ...], following: Crossing) -> bool:
     return bool(sequence) and sequence[-1].surface is following.surface and sequence[-1].forward != following.forward
 
 
-def _try(space: Space, sequence: tuple[Crossing, ...], start: End, end: End, relaxation: float, found: Found) -> None:
+def _try(
+    space: Space,
+    sequence: tuple[Crossing, ...],
+    start: End,
+    end: End,
+    relaxation: float,
+    found: Found,
+    budget: Budget,
+) -> None:
     toll = start.cost + end.cost + relaxation * len(sequence)
     route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
     if not sequence:
@@ -103,17 +112,19 @@ def _try(space: Space, sequence: tuple[Crossing, ...], start: End, end: End, rel
             _keep(found, float(np.linalg.norm(start.x - end.x)) + toll, route, start, end, np.zeros(0), verdict)
         else:
             middle = (start.x + end.x) / 2
-            _try_from(_bent(route, np.zeros(0), [0]), middle, start, end, toll, found, BENDS - 1)
+            _try_from(_bent(route, np.zeros(0), [0]), middle, start, end, toll, found, budget, BENDS - 1)
         return
     for guess in _guesses(space, sequence, start, end):
-        _try_from(route, guess, start, end, toll, found)
+        _try_from(route, guess, start, end, toll, found, budget)
 
 
-def _try_from(route: Route, guess: Array, start: End, end: End, toll: float, found: Found, bends: int = BENDS) -> None:
+def _try_from(
+    route: Route, guess: Array, start: End, end: End, toll: float, found: Found, budget: Budget, bends: int = BENDS
+) -> None:
     """Solve from a guess; where straight pieces leave their domains, let them bend and solve again."""
     size = FAR * (route.size(guess) or np.inf)
     for margin in MARGINS:
-        s = _solve(route, guess, margin)
+        s = _solve(route, guess, margin, budget)
         # A solve that ran away: so far out its rounding alone would pass for a path.
         if s is None or not np.abs(s).max(initial=0) <= size or not route.allowed(s):
             continue
@@ -126,7 +137,7 @@ def _try_from(route: Route, guess: Array, start: End, end: End, toll: float, fou
             _keep(found, value, route, start, end, s, min(verdicts))
         elif bends:
             bent = _bent(route, s, outside)
-            _try_from(bent, _with_middles(route, s, outside), start, end, toll, found, bends - 1)
+            _try_from(bent, _with_middles(route, s, outside), start, end, toll, found, budget, bends - 1)
         return
 
 
@@ -180,14 +191,20 @@ def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End)
     return [guess, *(guess + width * row for row in spread)]
 
 
-def _solve(route: Route, guess: Array, margin: float) -> Array | None:
-    """Solve in units of the path's own size, each constraint in units of its slope there."""
+class _TimeOver(Exception):
+    """Raised within a solve when the budget is spent."""
+
+
+def _solve(route: Route, guess: Array, margin: float, budget: Budget) -> Array | None:
+    """Solve in units of the path's own size, each constraint in units of its slope; None without a result in time."""
     minimise: Any = import_module("scipy.optimize").minimize
     unit = max(route.length(guess), 1e-3 * route.size(guess)) or 1.0
     on, in_ = (1 / (unit * _slopes(rows)) for rows in (route.surface_slopes(guess), route.room_slopes(guess)))
     clear = margin * max(1.0, route.size(guess) / unit)
 
     def length(x: Array) -> tuple[float, Array]:
+        if budget.spent():
+            raise _TimeOver
         value, slope = route.smooth_length(unit * x, SMOOTHING * unit)
         return value / unit, slope
 
@@ -196,12 +213,12 @@ def _solve(route: Route, guess: Array, margin: float) -> Array | None:
         _constraint("ineq", route.room, route.room_slopes, unit, in_, clear),
     ]
     most = ITERATIONS if len(guess) < MANY else ITERATIONS_OF_MANY
-    options = {"maxiter": most, "ftol": 1e-13}
+    options = {"maxiter": most, "ftol": 1e-11}
     with np.errstate(all="ignore"):
         try:
             first = guess / unit
             answer: Any = minimise(length, first, jac=True, method="SLSQP", constraints=constraints, options=options)
-        except (ValueError, np.linalg.LinAlgError):
+        except (_TimeOver, ValueError, np.linalg.LinAlgError):
             return None
         return onto(route, unit * np.array(answer.x, dtype=float))
 

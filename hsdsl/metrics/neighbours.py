@@ -59,11 +59,12 @@ class Neighbours:
         """Bound the distances of pairs; those at most ``enough`` are not looked at more closely."""
         pool = self.known.setdefault((pairs.source, pairs.target), [])
         search = _Batch(self, pairs, pool)
-        if len(open_ := search.open(enough)):
+        if len(open_ := search.open(enough)) and not self.budget.spent():
             search.around(open_)
         if not pool and len(open_ := search.open(enough)):
             for k in np.unique(open_[np.linspace(0, len(open_) - 1, FIRST).astype(int)]).tolist():
-                search.from_nothing(k, enough)
+                if not self.budget.spent():
+                    search.from_nothing(k, enough)
         while len(open_ := search.open(enough)) and not self.budget.spent():
             search.carry(open_)
             open_ = search.open(enough)
@@ -159,7 +160,7 @@ class _Batch:
     def improve(self, k: int, enough: float) -> None:
         """Search from the best guess, or from nothing where there is none, or another way may be much shorter."""
         guess = self.guess.get(k)
-        found = None if guess is None else improve(guess.route, guess.points, self.pairs.toll)
+        found = None if guess is None else improve(guess.route, guess.points, self.pairs.toll, self.owner.budget)
         if found is not None:
             value, route, points = found
             known = Known(self.at[k], route, points)

@@ -131,15 +131,8 @@ class _Maker:
         k = [m.name for m in self.system.modes].index(edge.target)
         surface = self._place(edge.surface.residual)
         conditions = [self._place(c) for c in clause]
-        mode = self.system.modes[j]
-        rate = surface.diff(TIME) + sum(
-            (surface.diff(_symbol(s)) * self._place(f) for s, f in zip(mode.states, mode.flow, strict=True)), sp.S.Zero
-        )
-        raw = edge.surface.residual.diff(TIME) + sum(
-            (edge.surface.residual.diff(_symbol(s)) * f for s, f in zip(mode.states, mode.flow, strict=True)), sp.S.Zero
-        )
-        if not self._moves(sp.sympify(raw)):
-            conditions.append(-sp.sympify(rate))
+        if (rate := self._rate(edge, surface, self.system.modes[j])) is not None:
+            conditions.append(-rate)
         reset = [self._place(r) for r in edge.reset] + [TIME] * self.timed
         flat = [as_affine(e, self.symbols[j]) for e in (surface, *reset)]
         if any(f is None for f in flat):
@@ -156,6 +149,18 @@ class _Maker:
         inequalities = [*domains[j].rows, *(r.row for _, r in rows if r is not None)]
         gate = gate_of(edge.name, (j, k), flat[0].row, inequalities, reset_to, domains[k].rows, bent)
         gates += [] if gate is None else [gate]
+
+    def _rate(self, edge: Edge, surface: sp.Expr, mode: Mode) -> sp.Expr | None:
+        """The surface's derivative along the flow; None where time or an input is in it."""
+
+        def along_flow(residual: sp.Expr) -> sp.Expr:
+            slopes = [residual.diff(_symbol(s)) for s in mode.states]
+            return residual.diff(TIME) + sum((a * f for a, f in zip(slopes, mode.flow, strict=True)), sp.S.Zero)
+
+        rate = along_flow(edge.surface.residual)
+        if self._moves(rate):
+            return None
+        return self._place(along_flow(surface) if self._moves(edge.surface.residual) else rate)
 
     def _image_symbols(self, edge: Edge) -> list[sp.Symbol]:
         return [*map(_symbol, edge.target_states), *(TIME,) * self.timed]
