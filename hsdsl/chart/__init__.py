@@ -1,13 +1,14 @@
-"""Speed against accuracy: what each method, scheme, engine and peer needs for which error, and where each goes wrong.
+"""Work and precision: the time that each method, scheme, engine and peer needs for an error, and its wrong results.
 
 `work_precision` runs everything that can run a model at several tolerances (adaptive methods) or steps (fixed ones),
-warm and in turns, and holds each result against the model's exact execution.
+warm and in turns, and compares each result with the model's exact execution.
 
 ==============  ============================================================================================
 `scene`         a model with its numbers, its exact execution, and the times at which errors are taken
-`plan`          which runs of our own to make
-`judge`         the error of a result, and whether it is the right execution at all
+`plan`          the runs: our own and those of peers
+`judge`         the error of a result, and whether it is the right execution
 `stopwatch`     warm times, in turns
+`table`         rows as text, as CSV, and as the panels of a picture
 `peers`         other tools, each run as its own documentation shows
 `translation`   a model's mathematics as functions for another tool
 `by_arcs`       the loop around a tool that stops at events
@@ -16,39 +17,17 @@ warm and in turns, and holds each result against the model's exact execution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from hsdsl.chart.judge import Judgement, judge, rho
-from hsdsl.chart.peers import PEERS, prepare
-from hsdsl.chart.plan import ENGINES, SCHEMES, own_runs
+from hsdsl.chart.peers import PEERS
+from hsdsl.chart.plan import ENGINES, SCHEMES, TOLERANCES, own_runs, peer_runs
 from hsdsl.chart.result import Attempt, Refused, Result
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.stopwatch import Timed, race
+from hsdsl.chart.stopwatch import race
+from hsdsl.chart.table import Row
 
 __all__ = ["ENGINES", "PEERS", "SCHEMES", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
-
-TOLERANCES = tuple(10.0**-k for k in range(3, 13))
-
-
-@dataclass(frozen=True)
-class Row:
-    """One run of one tool: what it was asked, what it took, how right it was.
-
-    ``seconds`` is the median of warm runs, sampling included, NaN where none was finished.
-    """
-
-    model: str
-    attempt: Attempt
-    judgement: Judgement
-    timed: Timed
-
-    @property
-    def seconds(self) -> float:
-        """Median seconds of a warm run."""
-        return self.timed.median
 
 
 def work_precision(
@@ -65,7 +44,7 @@ def work_precision(
     with_rho: bool = True,
     watch: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[Row], list[str]]:
-    """Run a scene with everything asked for.
+    """Run a scene with our methods and peers.
 
     Parameters
     ----------
@@ -84,7 +63,7 @@ def work_precision(
     with_rho : bool
         Also compute rho (of our own runs; a peer's samples are no execution).
     watch : callable
-        Told what is about to run.
+        Called with the name of the next run.
 
     Returns
     -------
@@ -92,7 +71,9 @@ def work_precision(
         The results, and sentences on what was left out and why.
     """
     remarks: list[str] = []
-    attempts = list(_attempts(scene, schemes, methods, engines, tolerances, steps, against, remarks))
+    attempts = list(own_runs(scene, schemes, methods, engines, tolerances, steps, remarks))
+    for name in against:
+        attempts += peer_runs(scene, name, tolerances, remarks)
 
     def judged(attempt: Attempt, result: Result) -> Judgement:
         judgement = judge(scene, result)
@@ -103,28 +84,3 @@ def work_precision(
 
     done = race(attempts, judged, rounds, patience, watch)
     return [Row(scene.name, attempt, judgement, timed) for attempt, judgement, timed in done], remarks
-
-
-def _attempts(
-    scene: Scene,
-    schemes: Sequence[str],
-    methods: Sequence[str],
-    engines: Sequence[str],
-    tolerances: Sequence[float],
-    steps: Sequence[float],
-    against: Sequence[str],
-    remarks: list[str],
-) -> Iterator[Attempt]:
-    yield from own_runs(scene, schemes, methods, engines, tolerances, steps, remarks)
-    for name in against:
-        try:
-            run: Callable[[float], Result] = prepare(name, scene)
-        except Refused as refusal:
-            remarks.append(f"{name}: {refusal}")
-            continue
-        for tolerance in tolerances:
-            yield Attempt(name, "", "", "tolerance", tolerance, partial(_sized, run, tolerance))
-
-
-def _sized(run: Callable[[float], Any], tolerance: float) -> Any:
-    return run(tolerance)

@@ -1,4 +1,4 @@
-"""Our own runs: schemes, methods and engines, at tolerances or steps."""
+"""The runs of a chart: our schemes, methods and engines, and peers, at tolerances or steps."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from hsdsl.chart.result import Attempt, Result
+from hsdsl.chart.peers import prepare
+from hsdsl.chart.result import Attempt, Refused, Result
 from hsdsl.chart.scene import Scene, sampled
 from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS, ButcherTableau
 from hsdsl.simulate import SCHEMES as ALL_SCHEMES
 
 SCHEMES = tuple(name for name in ALL_SCHEMES if name != "paoli-schatzman")
 ENGINES = ("c", "python")
+TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 SHARES = tuple(10.0 ** -(k / 2) for k in range(5, 10))  # steps as shares of a run
 LEAST_RELAXATION = 1e-12
 
@@ -43,6 +46,16 @@ def own_runs(
                     yield _attempt(scene, asked, size, value)
 
 
+def peer_runs(scene: Scene, name: str, tolerances: Sequence[float], remarks: list[str]) -> list[Attempt]:
+    """List the runs of a peer; a peer that cannot run the scene leaves its reason in ``remarks``."""
+    try:
+        run = prepare(name, scene)
+    except Refused as refusal:
+        remarks.append(f"{name}: {refusal}")
+        return []
+    return [Attempt(name, "", "", "tolerance", value, partial(run, value)) for value in tolerances]
+
+
 def _attempt(scene: Scene, asked: dict[str, Any], size: str, value: float) -> Attempt:
     if asked["scheme"] == "relaxed":
         asked = asked | {"relaxation": relaxation(asked["method"], value)}
@@ -58,17 +71,19 @@ def relaxation(method: str, value: float) -> float:
 
 
 def _refusal(scene: Scene, asked: dict[str, Any], size: str, value: float) -> str:
-    asked = asked | {size: value}
     try:
-        scene.model.simulate(0, **asked, parameters=scene.parameters, initial=scene.initial)
+        _simulate(scene, 0, asked | {size: value})
     except UsageError as error:
         return str(error)
     return ""
 
 
+def _simulate(scene: Scene, until: float, asked: dict[str, Any]) -> Execution:
+    return scene.model.simulate(until, **asked, parameters=scene.parameters or None, initial=scene.initial or None)
+
+
 def _run(scene: Scene, asked: dict[str, Any]) -> Result:
-    numbers: dict[str, Any] = {"parameters": scene.parameters or None, "initial": scene.initial or None}
-    execution = scene.model.simulate(float(scene.grid[-1]), **asked, **numbers)
+    execution = _simulate(scene, float(scene.grid[-1]), asked)
     values, modes = sampled(execution, scene.grid, scene.states)
     problem = None if execution.stop.complete else execution.stop.message
     return Result(values, modes, lambda: execution.made, problem, execution)

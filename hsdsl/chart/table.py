@@ -1,59 +1,51 @@
-"""A chart's numbers as a table."""
+"""A chart's rows as text, as CSV, and as the panels of a picture."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
-from math import isfinite
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any
 
-if TYPE_CHECKING:
-    from hsdsl.chart import Row
+from hsdsl.chart.judge import Judgement
+from hsdsl.chart.result import Attempt
+from hsdsl.chart.stopwatch import Timed
+from hsdsl.plot.work_precision import Line, Mark, Panel
 
-COLUMNS: tuple[str, ...] = (
-    "model",
-    "tool",
-    "scheme",
-    "method",
-    "size",
-    "value",
-    "seconds",
-    "fastest",
-    "slowest",
-    "first",
-    "error",
-    "rho_lower",
-    "rho_upper",
-    "transitions",
-    "verdict",
-    "why",
-)
+COLUMNS = (
+    "model", "tool", "scheme", "method", "size", "value", "seconds", "fastest", "slowest", "first", "error",
+    "rho_lower", "rho_upper", "transitions", "verdict", "why",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run of one tool: its settings, its times and its errors."""
+
+    model: str
+    attempt: Attempt
+    judgement: Judgement
+    timed: Timed
+
+    @property
+    def seconds(self) -> float:
+        """Median seconds of a warm run, sampling included, NaN where none was finished."""
+        return self.timed.median
 
 
 def record(row: Row) -> dict[str, Any]:
     """One row as plain values; a number that is not there is None."""
-    fastest, slowest = row.timed.spread
-    rho = row.judgement.rho
+    attempt, judgement, rho = row.attempt, row.judgement, row.judgement.rho
     values = (
-        row.model,
-        row.attempt.tool,
-        row.attempt.scheme,
-        row.attempt.method,
-        row.attempt.size,
-        row.attempt.value,
-        row.seconds,
-        fastest,
-        slowest,
-        row.timed.first,
-        row.judgement.error,
-        rho.lower if rho else None,
-        rho.upper if rho else None,
-        row.judgement.transitions,
-        row.judgement.verdict,
-        row.judgement.why,
+        *(row.model, attempt.tool, attempt.scheme, attempt.method, attempt.size, attempt.value),
+        *(row.seconds, *row.timed.spread, row.timed.first, judgement.error),
+        *((rho.lower, rho.upper) if rho else (None, None)),
+        *(judgement.transitions, judgement.verdict, judgement.why),
     )
-    return {name: _plain(value) for name, value in zip(COLUMNS, values, strict=True)}
+    finite = [None if isinstance(value, float) and not isfinite(value) else value for value in values]
+    return dict(zip(COLUMNS, finite, strict=True))
 
 
 def as_csv(rows: Iterable[Row]) -> str:
@@ -66,33 +58,42 @@ def as_csv(rows: Iterable[Row]) -> str:
 
 
 def as_text(rows: Iterable[Row], digits: int = 3) -> str:
-    """The table for a person."""
-    head = ("tool", "setting", "time", "error", "rho at most", "verdict")
-    lines = [head, *(_line(row, digits) for row in rows)]
+    """The table in aligned columns."""
+    lines = [("tool", "setting", "time", "error", "rho at most", "verdict")]
+    for row in rows:
+        judgement = row.judgement
+        verdict = judgement.verdict + (f": {judgement.why}" if judgement.why else "")
+        rho = f"{judgement.rho.upper:.{digits - 1}e}" if judgement.rho else ""
+        error = f"{judgement.error:.{digits - 1}e}"
+        lines.append((row.attempt.label, row.attempt.setting, duration(row.seconds), error, rho, verdict))
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
 
 
-def _line(row: Row, digits: int) -> tuple[str, ...]:
-    verdict = row.judgement.verdict + (f": {row.judgement.why}" if row.judgement.why else "")
-    rho = f"{row.judgement.rho.upper:.{digits - 1}e}" if row.judgement.rho else ""
-    return (
-        row.attempt.label,
-        row.attempt.setting,
-        duration(row.seconds),
-        f"{row.judgement.error:.{digits - 1}e}",
-        rho,
-        verdict,
-    )
-
-
 def duration(seconds: float) -> str:
     """Seconds in a unit that suits them."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-6:.3g} us"
+    unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3)) if seconds >= u[1]), ("us", 1e-6))
+    return f"{seconds / size:.3g} {unit}"
 
 
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not isfinite(value) else value
+def panels(name: str, rows: Sequence[Row]) -> list[Panel]:
+    """The panels of one scene: the states' error, and rho where it was computed."""
+    drawn = [Panel(name, "largest error of a state", _lines(rows, lambda row: row.judgement.error))]
+    measured = [row for row in rows if row.judgement.rho is not None]
+    if measured:
+        drawn.append(Panel(name, "rho, at most", _lines(measured, _rho)))
+    return drawn
+
+
+def _rho(row: Row) -> float:
+    rho = row.judgement.rho
+    return rho.upper if rho is not None and rho.upper < 1e300 else nan
+
+
+def _lines(rows: Sequence[Row], error: Callable[[Row], float]) -> list[Line]:
+    lines: list[Line] = []
+    for label in dict.fromkeys(row.attempt.label for row in rows):
+        own = [row for row in rows if row.attempt.label == label]
+        group = " ".join(filter(None, (own[0].attempt.tool, own[0].attempt.scheme)))
+        lines.append(Line(label, group, [Mark(error(row), row.seconds, row.judgement.verdict) for row in own]))
+    return lines

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from typer import Context
 
-from hsdsl.errors import ModelError, UsageError
+from hsdsl.errors import CODES, ModelError, UsageError
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -49,10 +49,8 @@ def _names(path: Path) -> Iterator[str]:
 
 def rule_codes(incomplete: str) -> list[tuple[str, str]]:
     """Codes of lint rules with their titles, after the last comma."""
-    from hsdsl.lint.rules import RULES
-
     listed, comma, _ = incomplete.rpartition(",")
-    return [(f"{listed}{comma}{code}", rule.title) for code, rule in RULES.items()]
+    return [(f"{listed}{comma}{code}", title) for code, title in codes() if code not in CODES]
 
 
 def codes() -> list[tuple[str, str]]:
