@@ -94,7 +94,8 @@ def residual(rng: random.Random) -> str:
         5: f"({one})**{odd}", 6: f"{rng.choice(('', '-'))}({one})**{even}", 7: f"min({one}, {other})",
         8: f"max({one}, {other})", 9: f"abs({one}) - {rng.choice(('0', '1/2'))}", 10: f"({one})*abs({one})",
         11: f"sign({one}) - {rng.choice(('0', '1/2', '2'))}", 12: f"floor({one}) - {rng.choice(('0', '1/2'))}",
-        13: rng.choice((f"{one} - sin(3*t)/2", f"{one} - t", "sin(5*t) - 1/2", f"{one} + t**3")),
+        13: rng.choice((f"{one} - sin(3*t)/2", f"{one} - t", "sin(5*t) - 1/2", f"{one} + t**3",
+                        f"{one} - sign(2*t - 1)/2", f"{one} + floor(2*t)", "floor(2*t) - 1")),
         14: rng.choice((f"({one})**3 - 2*({one})**2 + {one}", "x**2 + y**2 - 1", f"exp({one}) - 1", "1 - x**2 - y*y")),
         15: rng.choice((f"{one} - u", f"{one} + w/2", f"({one})*({other})")),
     }  # fmt: skip
@@ -106,7 +107,7 @@ def _rate(rng: random.Random, name: str) -> str:
     return rng.choice((
         "1", "-1", "0", "1/2", f"{other}", f"-{other}", f"-{name}", f"1 - {name}", f"{name}", f"{other}**2",
         f"-abs({other})", f"abs({name})", f"sign({other})", f"-sign({name})", f"max({other}, 0)", f"min({name}, 1) - 1",
-        f"{other}**3", "t - 1/2", "t**2", "u", "w", f"-{name}**3", f"{name}**2", f"floor({other})", f"-{other} + u/2",
+        f"{other}**3", "t - 1/2", "t**2", "u", "w", f"-{name}**3", f"{name}**2", f"floor({other})", "floor(2*t) - 1", f"{other}*sign(2*t - 1)", f"-{other} + u/2",
     ))  # fmt: skip
 
 

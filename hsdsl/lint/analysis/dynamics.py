@@ -276,6 +276,16 @@ class Dynamics:
         return frozenset(symbol(given.name) for given in self.system.inputs)
 
     @cached_property
+    def timed(self) -> frozenset[Any]:
+        """Time and the sampled inputs: jumps and kinks of what depends on these alone are at known times."""
+        return self.inputs | {TIME}
+
+    @cached_property
+    def held(self) -> frozenset[Any]:
+        """The inputs that jump at their samples."""
+        return self.inputs - self._moving
+
+    @cached_property
     def _moving(self) -> frozenset[Any]:
         """The inputs that are interpolated between samples: what depends on them has a rate of its own."""
         return frozenset(symbol(given.name) for given in self.system.inputs if given.hold == "linear")

@@ -13,7 +13,7 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.lint.analysis.decide import MOST_PARTS
-from hsdsl.lint.analysis.dynamics import Clause
+from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, positive, zero
 from hsdsl.lint.analysis.straight_line_program import too_large
 
@@ -22,6 +22,7 @@ _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
     sp.Add, sp.Mul, sp.Symbol, sp.Number, sp.NumberSymbol, sp.Abs, sp.Min, sp.Max, functions.absolute,
     functions.minimum, functions.maximum, *(functions.FUNCTIONS[name][0] for name in _SMOOTH),
 )  # fmt: skip
+_JUMPING = (functions.sign, functions.floor, sp.atan2)
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
@@ -44,10 +45,16 @@ def parts(expr: Any) -> list[Any]:
 def jumps(expr: Any) -> Iterator[Part]:
     """Where a sign, a floor or an angle jumps, unless what it is multiplied with vanishes there."""
     for part in parts(expr):
-        if isinstance(part, (functions.sign, functions.floor, sp.atan2)):
+        if isinstance(part, _JUMPING):
             weights = _weights(expr, part)
             for condition in _jump(part):
                 yield Part(part, _name(part), tuple((*condition, w) for w in weights))
+
+
+def jumps_in_time(dynamics: Dynamics, expr: Any) -> bool:
+    """Whether an expression may jump at a time that no state decides."""
+    timed = (part for part in parts(expr) if isinstance(part, _JUMPING) and part.free_symbols <= dynamics.timed)
+    return bool(expr.free_symbols & dynamics.held) or any(timed)
 
 
 def _jump(part: Any) -> list[Clause]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
-from hsdsl.lint.analysis.question import Answer, Constraint, positive, zero
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, positive, zero
 from hsdsl.lint.analysis.singularities import divisors, infinite_slopes, jumps, kinks, without_value
 from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Alike, Finding, Severity
@@ -33,6 +33,10 @@ class _Place:
     @property
     def name(self) -> str:
         return _NAMES[self.written.role].format(self.written.name)
+
+    def at_known_times(self, part: Any) -> bool:
+        """Whether a part switches at times that no state decides, where runs have the end of a step."""
+        return self.written.role != "reset" and part.free_symbols <= self.dynamics.timed
 
     def witness(self, conditions: Sequence[Clause], *more: Constraint) -> Answer:
         """A point of evaluation at which one of some conditions holds."""
@@ -75,7 +79,7 @@ def jump_inside_mode(subject: Subject) -> Iterator[Finding]:
     alike = Alike("expression")
     for place in _places(subject, *_NAMES):
         for jump in jumps(place.expr):
-            answer = place.witness(jump.alternatives)
+            answer = UNKNOWN if place.at_known_times(jump.expr) else place.witness(jump.alternatives)
             if answer.somewhere:
                 message = f"{place.name} jumps {place.at(answer, *jump.expr.args)}, where `{jump.name}` does"
                 hint = "make a mode of each side, with a transition where it jumps"
@@ -89,7 +93,7 @@ def kink_inside_mode(subject: Subject) -> Iterator[Finding]:
     alike = Alike("flow")
     for place in _places(subject, "flow"):
         for kink in kinks(place.expr):
-            answer = place.witness(kink.alternatives)
+            answer = UNKNOWN if place.at_known_times(kink.expr) else place.witness(kink.alternatives)
             if answer.somewhere:
                 where = place.at(answer, *kink.expr.args)
                 message = f"{place.name} has a kink {where}, where `{kink.name}` has one"
@@ -105,7 +109,7 @@ def vanishing_divisor(subject: Subject) -> Iterator[Finding]:
             if alike.again(divisor):
                 continue
             slopes = place.dynamics.gradient(place.mode, divisor)
-            answer, severity = Answer("unknown"), "warning"
+            answer, severity = UNKNOWN, "warning"
             if slopes is not None:
                 answer = place.witness([(zero(divisor),)], positive(sum(slope**2 for slope in slopes)))
             if not answer.somewhere:

@@ -9,6 +9,7 @@ from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import Proof, strict
 from hsdsl.lint.analysis.question import Answer, negative, positive, zero
+from hsdsl.lint.analysis.singularities import jumps_in_time
 from hsdsl.lint.analysis.smooth_pieces import pieces
 from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.finding import Alike, Finding
@@ -86,14 +87,15 @@ def _degenerate(dynamics: Dynamics, part: ModePart, surface: Surface, scalar: Sc
     if not answer.somewhere:
         return
     where = at(dynamics, mode, answer, [residual])
-    for side, say in ((positive, _nowhere_positive), (negative, _nowhere_negative)):
+    carried = jumps_in_time(dynamics, residual)  # a jump onto 0 fires, as one beyond does
+    for side, say in ((positive, _nowhere_positive), (negative, _nowhere_negative))[carried:]:
         proof = Proof(dynamics, mode)
         if not dynamics.ask(mode, (side(residual),)).somewhere and proof.never([(side(residual),)]):
             message = f"{say(surface.text, within(proof.searched))}, and 0 {where}"
             hint = "compare what passes through zero, not its square"
             yield Finding(scalar.place.span, message, hint, proof.decided, severity="warning")
             return
-    if _has_gradient(ModePoint(dynamics, mode, answer.point), residual):
+    if not residual.free_symbols <= dynamics.timed and _has_gradient(ModePoint(dynamics, mode, answer.point), residual):
         message = f"the gradient of the surface '{surface.text}' vanishes on it {where}"
         yield Finding(scalar.place.span, message, None, answer.decided, severity="note")
 
