@@ -10,7 +10,8 @@ import sympy as sp
 from hsdsl.expression import numeric
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.numbers import ROUND_OFF, Point, evaluate
-from hsdsl.system import TIME, Mode, Surface
+from hsdsl.lower.straight import lie_derivative
+from hsdsl.system import Mode, Surface
 
 INSIDE, ON, BEYOND = -1, 0, 1
 _DEEPEST = 4  # derivatives along the flow that are looked at
@@ -34,21 +35,15 @@ def leaves(mode: Mode, surface: Surface, point: Point) -> bool | None:
     count as constant.
     """
     rate: Any = surface.residual
+    flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
     for _ in range(_DEEPEST):
-        rate = along(mode, rate)
+        rate = lie_derivative(rate, flow)
         value = evaluate(rate, point)
         if not numeric.finite(value):
             return None
         if abs(value) > ROUND_OFF * _size(rate, point):
             return bool(value > 0)
     return None
-
-
-def along(mode: Mode, expr: Any) -> Any:
-    """The derivative of an expression along the flow of a mode, L_f."""
-    within = expr.free_symbols
-    pairs = ((symbol(name), value) for name, value in zip(mode.states, mode.flow, strict=True))
-    return sp.Add(expr.diff(TIME), *(expr.diff(state) * value for state, value in pairs if state in within))
 
 
 def _size(expr: Any, point: Point) -> Any:

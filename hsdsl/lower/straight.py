@@ -9,7 +9,7 @@ derivative or a text without end. After the cut every one of these costs as much
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import accumulate, count
 
@@ -17,6 +17,7 @@ import sympy as sp
 
 from hsdsl.functions import rebuilt
 from hsdsl.lower.printer import LARGEST_PRODUCT
+from hsdsl.system import TIME
 
 LARGEST = 80  # nodes of one statement
 WIDEST = 16  # terms or factors of one statement
@@ -124,7 +125,7 @@ class Gradient:
 
     def _row(self, expr: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
         present = expr.free_symbols
-        direct = {a: _derivative(expr, a) for a in present & self._order.keys()}
+        direct = {a: derivative(expr, a) for a in present & self._order.keys()}
         through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
             slope = self._cut.name(expr.diff(symbol))
@@ -134,8 +135,16 @@ class Gradient:
 
 
 @lru_cache(maxsize=4096)  # the modes of a large model have most of their derivatives in common
-def _derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """The derivative of an expression by a symbol."""
     return expr.diff(symbol)
+
+
+def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """The derivative of an expression of time and states along a flow, L_f."""
+    rates = {TIME: sp.S.One, **flow}
+    present = sorted(expr.free_symbols & rates.keys(), key=lambda s: s.name)
+    return sp.Add(*(derivative(expr, s) * rates[s] for s in present))
 
 
 def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:

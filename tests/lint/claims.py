@@ -107,7 +107,8 @@ def _rate(rng: random.Random, name: str) -> str:
     return rng.choice((
         "1", "-1", "0", "1/2", f"{other}", f"-{other}", f"-{name}", f"1 - {name}", f"{name}", f"{other}**2",
         f"-abs({other})", f"abs({name})", f"sign({other})", f"-sign({name})", f"max({other}, 0)", f"min({name}, 1) - 1",
-        f"{other}**3", "t - 1/2", "t**2", "u", "w", f"-{name}**3", f"{name}**2", f"floor({other})", "floor(2*t) - 1", f"{other}*sign(2*t - 1)", f"-{other} + u/2",
+        f"{other}**3", "t - 1/2", "t**2", "u", "w", f"-{name}**3", f"{name}**2", f"floor({other})", f"-{other} + u/2",
+        "floor(2*t) - 1", f"{other}*sign(2*t - 1)",
     ))  # fmt: skip
 
 

@@ -68,15 +68,6 @@ class Decider:
             return Answer("somewhere", "symbolic", point)
         return self._numerically(constraints, ranges, reduced, prove)
 
-    def contradicts(self, given: Sequence[Constraint], constraint: Constraint, ranges: Mapping[Any, Range]) -> bool:
-        """Whether constraints and one more inequality have no point, faster than :meth:`decide`."""
-        if too_large([constraint.expr, *(c.expr for c in given)], MOST_PARTS):
-            return False
-        reduced = self._reduced(given, ranges)
-        if reduced is None or elimination.contradicts(reduced, constraint, self.normal_forms, ranges):
-            return True
-        return not elimination.linear(reduced) and self.decide((*given, constraint), ranges).never
-
     def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
         if too_large([expr, *(c.expr for c in given)], MOST_PARTS):
@@ -96,11 +87,6 @@ class Decider:
         value, *slopes = program.at(points)
         size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
         return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
-
-    def bounds(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> dict[Any, Any]:
-        """Exact bounds of the names that constraints leave free; nothing where they are too large or contradict."""
-        reduced = None if too_large((c.expr for c in given), MOST_PARTS) else self._reduced(given, ranges)
-        return dict(reduced.bounds) if reduced else {}
 
     def sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
         """Points where constraints hold, as many as are found: array (n, names of ranges)."""

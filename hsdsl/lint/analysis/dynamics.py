@@ -9,7 +9,7 @@ values of the file; `--set` is not looked at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, TypeVar
@@ -22,7 +22,7 @@ from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
 from hsdsl.lint.analysis.straight_line_program import at_point, enclosure, parts_of, too_large
-from hsdsl.lower.straight import replaced
+from hsdsl.lower.straight import derivative, lie_derivative, replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
 MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one
@@ -47,8 +47,6 @@ class Dynamics:
         self.decider = Decider()
         self._values = system.parameter_values(lambda value, earlier: replaced(value, earlier, {}))
         self._done: dict[Any, Any] = {}
-        self._rates: dict[Any, Any] = {}
-        self._slopes: dict[tuple[Any, Any], Any] = {}
         self._ranges: dict[tuple[str, ...], dict[Any, Range]] = {}
         self._remembered: dict[Any, Any] = {}
 
@@ -64,47 +62,30 @@ class Dynamics:
         """The derivative of each state, by symbol."""
         return {symbol(s): self.placed(f) for s, f in zip(mode.states, mode.flow, strict=True)}
 
-    def rate(self, mode: Mode, expr: Any) -> Any | None:
+    def rate(self, mode: Mode, expr: Any | None) -> Any | None:
         """L_f of an expression: how fast it changes along the flow.
 
         None where that is not known: the expression is too large, or follows an input that is interpolated.
         """
-        key = (mode.name, expr)
-        if key not in self._rates:
-            self._rates[key] = self._rate(mode, expr)
-        return self._rates[key]
+        return self.remembered(("rate", mode.name, expr), lambda: self.along(expr, self.flow(mode)))
 
-    def _rate(self, mode: Mode, expr: Any) -> Any | None:
-        if expr is None:
-            return None
-        return self.along(expr, self.flow(mode))
-
-    def along(self, expr: Any, flow: Mapping[Any, Any]) -> Any | None:
+    def along(self, expr: Any | None, flow: Mapping[Any, Any]) -> Any | None:
         """The derivative of an expression along a flow; None where that is not known."""
-        if parts_of(expr) > MOST_DERIVED or too_large([expr], MOST_PARTS) or expr.free_symbols & self._moving:
+        if expr is None or parts_of(expr) > MOST_DERIVED or too_large([expr], MOST_PARTS):
             return None
-        present = sorted(expr.free_symbols & flow.keys(), key=lambda s: s.name)
-        parts = [self.slope(expr, s) * flow[s] for s in present]
-        return sp.Add(self.slope(expr, TIME), *parts) if TIME in expr.free_symbols else sp.Add(*parts)
+        return None if expr.free_symbols & self._moving else lie_derivative(expr, flow)
 
     def gradient(self, mode: Mode, expr: Any) -> list[Any] | None:
         """The derivatives of an expression by time and the mode's states; None where it is too large."""
         if too_large([expr], MOST_PARTS):
             return None
-        return [self.slope(expr, s) for s in (TIME, *map(symbol, mode.states))]
-
-    def slope(self, expr: Any, by: Any) -> Any:
-        """The derivative of an expression by a name."""
-        if by not in expr.free_symbols:
-            return sp.S.Zero
-        if (expr, by) not in self._slopes:
-            self._slopes[expr, by] = expr.diff(by)
-        return self._slopes[expr, by]
+        present = expr.free_symbols
+        return [derivative(expr, s) if s in present else sp.S.Zero for s in (TIME, *map(symbol, mode.states))]
 
     def domain(self, mode: Mode, without: Edge | None = None) -> Clause:
         """Where a mode's states belong (M1): every edge without `if`, and every wall."""
-        surfaces = [edge.surface for edge in mode.edges if edge.condition is None and edge is not without]
-        return tuple(at_most_zero(self.residual(surface)) for surface in (*surfaces, *mode.walls))
+        surfaces = (surface for surface, edge in bounding(mode) if edge is None or edge is not without)
+        return tuple(at_most_zero(self.residual(surface)) for surface in surfaces)
 
     def condition(self, edge: Edge, holds: bool = True) -> list[Clause] | None:
         """An `if`, or its contrary, as alternatives: each a list of constraints that hold together.
@@ -182,18 +163,6 @@ class Dynamics:
         states = {symbol(name): float(value) for name, value in self.start.items()}
         return {s: r.typical for s, r in self.ranges(mode).items()} | states | {TIME: 0.0}
 
-    def at_start(self, surface: Surface) -> tuple[float, float]:
-        """The surface function where the run starts, and the round-off of it."""
-        residual = self.residual(surface)
-        sides = [self.placed(side) for side in (surface.left, surface.right)]
-        slopes = [s * residual.diff(s) for s in residual.free_symbols if s is not TIME]
-        value, *sizes = (self.value(e, self.starting_point) for e in (residual, *sides, *slopes))
-        return value, 32 * 2.0**-53 * sum(abs(size) for size in sizes if size == size)
-
-    def bounds(self, mode: Mode) -> dict[Any, tuple[Any, Any]]:
-        """What a mode's surfaces say of single states: exact ends, None where there is none."""
-        return self.decider.bounds(self.domain(mode), self.ranges(mode))
-
     def ask(self, mode: Mode, constraints: Iterable[Constraint], prove: bool = False) -> Answer:
         """Whether there is a point of a mode's states, inputs and time where all constraints hold."""
         return self.decider.decide(tuple(dict.fromkeys(constraints)), self.ranges(mode), prove)
@@ -213,10 +182,6 @@ class Dynamics:
         unknown = [a for a in answers if a.verdict == "unknown"]
         weakest = [a for a in answers if a.decided == "interval"]
         return (unknown or weakest or answers or [Answer("never", "symbolic")])[0]
-
-    def contradicts(self, mode: Mode, given: Clause, constraint: Constraint) -> bool:
-        """Whether constraints and one more inequality are known to have no point."""
-        return self.decider.contradicts(given, constraint, self.ranges(mode))
 
     def vanishes(self, mode: Mode, expr: Any, given: Clause) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
@@ -289,6 +254,12 @@ class Dynamics:
     def _moving(self) -> frozenset[Any]:
         """The inputs that are interpolated between samples: what depends on them has a rate of its own."""
         return frozenset(symbol(given.name) for given in self.system.inputs if given.hold == "linear")
+
+
+def bounding(mode: Mode) -> Iterator[tuple[Surface, Edge | None]]:
+    """The surfaces that bound a mode, with their edges: those without `if`, and walls."""
+    yield from ((edge.surface, edge) for edge in mode.edges if edge.condition is None)
+    yield from ((wall, None) for wall in mode.walls)
 
 
 def _middle(expr: Any) -> Fraction:

@@ -50,24 +50,6 @@ def reduce(constraints: Sequence[Constraint], normal_forms: NormalForms, ranges:
     return reduced
 
 
-def contradicts(
-    reduced: Reduced, constraint: Constraint, normal_forms: NormalForms, ranges: Mapping[Any, Range]
-) -> bool:
-    """Whether one more constraint, an inequality, is found to leave nothing of a question."""
-    p = moved(normal_forms.of(constraint.expr), reduced, normal_forms)
-    bounds: dict[Any, Bounds] = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
-    try:
-        tighten([*reduced.rows, *_kept([(p, constraint.relation)])], bounds)
-    except Contradiction:
-        return True
-    return False
-
-
-def linear(reduced: Reduced) -> bool:
-    """Whether nothing but linear inequalities is left, each of one name or direction."""
-    return all(atom.kind == "name" and e == 1 for p, _ in reduced.rows for m in p.terms if m for atom, e in m[:1])
-
-
 def moved(p: Polynomial, reduced: Reduced, normal_forms: NormalForms) -> Polynomial:
     """A polynomial where the equations hold."""
     for symbol, value in reduced.solved:

@@ -11,7 +11,7 @@ from hsdsl.errors import Decided
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.question import positive
-from hsdsl.system import Edge, Mode, Surface
+from hsdsl.system import Edge, Surface
 
 
 @dataclass(frozen=True)
@@ -45,20 +45,6 @@ class Landing:
     decided: Decided
 
 
-def surfaces_of(mode: Mode, conditional: bool = False) -> Iterator[tuple[Surface, Edge | None]]:
-    """The surfaces that bound a mode, with their edges; with ``conditional`` those of edges with an `if` too.
-
-    None of a final mode, which a run does not flow in.
-    """
-    if mode.final:
-        return
-    for edge in mode.edges:
-        if conditional or edge.condition is None:
-            yield edge.surface, edge
-    for wall in mode.walls:
-        yield wall, None
-
-
 def landings(dynamics: Dynamics, edge: Edge) -> tuple[Landing, ...]:
     """The surfaces of the next mode that an edge's reset always lands on."""
     return dynamics.remembered(("landings", edge.source, edge.name), lambda: tuple(_landings(dynamics, edge)))
@@ -67,7 +53,8 @@ def landings(dynamics: Dynamics, edge: Edge) -> tuple[Landing, ...]:
 def _landings(dynamics: Dynamics, edge: Edge) -> Iterator[Landing]:
     mode, target = dynamics.modes[edge.source], dynamics.modes[edge.target]
     guard = dynamics.guard(edge)
-    for surface, after in surfaces_of(target, conditional=True) if guard else ():
+    surfaces = [*((after.surface, after) for after in target.edges), *((wall, None) for wall in target.walls)]
+    for surface, after in surfaces if guard and not target.final else ():
         residual = dynamics.residual(surface)
         carried = dynamics.carried(residual, edge)
         known = [dynamics.vanishes(mode, carried, clause) for clause in guard or ()]

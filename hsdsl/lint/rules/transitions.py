@@ -7,8 +7,8 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.crossing import fires
-from hsdsl.lint.analysis.dynamics import Dynamics
-from hsdsl.lint.analysis.landing import Landing, landings, surfaces_of
+from hsdsl.lint.analysis.dynamics import Dynamics, bounding
+from hsdsl.lint.analysis.landing import Landing, landings
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import Answer, at_most_zero, positive, zero
@@ -29,7 +29,7 @@ def reset_lands_beyond(subject: Subject) -> Iterator[Finding]:
 
 def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -> None:
     target = dynamics.modes[edge.edge.target]
-    for surface, after in surfaces_of(target):
+    for surface, after in bounding(target) if not target.final else ():
         carried = dynamics.carried(dynamics.residual(surface), edge.edge)
         answer = fires(dynamics, edge.edge, positive(carried))
         if not answer.somewhere:
@@ -37,7 +37,7 @@ def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -
         proof, guard = Proof(dynamics, mode), dynamics.guard(edge.edge)
         always = guard is not None and proof.never(guard, at_most_zero(carried))
         residual = dynamics.residual(edge.edge.surface)
-        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in surfaces_of(target))
+        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in bounding(target))
         about = [residual, carried, *([] if always else [dynamics.rate(mode, residual), *others])]
         where = at(dynamics, mode, answer, about)
         beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
@@ -162,9 +162,10 @@ def _cycle_finding(subject: Subject, part: ModePart, edge: EdgePart, answer: Ans
 
 def _followed_at_once(dynamics: Dynamics, mode: Mode, edge: Edge) -> Iterator[Answer]:
     """Points of a guard from which another transition fires at once."""
-    for surface, after in surfaces_of(dynamics.modes[edge.target]):
-        if after is not None:
-            carried = dynamics.carried(dynamics.residual(surface), edge)
+    target = dynamics.modes[edge.target]
+    for after in target.edges if not target.final else ():
+        if after.condition is None:
+            carried = dynamics.carried(dynamics.residual(after.surface), edge)
             yield fires(dynamics, edge, positive(carried))
     for landing in landings(dynamics, edge):
         if landing.rate is not None and landing.edge is not None and not landing.returns:
