@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.chain import Shape
+from hsdsl.metrics.gate_sequence import Shape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.rounding import UNIT, charge, lengths
 

@@ -1,8 +1,8 @@
 """Distances where guards, resets or domains are not affine: the best path that local solves find.
 
 Its length is an upper bound: it is a path of the space, and whether its straight pieces stay in curved domains is
-proved where enclosures can (:mod:`hsdsl.metrics.inside`). Nothing here bounds from below: that comes from
-:mod:`hsdsl.metrics.nearest`, and from the affine part of the model.
+proved where enclosures can (:mod:`hsdsl.metrics.segment_containment`). Nothing here bounds from below: that comes from
+:mod:`hsdsl.metrics.guard_clearance`, and from the affine part of the model.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.inside import CERTAIN, OUTSIDE, straight_inside
 from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
 from hsdsl.metrics.search import End, Found
+from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.serial import one_thread
 
 MOST_SEQUENCES = 6
@@ -107,7 +107,7 @@ def _try(
     toll = start.cost + end.cost + relaxation * len(sequence)
     route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
     if not sequence:
-        verdict = int(straight_inside(space, start.mode, start.x[None], end.x[None])[0])
+        verdict = int(segments_inside(space, start.mode, start.x[None], end.x[None])[0])
         if verdict != OUTSIDE:
             _keep(found, float(np.linalg.norm(start.x - end.x)) + toll, route, start, end, np.zeros(0), verdict)
         else:

@@ -12,16 +12,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.metrics.beyond import beyond_affine
+from hsdsl.metrics.batch_search import ROUNDING, Pairs
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.inside import OUTSIDE, UNDECIDED, straight_inside
+from hsdsl.metrics.guard_clearance import to_passages
 from hsdsl.metrics.interval import CERTIFIED, SAMPLED, SEARCHED, weakest
 from hsdsl.metrics.local import improve, onto
-from hsdsl.metrics.many import ROUNDING, Pairs
-from hsdsl.metrics.nearest import to_passages
+from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.routes import Route
 from hsdsl.metrics.search import End, most_hops, search
+from hsdsl.metrics.segment_containment import OUTSIDE, UNDECIDED, segments_inside
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
@@ -94,7 +94,7 @@ class _Batch:
         pairs.lower = np.minimum(self.straight, pairs.least() + pairs.toll)
         self.looked_at = np.zeros(len(pairs.p), dtype=bool)
         if pairs.source == pairs.target and not space.domains[pairs.source].convex:
-            verdicts = straight_inside(space, pairs.source, pairs.p, pairs.q)
+            verdicts = segments_inside(space, pairs.source, pairs.p, pairs.q)
             pairs.upper = np.where(verdicts == OUTSIDE, np.inf, pairs.upper)
             self.looked_at = verdicts == UNDECIDED
 
@@ -152,7 +152,7 @@ class _Batch:
         holds = np.ones(len(moved), dtype=bool)
         for pieces in zip(*legs, strict=True):
             a, b = np.array([piece[1] for piece in pieces]), np.array([piece[2] for piece in pieces])
-            holds &= straight_inside(self.owner.space, pieces[0][0], a, b) != OUTSIDE
+            holds &= segments_inside(self.owner.space, pieces[0][0], a, b) != OUTSIDE
         for (k, found), good in zip(moved, holds.tolist(), strict=True):
             if good:
                 self._shorter(k, found.route.charged(found.points) + self._toll(found.route), found)
@@ -178,7 +178,7 @@ class _Batch:
         hops = most_hops(owner.space, pairs.source, pairs.target, owner.hops)
         outer = search(owner.space, starts, ends, pairs.toll, hops, np.inf, owner.budget)
         enough = max(enough, float(pairs.lower[k]) * (1 + CLOSED))
-        found = beyond_affine(owner.space, starts, ends, pairs.toll, hops, np.inf, outer, owner.budget, enough)
+        found = search_nonaffine(owner.space, starts, ends, pairs.toll, hops, np.inf, outer, owner.budget, enough)
         pairs.lower[k] = max(pairs.lower[k], found.lower * (1 - ROUNDING))
         pairs.upper[k] = min(pairs.upper[k], found.upper)
         self.done[k] = True

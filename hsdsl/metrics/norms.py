@@ -16,7 +16,7 @@ from typing import cast
 
 import numpy as np
 
-from hsdsl.metrics.chain import Shape
+from hsdsl.metrics.gate_sequence import Shape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.rounding import brought_inside, charge, lengths, norm, proved_above, proved_below
 

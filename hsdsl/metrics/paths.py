@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsdsl.metrics.chain import chain_of
+from hsdsl.metrics.gate_sequence import gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
 from hsdsl.metrics.search import TOLERANCE, End, Found
@@ -151,7 +151,7 @@ def _path(space: Space, found: Found) -> tuple[Piece, ...]:
     at, mode = found.start.x, found.start.mode
     pieces: list[Piece] = []
     if found.sequence:
-        chain = chain_of(space, found.sequence)
+        chain = gate_sequence(space, found.sequence)
         for passage, (enter, leave) in zip(chain.passages, chain.sides(found.unknowns), strict=True):
             pieces.append(_piece(space, mode, at, enter, passage.gate.edge, passage.forward))
             at, mode = leave, passage.target

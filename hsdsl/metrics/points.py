@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.beyond import beyond_affine
+from hsdsl.metrics.batch_search import Pairs, around_guards, search_batch
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import INFINITE, ZERO
-from hsdsl.metrics.many import Pairs, around_guards, search_many
 from hsdsl.metrics.neighbours import Neighbours
+from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.paths import Piece, Place, PointDistance, answer, coordinates, ends_of
 from hsdsl.metrics.search import End, most_hops, search
 
@@ -61,7 +61,7 @@ def distance(
     most, toll, budget = most_hops(space, a.mode, b.mode, hops), relaxation or 0.0, budget or Budget()
     found = search(space, starts, ends, toll, most, strip, budget)
     if not space.affine:
-        found = beyond_affine(space, starts, ends, toll, most, strip, found, budget)
+        found = search_nonaffine(space, starts, ends, toll, most, strip, found, budget)
     return answer(space, found, most)
 
 
@@ -107,7 +107,7 @@ def distances(
     if space.components[pairs.source] != space.components[pairs.target]:
         pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
     elif space.affine:
-        search_many(pairs, most_hops(space, pairs.source, pairs.target, hops), budget or Budget())
+        search_batch(pairs, most_hops(space, pairs.source, pairs.target, hops), budget or Budget())
     else:
         (neighbours or Neighbours(space, relaxation, budget or Budget(), hops)).bound(pairs, enough)
     return pairs.bounds()

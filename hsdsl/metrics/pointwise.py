@@ -11,11 +11,11 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Space
-from hsdsl.metrics.inside import highest
 from hsdsl.metrics.interval import weakest
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.on_space import Points
 from hsdsl.metrics.points import Place, distance, distances
+from hsdsl.metrics.segment_containment import highest
 
 QUICK, SLOW = 50_000, 20_000
 

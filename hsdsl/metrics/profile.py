@@ -8,8 +8,8 @@ import numpy as np
 
 from hsdsl.execution import Array, Execution
 from hsdsl.metrics.curves import merged
+from hsdsl.metrics.labelled_sup import Labelled
 from hsdsl.metrics.on_space import OnSpace, PointMetric
-from hsdsl.metrics.rivals import Labelled
 from hsdsl.metrics.supremum import CellDistance
 
 POINTS = 1500

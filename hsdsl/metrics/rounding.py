@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hsdsl.enclosures import Array
-    from hsdsl.metrics.chain import Shape
+    from hsdsl.metrics.gate_sequence import Shape
 
 UNIT = 2.0**-53
 ROUNDS = 20  # of moving points onto the inequality that is broken most

@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain, Gate, Space
-from hsdsl.metrics.inside import OUTSIDE, straight_inside
+from hsdsl.metrics.segment_containment import OUTSIDE, segments_inside
 
 # Where a leg that is held is held: dense towards its ends, at which it may leave a boundary it begins on.
 SHARES = (0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999)
@@ -204,11 +204,11 @@ class Route:
         return self.length(unknowns) + 2 * excess * moved
 
     def judged(self, unknowns: Array) -> list[int]:
-        """For each leg whether it stays in its domain, see :func:`hsdsl.metrics.inside.straight_inside`."""
+        """Containment of each leg in its domain, see :mod:`hsdsl.metrics.segment_containment`."""
         if not np.all(np.isfinite(unknowns)):
             return [OUTSIDE]
         legs = self.legs(unknowns)
-        return [int(straight_inside(self.space, mode, a[None], b[None])[0]) for mode, a, b in legs]
+        return [int(segments_inside(self.space, mode, a[None], b[None])[0]) for mode, a, b in legs]
 
 
 def beyond(space: Space, mode: int, a: Array, b: Array) -> float:

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.chain import Problem, Shape, chain_of
-from hsdsl.metrics.cones import ROUNDS, solve
-from hsdsl.metrics.follow import followers, hops_of, may_follow, passage_number
+from hsdsl.metrics.dominance import followers, hops_of, may_follow, passage_number
+from hsdsl.metrics.gate_sequence import Problem, Shape, gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.serial import one_thread
 from hsdsl.metrics.sides import to_entry, to_exit
+from hsdsl.metrics.socp import ROUNDS, solve
 
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
 ROUNDING = 4 * 2.0**-53  # of a sum of bounds, for each of them
@@ -211,7 +211,7 @@ class _Search:
     def _keep(self, sequence: tuple[int, ...], rounds: int = ROUNDS) -> float:
         """Keep the shortest path through a sequence where it is the best; a lower bound on it."""
         if sequence:
-            problem = chain_of(self.space, sequence).problem(self.start.x, self.end.x)
+            problem = gate_sequence(self.space, sequence).problem(self.start.x, self.end.x)
         else:
             problem = straight(self.start.x, self.end.x)
         lower, upper, s = solve(problem, rounds)
@@ -251,7 +251,7 @@ class _Search:
         rest = float(self.rest[passage_number(sequence[-1])])
         if rest == np.inf:
             return np.inf
-        chain = chain_of(self.space, sequence)
+        chain = gate_sequence(self.space, sequence)
         simple = self._least(chain.problem(self.start.x, None), rest + toll)
         if simple >= self.found.upper * (1 - TOLERANCE) or self.space.kept is None:
             return simple
@@ -294,7 +294,7 @@ def remaining(space: Space, end: End, relaxation: float, budget: Budget) -> Arra
         if passage.target == end.mode:
             rest[passage.index] = to_exit(passage, end.x[None])[0]
             if passage.gate.size > 1 and not budget.spent():
-                goal = chain_of(space, (passage.index,)).problem(None, end.x)
+                goal = gate_sequence(space, (passage.index,)).problem(None, end.x)
                 rest[passage.index] = max(rest[passage.index], solve(goal)[0])
     between = gaps(space, budget)
     for _ in range(total):
@@ -329,4 +329,4 @@ def gaps(space: Space, budget: Budget) -> Array:
 
 def _gap(space: Space, f: int, g: int) -> float:
     """0 where a passage is taken back at once."""
-    return 0.0 if f == g ^ 1 else solve(chain_of(space, (f, g)).problem(None, None), 1)[0]
+    return 0.0 if f == g ^ 1 else solve(gate_sequence(space, (f, g)).problem(None, None), 1)[0]

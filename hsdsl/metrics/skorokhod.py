@@ -2,7 +2,7 @@
 
     inf over increasing bijections r of the common span of  max(sup |r(t) - t|, sup D(x(t), y(r(t))))
 
-with D the distance of states with modes (:mod:`hsdsl.metrics.rivals`), on right-continuous curves: of several
+with D the distance of states with modes (:mod:`hsdsl.metrics.labelled_sup`), on right-continuous curves: of several
 transitions at one instant only the last value counts. This is the variant of Gokhman (2008) and of Majumdar and Prabhu
 (HSCC 2015), without a bound on the retiming's slope.
 """
@@ -14,9 +14,9 @@ import numpy as np
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import ROUNDOFF, CurveDistance, merged, no_distance, rounding_of, span_note
 from hsdsl.metrics.interval import Interval
+from hsdsl.metrics.labelled_sup import sup_norm
 from hsdsl.metrics.merge import common_span
 from hsdsl.metrics.polyline import Polyline, polylines
-from hsdsl.metrics.rivals import sup_norm
 from hsdsl.metrics.trace import Array, Trace
 
 RESOLUTION = 1000

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.metrics.closeness import tau_epsilon
 from hsdsl.metrics.curves import CurveDistance, rho
+from hsdsl.metrics.labelled_sup import sup_norm
 from hsdsl.metrics.on_space import PointMetric
-from hsdsl.metrics.rivals import sup_norm
-from hsdsl.metrics.sampled import rho_hat
+from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
+from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.names import did_you_mean
 
 SpaceMaker = Callable[[float | None], PointMetric]  # the model's, relaxed or not

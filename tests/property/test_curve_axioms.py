@@ -11,11 +11,11 @@ from curve_spaces import Bent, Plane
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsdsl.metrics.closeness import tau_epsilon
 from hsdsl.metrics.curves import rho
-from hsdsl.metrics.rivals import sup_norm
-from hsdsl.metrics.sampled import rho_hat
+from hsdsl.metrics.labelled_sup import sup_norm
+from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
+from hsdsl.metrics.tau_epsilon import tau_epsilon
 
 UNTIL = 2.0
 number = st.floats(-2, 2).map(lambda x: round(x, 3))

@@ -14,13 +14,13 @@ from curve_spaces import Apart, Bent, Line, Plane
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.metrics.bernstein import bernstein, largest_norm, length, restrict
-from hsdsl.metrics.closeness import tau_epsilon
 from hsdsl.metrics.curves import rho
+from hsdsl.metrics.labelled_sup import sup_norm
 from hsdsl.metrics.profile import profiles
-from hsdsl.metrics.rivals import sup_norm
-from hsdsl.metrics.sampled import rho_hat
+from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
 from hsdsl.metrics.table import CURVE_METRICS, Request, between
+from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.store import load
 
 NAN = float("nan")

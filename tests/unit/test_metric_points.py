@@ -9,11 +9,11 @@ import pytest
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.metrics.chain import Problem, Shape
-from hsdsl.metrics.cones import solve
+from hsdsl.metrics.gate_sequence import Problem, Shape
 from hsdsl.metrics.interval import INFINITE, ZERO
 from hsdsl.metrics.norms import minimise
 from hsdsl.metrics.points import Place, distance, distances, quick_bounds
+from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
 
 MODELS = Path(__file__).parents[2] / "models"

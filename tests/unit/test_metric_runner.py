@@ -10,9 +10,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 import hsdsl
-from hsdsl.metrics.inside import CERTAIN, OUTSIDE, straight_inside
-from hsdsl.metrics.nearest import to_passages
+from hsdsl.metrics.guard_clearance import to_passages
 from hsdsl.metrics.points import Place, distance
+from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.space import make_space
 from hsdsl.model.distances import distance_of_runs as between_runs
 
@@ -121,7 +121,7 @@ def test_straight_pieces_are_judged_as_many_points_say(space):
     rng = np.random.default_rng(2)
     low, high = (-1, 0.5, -1, -1, -2, -1), (1, 1.2, 1, 1, 0, 1)
     a, b = rng.uniform(low, high, size=(300, 6)), rng.uniform(low, high, size=(300, 6))
-    verdicts = straight_inside(space, 0, a, b)
+    verdicts = segments_inside(space, 0, a, b)
     shares = np.linspace(0, 1, 1001)[:, None]
     seen = np.array([foot_heights(p + shares * (q - p)).min() for p, q in zip(a, b, strict=True)])
     assert np.all(verdicts[seen < -1e-6] == OUTSIDE)

@@ -10,10 +10,10 @@ import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.metrics import search
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.cones import solve
-from hsdsl.metrics.follow import followers, hops_of
+from hsdsl.metrics.dominance import followers, hops_of
 from hsdsl.metrics.interval import EndsCross, Interval, weakest
 from hsdsl.metrics.points import Place, distance, distances
+from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
 
 HEAD = "hsdsl: 1\ninputs: {u: sin(t)}\nmodes:\n"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.chain import Problem, Shape
+from hsdsl.metrics.gate_sequence import Problem, Shape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.line import on_line
 from hsdsl.metrics.rounding import brought_inside, charge, norm, proved_above, proved_below

@@ -102,7 +102,7 @@ class Problem:
         return float(sum(np.linalg.norm(m @ s + o) for m, o in legs))
 
 
-class Chain:
+class GateSequence:
     """A sequence of passages: its matrices, to which the two ends are added by :meth:`problem`.
 
     The legs are the one from p, those between passages, and the one to q.
@@ -180,11 +180,11 @@ class Chain:
         ]
 
 
-def chain_of(space: Space, indices: tuple[int, ...]) -> Chain:
+def gate_sequence(space: Space, indices: tuple[int, ...]) -> GateSequence:
     """The chain of a sequence of passages, made once."""
     key = ("chain", indices)
     found = space.cache.get(key)
-    if not isinstance(found, Chain):
-        found = Chain(space, [space.passages[i] if i >= 0 else space.planes[~i] for i in indices])
+    if not isinstance(found, GateSequence):
+        found = GateSequence(space, [space.passages[i] if i >= 0 else space.planes[~i] for i in indices])
         space.cache[key] = found
     return found

@@ -6,14 +6,14 @@ import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.guard_clearance import to_passages
 from hsdsl.metrics.local import search_locally
-from hsdsl.metrics.nearest import to_passages
 from hsdsl.metrics.search import End, Found
 
 CLOSE = 1e-9  # relative: a path so near to the lower end is not improved
 
 
-def beyond_affine(
+def search_nonaffine(
     space: Space,
     starts: list[End],
     ends: list[End],

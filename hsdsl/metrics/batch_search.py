@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.chain import Chain, chain_of
-from hsdsl.metrics.follow import followers, hops_of, may_follow, passage_number
+from hsdsl.metrics.dominance import followers, hops_of, may_follow, passage_number
+from hsdsl.metrics.gate_sequence import GateSequence, gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, Interval, up_to_hops, weakest
 from hsdsl.metrics.line import on_line
@@ -88,7 +88,7 @@ class Pairs:
         self.lower[indices] = np.minimum(self.lower[indices], bounds)
 
 
-def search_many(pairs: Pairs, hops: int, budget: Budget) -> None:
+def search_batch(pairs: Pairs, hops: int, budget: Budget) -> None:
     """Improve ``pairs`` until no sequence of at most ``hops`` passages can be shorter, or the time is over."""
     space = pairs.space
     everything = np.arange(len(pairs.p))
@@ -153,7 +153,7 @@ def _promising(
 def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Ways) -> Array:
     """The least that paths beginning with a sequence can have."""
     space, toll = pairs.space, pairs.toll * hops_of(sequence)
-    chain = chain_of(space, sequence)
+    chain = gate_sequence(space, sequence)
     rest = ways.rest(passage_number(sequence[-1]), active)
     bound = _shortest(pairs, chain, active, None)[0] + toll + rest
     if space.kept is not None:
@@ -164,7 +164,7 @@ def _through(pairs: Pairs, sequence: tuple[int, ...], active: Indices, ways: Way
 
 def _finish(pairs: Pairs, sequence: tuple[int, ...], active: Indices) -> None:
     """The paths through exactly this sequence."""
-    lower, upper = _shortest(pairs, chain_of(pairs.space, sequence), active, pairs.q[active])
+    lower, upper = _shortest(pairs, gate_sequence(pairs.space, sequence), active, pairs.q[active])
     toll = pairs.toll * hops_of(sequence)
     pairs.lower[active] = np.minimum(pairs.lower[active], (lower + toll) * (1 - ROUNDING))
     if min(sequence) < 0:
@@ -173,7 +173,7 @@ def _finish(pairs: Pairs, sequence: tuple[int, ...], active: Indices) -> None:
 
 
 def _shortest(
-    pairs: Pairs, chain: Chain, active: Indices, goals: Array | None, kept: bool = False
+    pairs: Pairs, chain: GateSequence, active: Indices, goals: Array | None, kept: bool = False
 ) -> tuple[Array, Array]:
     """Bounds on the shortest ways from p through a chain, to goals if there are any."""
     zero = np.zeros(len(pairs.space.domains[pairs.source].coordinates))

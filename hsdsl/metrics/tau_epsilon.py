@@ -2,7 +2,7 @@
 
 Two hybrid arcs are (tau, epsilon)-close when for every (t, j) of one with t + j <= tau there is (s, j) of the other,
 with the same j, |t - s| < epsilon and D < epsilon, and the other way round; D is the distance of states with modes
-(:mod:`hsdsl.metrics.rivals`), the mode being one of the state's components there.
+(:mod:`hsdsl.metrics.labelled_sup`), the mode being one of the state's components there.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ SAMPLES = 16  # of a piece that enclosures do not decide
 OUTSIDE, UNDECIDED, CERTAIN = 0, 1, 2
 
 
-def straight_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
+def segments_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
     """Judge the straight pieces from a to b, (B, n) arrays of points of one mode.
 
     Returns
