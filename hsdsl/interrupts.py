@@ -54,19 +54,16 @@ class Noted:
 
     def __enter__(self) -> None:
         before = _getsignal(_SIGINT)
-        self._before = before if before in (signal.default_int_handler, _pressed) and _in_main_thread() else None
+        self._before = before if before in (signal.default_int_handler, _pressed) else None
         if self._before is not None:
-            _signal(_SIGINT, self._press)
+            try:
+                _signal(_SIGINT, self._press)
+            except ValueError:  # only the main thread sets handlers, and gets KeyboardInterrupt
+                self._before = None
 
     def __exit__(self, *_: object) -> None:
         if self._before is not None:
             _signal(_SIGINT, self._before)
-
-
-def _in_main_thread() -> bool:
-    from threading import get_ident, main_thread
-
-    return get_ident() == main_thread().ident
 
 
 def _pressed(number: int, frame: FrameType | None) -> None:

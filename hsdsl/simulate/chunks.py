@@ -31,7 +31,7 @@ class Chunks:
     """
 
     def __init__(self, table: tables.Chunk, shape: Shape) -> None:
-        self.table, self._shape = table, shape
+        self.table, self._shape, self._row_bytes = table, shape, shape.row_bytes
         self._full: list[dict[str, Array]] = []
         self._rows = 0  # of the chunk that is there
         self._before = 0  # rows of a run that needed more than one chunk
@@ -42,7 +42,7 @@ class Chunks:
     def clear(self, rows: float, memory: int) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
         self._memory, self._taken, self.full = memory, 0, False
-        wanted = min(max(rows, self._before), MOST_ROWS, memory // self._shape.row_bytes)
+        wanted = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
         wanted = max(wanted, LEAST_ROWS)
         if wanted > self._rows:
             try:
@@ -118,7 +118,7 @@ class Chunks:
         ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it
         leaves it. ``pack`` copies the chunk to an address, and returns how many states a row has.
         """
-        if not self._full and self._rows * self._shape.row_bytes <= MOST_KEPT:
+        if not self._full and self._rows * self._row_bytes <= MOST_KEPT:
             return Packed(pack, self.counts, self._shape)
         chunks = [*self._full, self._written()]
         chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
@@ -127,7 +127,7 @@ class Chunks:
             whole = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0] if name != "pieces"}
             pieces = [chunk["pieces"][:-1] for chunk in chunks]
             whole["coefficients"] = np.concatenate([pieces[0][1:], *pieces[1:], chunks[-1]["pieces"][-1:]])
-            self._before = min(len(whole["times"]) * 9 // 8, MOST_KEPT // self._shape.row_bytes)
+            self._before = min(len(whole["times"]) * 9 // 8, MOST_KEPT // self._row_bytes)
         else:
             whole = chunks[0]
             whole["coefficients"] = whole.pop("pieces")[1:]

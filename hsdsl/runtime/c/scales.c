@@ -4,11 +4,27 @@
 #define SHARE 32
 #define BLUR_UNITS 4 /* BLUR there */
 
+/* 2**k, where that is a normal number. */
+static double power_of_two(int k) {
+  const uint64_t bits = (uint64_t)(k + 1023) << 52;
+  double power;
+  memcpy(&power, &bits, sizeof power);
+  return power;
+}
+
+static int rounded_down(int exponent, int m) { return exponent >= 0 ? exponent / m : -((-exponent + m - 1) / m); }
+
 /* x**(-1/m); of x 2**(k m) it is exactly 2**-k times as much. */
 static double root(double x, int m) {
+  if (x >= 0x1p-900 && x <= 0x1p900) { /* frexp and ldexp cost as much as pow */
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    const int shift = rounded_down((int)(bits >> 52) - 1022, m);
+    return pow(x * power_of_two(-shift * m), -1.0 / m) * power_of_two(-shift);
+  }
   int exponent;
   const double fraction = frexp(x, &exponent);
-  const int shift = exponent >= 0 ? exponent / m : -((-exponent + m - 1) / m);
+  const int shift = rounded_down(exponent, m);
   return ldexp(pow(ldexp(fraction, exponent - shift * m), -1.0 / m), -shift);
 }
 

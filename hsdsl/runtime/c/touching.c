@@ -18,12 +18,19 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   return here->table->flow(here->p, time, run->at, run->source) || !hs_finite(sum(run->source, n));
 }
 
+/* Whether surface k rises at the start of the step and falls at its end, both by its polynomial. */
+HS_INLINE int turns_back(const hs_run *run, int k) {
+  const double *const c = coefficients_of(&run->curves, 0, k);
+  if (!(c[1] > 0) || run->curves.parts > 1 || !(run->control.tolerance > 0)) return 0;
+  return slope_of(c, *degree_of(&run->curves, 0, k), 1.0) < 0;
+}
+
 /* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
 static int touched(hs_run *run, int k, hs_crossing *crossing) {
   const double *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
   double rate, low = 0.0, high = 1.0;
-  if (!(c[1] > 0) || run->curves.parts > 1 || !(run->control.tolerance > 0) || !(slope_of(c, n, 1.0) < 0)) return 0;
+  if (!turns_back(run, k)) return 0;
   if (run->here.table->rates[k](run->here.p, run->span.t1, run->z, &rate)) return RAISED;
   if (!(rate > 0)) return 0;
   for (int i = 0; i < TURNINGS; i++) {
