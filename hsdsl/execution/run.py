@@ -46,7 +46,7 @@ class Execution(Deferred):
         ``assessment(execution, estimated) -> Verdict``: the verdict, where ``estimated`` holds it against a finer run
         also where steps are fixed; without it the verdict stays what it is.
     repetition : callable or None
-        Makes the same run again, finer (`hsdsl.simulate.finer`).
+        ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.finer`).
     """
 
     model: str
@@ -73,7 +73,7 @@ class Execution(Deferred):
     output_function: OutputFunction | None = field(default=None, compare=False)
     sampler: Sampler | None = field(default=None, compare=False)
     assessment: Assessment | None = field(default=None, compare=False)
-    repetition: Callable[[], Execution] | None = field(default=None, compare=False)
+    repetition: Callable[[Execution], Execution] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
@@ -154,7 +154,7 @@ class Execution(Deferred):
     @cached_property
     def finer(self) -> Execution | None:
         """The same run, finer; None for one that was read from a file."""
-        return None if self.repetition is None else self.repetition()
+        return None if self.repetition is None else self.repetition(self)
 
     def estimated(self) -> Execution:
         """Return the same execution with its verdict held against the finer run, also where steps are fixed."""

@@ -155,6 +155,7 @@ class Settings(ctypes.Structure):
         *((name, c_double) for name in ("step", "tolerance", "largest", "relaxation", "until")),
         ("max_transitions", c_int64),
         ("scheme", c_int64),
+        ("scale", POINTER(c_double)),
     )
 
 

@@ -65,7 +65,7 @@ class CompiledPlan:
         scheme = settings.scheme
         key = settings.method, scheme, shape
         self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))
-        self._settings = task_settings(settings)
+        self._settings = task_settings(settings, program.all_states)
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(timeline)
         self.timeline = self._columns.pointer
@@ -86,9 +86,10 @@ class CompiledPlan:
         task.mode, (task.dimension, task.x) = self._mode, self._start
 
 
-def task_settings(settings: Settings) -> tables.Settings:
-    """Write settings as the runtime takes them."""
+def task_settings(settings: Settings, states: tuple[str, ...]) -> tables.Settings:
+    """Write settings as the runtime takes them; ``states`` are those of all modes."""
     control = make_control(settings, FLOAT64)
+    scale = [settings.scale.get(name, 0.0) for name in states] if settings.scale else None
     return tables.Settings(
         control.h,
         control.tolerance or 0.0,
@@ -97,6 +98,7 @@ def task_settings(settings: Settings) -> tables.Settings:
         settings.until,
         min(settings.max_transitions, 2**62),
         tables.SCHEMES.index(settings.scheme),
+        scale and (ctypes.c_double * len(scale))(*scale),
     )
 
 

@@ -155,6 +155,8 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     if settings.step is not None:
         return Control(settings.step, None, order, settings.step, None)
     largest = settings.until * LARGEST_SHARE
+    if settings.longest_step is not None:
+        largest = min(largest, settings.longest_step)
     implicit = isinstance(settings.method, RadauMethod)
     control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest

@@ -70,7 +70,9 @@ class CompiledEnsemble:
         self._plan, self._kept = plan, kept
         self._start = np.ascontiguousarray(instances.start, np.float64)
         self._time = np.ascontiguousarray(instances.time, np.float64)
-        self._settings = (tables.Settings * len(instances.settings))(*map(task_settings, instances.settings))
+        self._settings = (tables.Settings * len(instances.settings))(
+            *(task_settings(settings, plan.program.all_states) for settings in instances.settings)
+        )
         self._timelines, self._numbers = _timelines(instances.timelines)
         self._names, self._layouts = names, plan.layouts
         self._stop = np.zeros(1, np.int32)

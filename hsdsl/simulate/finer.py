@@ -1,6 +1,7 @@
 """Settings of the same run made finer: the difference of the two runs estimates the error of the first.
 
-The tolerance falls to a tenth, so the finer run is wrong by about a tenth of what the run is. A fixed step is halved;
+The tolerance falls to a tenth, so the finer run is wrong by about a tenth of what the run is. Steps that the tolerance
+does not bound, but the run's length or samples of inputs, become shorter in the same way. A fixed step is halved;
 a method of order 1 needs a quarter, or the difference would be no larger than the error of the finer run. The
 relaxed scheme's strips shrink to a tenth: the delay of a transition is known only up to a factor. Below round-off the
 other run is coarser instead, and the difference is that much larger than the error.
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hsdsl.arithmetic import Arithmetic
+from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators import ButcherTableau, TaylorMethod
 from hsdsl.simulate.settings import Settings
 
@@ -18,8 +19,8 @@ FINER = 10
 LEAST_UNITS = 32  # of round-off: a tolerance that a finer run may still have
 
 
-def finer_settings(settings: Settings, arithmetic: Arithmetic) -> Settings:
-    """Return the settings of the run to compare with."""
+def finer_settings(settings: Settings, longest: Number, arithmetic: Arithmetic) -> Settings:
+    """Return the settings of the run to compare with; ``longest`` is the longest step of the run."""
     finer = settings
     if settings.scheme != "located":
         finer = replace(finer, relaxation=settings.relaxation / FINER)
@@ -30,6 +31,8 @@ def finer_settings(settings: Settings, arithmetic: Arithmetic) -> Settings:
     smaller = settings.tolerance / FINER
     tolerance = smaller if smaller >= LEAST_UNITS * arithmetic.unit else settings.tolerance * FINER
     method = settings.method
+    assert method is not None
+    longest = longest * float(FINER) ** (-1 / method.order)
     if isinstance(method, TaylorMethod):
         method = method.for_tolerance(tolerance, arithmetic)
-    return replace(finer, tolerance=tolerance, method=method)
+    return replace(finer, tolerance=tolerance, method=method, longest_step=longest)

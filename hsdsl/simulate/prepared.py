@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
+from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Execution, Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
@@ -65,6 +68,7 @@ class Prepared:
     states: tuple[str, ...]
     x: State
     plan: CompiledPlan | None
+    finer: dict[Number, Prepared] = field(default_factory=dict["Number", "Prepared"])  # by the run's longest step
 
     def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
         """Run to the end.
@@ -89,16 +93,16 @@ class Prepared:
         stop, rest = under_way.stream(sink)
         return stop, under_way.made, rest
 
-    def again(self) -> Execution:
+    def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
-        return self._finer.simulate()
-
-    @cached_property
-    def _finer(self) -> Prepared:
-        settings, plan = finer_settings(self.settings, self.kernel.arithmetic), self.plan
-        if plan is not None:
-            plan = CompiledPlan(self.program, plan.compiled, settings, self.timeline, self.mode, self.states, self.x)
-        return replace(self, settings=settings, plan=plan)
+        longest = max(np.diff(execution.times), default=self.settings.until)
+        if longest not in self.finer:
+            settings, plan = finer_settings(self.settings, longest, self.kernel.arithmetic), self.plan
+            if plan is not None:
+                start = self.timeline, self.mode, self.states, self.x
+                plan = CompiledPlan(self.program, plan.compiled, settings, *start)
+            self.finer[longest] = replace(self, settings=settings, plan=plan, finer={})
+        return self.finer[longest].simulate()
 
     @cached_property
     def _about(self) -> dict[str, Any]:
@@ -110,7 +114,7 @@ class Prepared:
         degree = settings.method.degree if settings.method else 0
         outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
         room = Room.of(settings.memory, width, degree, outputs, arithmetic.digits)
-        recorder = Recorder(arithmetic, settings.until, degree, outputs, room)
+        recorder = Recorder(arithmetic, settings.until, degree, outputs, room, scales=dict(settings.scale))
         return Run(program, self.kernel, self.timeline, settings, make_control(settings, arithmetic), recorder)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:

@@ -24,7 +24,7 @@ from hsdsl.simulate.settings import Settings
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
 
-def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Callable[[], Execution]) -> Execution:
+def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Callable[[Execution], Execution]) -> Execution:
     """Make the execution of what the Python loop has recorded; ``again`` makes the run finer."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
@@ -50,7 +50,7 @@ def written(
     columns: Columns,
     stop: Stop,
     seconds: dict[str, float],
-    again: Callable[[], Execution],
+    again: Callable[[Execution], Execution],
 ) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 

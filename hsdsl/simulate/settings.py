@@ -38,7 +38,7 @@ class Settings:
     ``scale`` has the given sizes of states: the scale of a state is this size until the state has been larger.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
-    ``memory`` is how many bytes of rows a run may keep.
+    ``memory`` is how many bytes of rows a run may keep. ``longest_step`` bounds the steps of an adaptive method further.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -55,6 +55,7 @@ class Settings:
     method_chosen: str | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False)
     memory: int = DEFAULT.memory
+    longest_step: Number | None = None
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

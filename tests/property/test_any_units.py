@@ -156,3 +156,31 @@ experiment: {{until: {20 * scale!r}}}
     wanted = np.pi / 10 * scale * np.arange(1, 64)
     assert np.allclose(times[times > 0.01 * scale], wanted, rtol=1e-12)
     assert len(times) <= len(wanted) + 1  # at the start the surface is zero: one that is crossed then, or none
+
+
+@pytest.mark.parametrize("method", ("taylor", "dopri5", "radau"))
+def test_given_sizes_of_states_count_until_states_are_larger(method: str) -> None:
+    text = """\
+hsdsl: 1
+parameters: {size: 1e-12}
+modes:
+  a: {flow: {x: y, y: -x, z: 1e-9*cos(40*t)}, transitions: [{when: x >= 0.5, to: b, reset: {w: 0}}]}
+  b: {flow: {w: 1 - w}}
+initial: {mode: a, x: 0, y: 1, z: 0}
+experiment: {until: 5, scale: {z: size, w: 1}}
+"""
+    model = hsdsl.loads(text)
+    runs = {
+        engine: [model.simulate(engine=engine, method=method, parameters={"size": s}) for s in (1e-15, 1e3)]
+        for engine in ("c", "python")
+    }
+    for c, python in zip(*runs.values(), strict=True):
+        assert np.array_equal(c.times, python.times)
+        assert np.array_equal(c.values, python.values, equal_nan=True)
+    small, large = runs["c"]
+    assert len(large.times) <= len(small.times)
+    assert len(large.times) < len(
+        hsdsl.loads(text.replace(", scale: {z: size, w: 1}", "")).simulate(method=method).times
+    )
+    both = model.ensemble(method=method, parameters={"size": np.array([1e-15, 1e3])})
+    assert list(both.state["w"]) == [run.final.state["w"] for run in (small, large)]

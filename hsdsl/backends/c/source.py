@@ -87,7 +87,7 @@ class _Writer:
         names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
         names += [f"k{i}" for i in range(len(program.switches))]
         self.data = {name: f"p[{i}]" for i, name in enumerate(names)}
-        self.states = list(dict.fromkeys(name for mode in program.modes for name in mode.states))
+        self.states = program.all_states
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []
         self._names: dict[str, str] = {}

@@ -221,7 +221,7 @@ void hs_simulate(hs_task *task) {
   run.polled = clock();
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
-  for (int i = 0; i < run.model->states; i++) run.known[i] = 0.0;
+  for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
   if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
     located(&run, entered);

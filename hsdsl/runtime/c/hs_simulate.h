@@ -79,6 +79,7 @@ typedef struct {
   double until;
   int64_t max_transitions;
   int64_t scheme;
+  const double *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
 } hs_settings;
 
 enum { HS_FLOW, HS_STRIP };
