@@ -1,10 +1,12 @@
 """A guard that the flow reaches and has no value beyond, as that of an empty tank: h' = -sqrt(h) with h <= 0.
 
-The execution comes to the surface tangentially, in finite time. A step's polynomial turns back there, as the equation
-does not: at its end the flow still leads towards the surface.
+The execution comes to the surface tangentially, in finite time. A step's polynomial ends there, or turns back there as
+the equation does not: at its end the flow still leads towards the surface.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
@@ -12,7 +14,7 @@ from hsdsl.simulate.along import Piece, slope_of
 from hsdsl.simulate.isolate import total
 from hsdsl.simulate.run import Here, Run
 from hsdsl.simulate.spans import Span
-from hsdsl.simulate.surfaces import Crossing, at
+from hsdsl.simulate.surfaces import ROUNDOFF_UNITS, Crossing, at
 
 TURNINGS = 60  # halvings of a step
 
@@ -20,19 +22,31 @@ TURNINGS = 60  # halvings of a step
 def touched(run: Run, here: Here, span: Span, k: int, pieces: list[Piece]) -> Crossing | None:
     """Return where in a step surface k is reached so and its condition holds, on the step's own polynomial."""
     c, one = pieces[0].coefficients, run.arithmetic.zero + 1
-    if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None or not slope_of(c, one) < 0:
+    if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None:
         return None
-    if not here.kernel.rates[k](span.t1, *span.z)[0] > 0:
+    share, time, q, slope = one, span.t1, span.z, slope_of(c, one)
+    if slope > ROUNDOFF_UNITS * run.arithmetic.unit * c[1]:
         return None
+    if here.kernel.rates[k](span.t1, *span.z)[0] > 0:
+        if not slope < 0:
+            return None
+        share = turning(c, one)
+        time, q = span.t + share * span.h, at(span.x, span.piece, share)
+    elif not abs(span.ends[k]) <= here.surfaces.noise(k, span.t, span.x):
+        return None
+    if not ends_at(run, here, k, time, q):
+        return None
+    holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
+    return Crossing(k, share, time, q, run.arithmetic.zero) if holds else None
+
+
+def turning(c: Sequence[Number], one: Number) -> Number:
+    """Where in [0, 1] a polynomial turns that rises at 0 and falls at 1."""
     low, high = one * 0, one
     for _ in range(TURNINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if slope_of(c, middle) > 0 else (low, middle)
-    time, q = span.t + low * span.h, at(span.x, span.piece, low)
-    if not ends_at(run, here, k, time, q):
-        return None
-    holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
-    return Crossing(k, low, time, q, run.arithmetic.zero) if holds else None
+    return low
 
 
 def ends_at(run: Run, here: Here, k: int, time: Number, q: State) -> bool:

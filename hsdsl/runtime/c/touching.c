@@ -18,21 +18,14 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   return here->table->flow(here->p, time, run->at, run->source) || !hs_finite(sum(run->source, n));
 }
 
-/* Whether surface k rises at the start of the step and falls at its end, both by its polynomial. */
-HS_INLINE int turns_back(const hs_run *run, int k) {
-  const double *const c = coefficients_of(&run->curves, 0, k);
-  if (!(c[1] > 0) || run->curves.parts > 1 || !(run->control.tolerance > 0)) return 0;
-  return slope_of(c, *degree_of(&run->curves, 0, k), 1.0) < 0;
+/* Whether surface k rises from the start of the step, and is followed by one polynomial. */
+HS_INLINE int may_be_touched(const hs_run *run, int k) {
+  return coefficients_of(&run->curves, 0, k)[1] > 0 && run->curves.parts == 1 && run->control.tolerance > 0;
 }
 
-/* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
-static int touched(hs_run *run, int k, hs_crossing *crossing) {
-  const double *const c = coefficients_of(&run->curves, 0, k);
-  const int n = *degree_of(&run->curves, 0, k);
-  double rate, low = 0.0, high = 1.0;
-  if (!turns_back(run, k)) return 0;
-  if (run->here.table->rates[k](run->here.p, run->span.t1, run->z, &rate)) return RAISED;
-  if (!(rate > 0)) return 0;
+/* Where in [0, 1] a polynomial turns that rises at 0 and falls at 1. */
+static double turning(const double *c, int n) {
+  double low = 0.0, high = 1.0;
   for (int i = 0; i < TURNINGS; i++) {
     const double middle = (low + high) / 2;
     if (slope_of(c, n, middle) > 0)
@@ -40,11 +33,33 @@ static int touched(hs_run *run, int k, hs_crossing *crossing) {
     else
       high = middle;
   }
-  crossing->time = run->span.t + low * run->span.h;
-  at(run, &run->span.piece, low, crossing->state);
+  return low;
+}
+
+/* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
+static int touched(hs_run *run, int k, hs_crossing *crossing) {
+  const hs_span *span = &run->span;
+  const double *const c = coefficients_of(&run->curves, 0, k);
+  const int n = *degree_of(&run->curves, 0, k);
+  double rate, noise, share = 1.0;
+  if (!may_be_touched(run, k)) return 0;
+  const double slope = slope_of(c, n, 1.0);
+  if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
+  if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
+  crossing->time = span->t1;
+  copy(crossing->state, run->z, run->here.dimension);
+  if (rate > 0) {
+    if (!(slope < 0)) return 0;
+    share = turning(c, n);
+    crossing->time = span->t + share * span->h;
+    at(run, &span->piece, share, crossing->state);
+  } else {
+    if (noise_of(run, k, span->t, run->x, 0, &noise)) return RAISED;
+    if (!(fabs(run->ends[k]) <= noise)) return 0;
+  }
   const int ends = ends_at(run, k, crossing);
   if (ends != 1) return ends;
-  crossing->theta = low;
+  crossing->theta = share;
   crossing->edge = k;
   crossing->depth = 0.0;
   return k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
