@@ -109,7 +109,7 @@ class PythonKernel:
         if program.tape is None:
             return None
         if mode not in self._tapes:
-            self._tapes[mode] = compile_tape(program.tape, len(program.all_states), self.arithmetic, f"mode {mode}")
+            self._tapes[mode] = compile_tape(program.tape, len(program.states), self.arithmetic, f"mode {mode}")
         return self._tapes[mode](data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
@@ -118,7 +118,7 @@ class PythonKernel:
         if mode not in self._jacobians:
             text = program.jacobian.routines
             self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
-        size = len(program.all_states) ** 2
+        size = len(program.states) ** 2
         return _spread_out(self._jacobians[mode](*data)[0], program.jacobian.places, size, self.arithmetic.zero)
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:

@@ -95,7 +95,7 @@ class Prepared:
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
-        longest = max(np.diff(execution.times), default=self.settings.until)
+        longest: Number = np.diff(execution.times).max(initial=0) or self.settings.until
         if longest not in self.finer:
             settings, plan = finer_settings(self.settings, longest, self.kernel.arithmetic), self.plan
             if plan is not None:

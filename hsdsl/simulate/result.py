@@ -21,10 +21,11 @@ from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 
+Repetition = Callable[[Execution], Execution]
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
 
-def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Callable[[Execution], Execution]) -> Execution:
+def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repetition) -> Execution:
     """Make the execution of what the Python loop has recorded; ``again`` makes the run finer."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
@@ -50,7 +51,7 @@ def written(
     columns: Columns,
     stop: Stop,
     seconds: dict[str, float],
-    again: Callable[[Execution], Execution],
+    again: Repetition,
 ) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 

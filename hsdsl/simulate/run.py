@@ -99,7 +99,7 @@ class Run:
         """
         segment = self.timeline.at(t)
         program, kernel = self.program.modes[mode], self.kernel.bind(mode, segment.data)
-        outputs = kernel.outputs if program.all_states == states else None
+        outputs = kernel.outputs if program.states == states else None
         if outputs is None and before is not None and before.mode.states == states:
             outputs = before.kernel.outputs
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)

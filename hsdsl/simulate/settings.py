@@ -38,7 +38,8 @@ class Settings:
     ``scale`` has the given sizes of states: the scale of a state is this size until the state has been larger.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
-    ``memory`` is how many bytes of rows a run may keep. ``longest_step`` bounds the steps of an adaptive method further.
+    ``memory`` is how many bytes of rows a run may keep.
+    ``longest_step`` bounds the steps of an adaptive method further.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 

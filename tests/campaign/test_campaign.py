@@ -42,7 +42,7 @@ class Run(NamedTuple):
         return all(abs(a - b) <= WITHIN * self.until for a, b in zip(self.right.times, self.found.times, strict=True))
 
 
-def _model(family: Family) -> hsdsl.Model:
+def model_of(family: Family) -> hsdsl.Model:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.yaml"
         path.write_text(family.text)
@@ -51,7 +51,7 @@ def _model(family: Family) -> hsdsl.Model:
 
 def runs(family: Family, count: int, seed: str, scheme: str) -> Iterator[Run]:
     """Run so many draws of a family."""
-    model, r = _model(family), random.Random(seed)
+    model, r = model_of(family), random.Random(seed)
     for _ in range(count):
         values = family.draw(r)
         asked = {"scheme": scheme, "method": r.choice(METHODS)}

@@ -48,7 +48,7 @@ def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transitio
     """How often the error fits into what keeps the crossing; None where nothing tells."""
     if run.errors is None:
         return None
-    shift = run.shift(place, k, run.row_at(made.time))
+    shift = run.shift(place, k, run.row_before(made))
     rate, bend = place.rate(k), run.arithmetic.zero
     if arc is not None:
         before = run.between(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
@@ -77,7 +77,7 @@ def _findings(
         )
     if run.errors is None:
         return found
-    error = run.around(place, run.row_at(made.time))
+    error = run.around(place, run.row_before(made))
     if place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found

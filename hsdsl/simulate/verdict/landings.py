@@ -79,13 +79,13 @@ def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
     target = before.mode.edges[edge].target
     if k == edge and target == run.index(made.source) and _untouched(before, edge):
         return True
-    for moved in _along(run, before, edge, run.around(before, run.row_at(made.time))):
+    for moved in _along(run, before, edge, run.around(before, run.row_before(made))):
         landed = before.kernel.resets[edge](made.time, *moved)
         after = run.place(target, made.time, landed)
         here = before.kernel.resets[edge](made.time, *before.x)
         slopes = after.kernel.gradients[k](after.t, *after.x)[1:]
         change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, landed, here, strict=True)), run.arithmetic.zero)
-        if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_at(made.time)):
+        if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_before(made)):
             return False
     return True
 
@@ -122,7 +122,7 @@ def _continuous(run: Looking, made: Transition) -> Iterator[Finding]:
     edge = place.mode.edges[k]
     if made.after is None or not any(map(JUMPS.search, edge.reset_texts)):
         return
-    error = run.around(place, run.row_at(made.time))
+    error = run.around(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
     least = [64 * float(run.arithmetic.unit) * abs(float(v)) for v in made.after.values()]
     if any(a > b and c < a * WIDER / 2 for a, b, c in zip(narrow, least, wide, strict=True)):

@@ -100,8 +100,8 @@ class Looking:
 
     @property
     def relied_transitions(self) -> list[Transition]:
-        """The transitions made before the run becomes unreliable."""
-        return [made for made in self.transitions if made.time < self.upto]
+        """The transitions made until the run becomes unreliable: the last one may be why."""
+        return [made for made in self.transitions if made.time <= self.upto]
 
     @cached_property
     def crossed(self) -> dict[int, int]:
@@ -203,6 +203,11 @@ class Looking:
     def row_at(self, t: Number) -> int:
         """The last row before a time, or at it."""
         return max(0, bisect_right(self.times, t) - 1)
+
+    def row_before(self, made: Transition) -> int:
+        """The last row before a transition."""
+        arc = self.execution.arcs[int(np.searchsorted(self.execution.arc_table.jump, made.index, "right")) - 1]
+        return arc.last
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are the same instant."""
