@@ -23,7 +23,7 @@ COMPILED = [
 ]
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
 FLOATS = {name: setting for name, setting in SETTINGS.items() if "precision" not in setting}
-LONG = ("m4-chattering", "zeno-ball")  # tens of thousands of transitions
+LONG = ("m4-chattering", "m10-sliding", "zeno-ball")  # tens of thousands of transitions
 SHORT = {"stiff-switch": {"until": "1e-4"}}  # explicit steps on it are a ten-millionth long
 OVER_BOTH = ("midpoint", "adaptive")
 # steps that fall on nothing, a relaxation large enough for strips to be seen, few transitions: the loop is what counts
