@@ -95,7 +95,7 @@ class Prepared:
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
-        longest: Number = np.diff(execution.times).max(initial=0) or self.settings.until
+        longest: Number = max(np.diff(execution.times).tolist(), default=self.settings.until) or self.settings.until
         if longest not in self.finer:
             settings, plan = finer_settings(self.settings, longest, self.kernel.arithmetic), self.plan
             if plan is not None:
