@@ -14,20 +14,18 @@ import sympy as sp
 from sympy.printing.precedence import PRECEDENCE, precedence
 from sympy.printing.pycode import PythonCodePrinter
 
+from hsdsl.functions import FUNCTIONS
+
 LARGEST_PRODUCT = 8
 
 _NAMES = {
     "absolute": "abs",
     "Abs": "abs",
-    "sign": "sign",
-    "floor": "floor",
     "minimum": "min",
     "maximum": "max",
     "Min": "min",
     "Max": "max",
-    "Heaviside": "heaviside",
-    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log")},
-    **{name: name for name in ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")},
+    **{name: name for name in FUNCTIONS if name not in ("abs", "min", "max", "sqrt")},
 }
 
 # SymPy makes these by itself: tan(pi/3 - x) becomes cot(x + pi/6)
@@ -68,8 +66,7 @@ class KernelPrinter(PythonCodePrinter):
         name = _NAMES[type(expr).__name__]
         return f"{name}({', '.join(self._print(a) for a in expr.args)})"
 
-    _print_Abs = _print_sign = _print_floor = _print_log = _print_Function
-    _print_Min = _print_Max = _print_Function
+    _print_Abs = _print_sign = _print_floor = _print_log = _print_Min = _print_Max = _print_Function
 
     def _print_Heaviside(self, expr):
         return f"heaviside({self._print(expr.args[0])})"
@@ -118,10 +115,10 @@ class KernelPrinter(PythonCodePrinter):
         return text
 
     def _print_And(self, expr):
-        return "(" + " and ".join(self._print(a) for a in sorted(expr.args, key=sp.default_sort_key)) + ")"
+        word = " and " if isinstance(expr, sp.And) else " or "
+        return "(" + word.join(self._print(a) for a in sorted(expr.args, key=sp.default_sort_key)) + ")"
 
-    def _print_Or(self, expr):
-        return "(" + " or ".join(self._print(a) for a in sorted(expr.args, key=sp.default_sort_key)) + ")"
+    _print_Or = _print_And
 
     def _print_Not(self, expr):
         return f"(not {self._print(expr.args[0])})"

@@ -77,7 +77,7 @@ class _Writer:
         return self._known[expr]
 
     def _write(self, expr) -> int:
-        if self._still(expr):
+        if self._is_constant(expr):
             return self._operation("constant", constant=expr)
         if expr.is_Add:
             return self._sum(expr)
@@ -90,7 +90,7 @@ class _Writer:
             raise Kinked(name)
         return _DERIVATIVES[name](self, *map(self.line, expr.args))
 
-    def _still(self, expr) -> bool:
+    def _is_constant(self, expr) -> bool:
         return not (expr.free_symbols & self._moving)
 
     def _operation(self, kind: str, *lines: int, constant=None) -> int:
@@ -134,27 +134,27 @@ class _Writer:
 
     def _sum(self, expr) -> int:
         terms = expr.as_ordered_terms()
-        moving = [t for t in terms if not self._still(t)]
+        moving = [t for t in terms if not self._is_constant(t)]
         total = self.line(moving[0])
         for term in moving[1:]:
             negative = term.could_extract_minus_sign()
             total = self._operation("sub" if negative else "add", total, self.line(-term if negative else term))
-        still = sp.Add(*(t for t in terms if self._still(t)))
-        return total if still == 0 else self._operation("offset", total, constant=still)
+        constant = sp.Add(*(t for t in terms if self._is_constant(t)))
+        return total if constant == 0 else self._operation("offset", total, constant=constant)
 
     def _product(self, expr) -> int:
-        still = sp.Mul(*(f for f in expr.args if self._still(f)))
-        moving = [f for f in expr.args if not self._still(f)]
+        constant = sp.Mul(*(f for f in expr.args if self._is_constant(f)))
+        moving = [f for f in expr.args if not self._is_constant(f)]
         below = [1 / f for f in moving if f.is_Pow and f.exp.is_Number and f.exp < 0]
         above = [f for f in moving if not (f.is_Pow and f.exp.is_Number and f.exp < 0)]
         if not above:
-            return self._operation("under", self._factors(below), constant=still)
+            return self._operation("under", self._factors(below), constant=constant)
         line = self._factors(above)
         if below:
             line = self._operation("div", line, self._factors(below))
-        if still == -1:
+        if constant == -1:
             return self._operation("neg", line)
-        return line if still == 1 else self._operation("scale", line, constant=still)
+        return line if constant == 1 else self._operation("scale", line, constant=constant)
 
     def _factors(self, factors) -> int:
         line = self.line(factors[0])
@@ -163,9 +163,9 @@ class _Writer:
         return line
 
     def _power(self, base, exponent) -> int:
-        if self._still(base):
+        if self._is_constant(base):
             return self.line(sp.exp(exponent * sp.log(base), evaluate=False))
-        if not self._still(exponent):
+        if not self._is_constant(exponent):
             return self.line(sp.exp(exponent * sp.log(base, evaluate=False), evaluate=False))
         if exponent.is_Number and exponent < 0:
             return self._operation("under", self.line(base**-exponent), constant=_ONE)
@@ -204,11 +204,11 @@ class _Writer:
         self.slope(u)
         return self.chain("exp", u, self.ahead(0))
 
-    def log(self, u: int) -> int:
-        """Z' = u'/u."""
-        return self.chain("log", u, self._operation("under", u, constant=_ONE))
+    def pair(self, first: str, second: str, u: int, turn: bool) -> int:
+        """Two functions that are each other's derivative; with ``turn`` that of the second one up to sign.
 
-    def _pair(self, first: str, second: str, u: int, turn: bool) -> tuple[int, int]:
+        The second one is the next line.
+        """
         key = (first, u)
         if key not in self._known:
             self.slope(u)
@@ -216,25 +216,10 @@ class _Writer:
             self.chain(second, u, self.ahead(1) if turn else one)
             if turn:
                 self._operation("neg", one)
-        return self._known[key], self._known[key] + 1
+        return self._known[key]
 
-    def sin(self, u: int) -> int:
-        """Sine and cosine together: each is the other's derivative, up to sign."""
-        return self._pair("sin", "cos", u, turn=True)[0]
-
-    def cos(self, u: int) -> int:
-        """See :meth:`sin`."""
-        return self._pair("sin", "cos", u, turn=True)[1]
-
-    def sinh(self, u: int) -> int:
-        """Hyperbolic sine and cosine together."""
-        return self._pair("sinh", "cosh", u, turn=False)[0]
-
-    def cosh(self, u: int) -> int:
-        """See :meth:`sinh`."""
-        return self._pair("sinh", "cosh", u, turn=False)[1]
-
-    def _own_square(self, name: str, u: int, negative: bool) -> int:
+    def tangent(self, name: str, u: int, negative: bool) -> int:
+        """Z' = (1 + z**2) u', or (1 - z**2) u'."""
         self.slope(u)
         z = self.chain(name, u, self.ahead(3 if negative else 2))
         square = self._operation("mul", z, z)
@@ -243,15 +228,11 @@ class _Writer:
         self._operation("offset", square, constant=_ONE)
         return z
 
-    def tan(self, u: int) -> int:
-        """Z' = (1 + z**2) u'."""
-        return self._own_square("tan", u, negative=False)
+    def reciprocal(self, u: int) -> int:
+        """1/u."""
+        return self._operation("under", u, constant=_ONE)
 
-    def tanh(self, u: int) -> int:
-        """Z' = (1 - z**2) u'."""
-        return self._own_square("tanh", u, negative=True)
-
-    def _algebraic(self, name: str, u: int, sign: int, offset: int, root: bool, scale: int = 1) -> int:
+    def algebraic(self, name: str, u: int, sign: int, offset: int, root: bool, scale: int = 1) -> int:
         """Z' = scale u' / (offset + sign u**2), or with the square root of that."""
         line = self._operation("mul", u, u)
         if sign < 0:
@@ -271,11 +252,19 @@ class _Writer:
 
 
 _DERIVATIVES = {
-    **{name: getattr(_Writer, name) for name in ("exp", "log", "sin", "cos", "sinh", "cosh", "tan", "tanh", "atan2")},
-    "atan": lambda w, u: w._algebraic("atan", u, 1, 1, root=False),
-    "atanh": lambda w, u: w._algebraic("atanh", u, -1, 1, root=False),
-    "asin": lambda w, u: w._algebraic("asin", u, -1, 1, root=True),
-    "acos": lambda w, u: w._algebraic("acos", u, -1, 1, root=True, scale=-1),
-    "asinh": lambda w, u: w._algebraic("asinh", u, 1, 1, root=True),
-    "acosh": lambda w, u: w._algebraic("acosh", u, 1, -1, root=True),
+    "exp": _Writer.exp,
+    "log": lambda w, u: w.chain("log", u, w.reciprocal(u)),
+    "sin": lambda w, u: w.pair("sin", "cos", u, turn=True),
+    "cos": lambda w, u: w.pair("sin", "cos", u, turn=True) + 1,
+    "sinh": lambda w, u: w.pair("sinh", "cosh", u, turn=False),
+    "cosh": lambda w, u: w.pair("sinh", "cosh", u, turn=False) + 1,
+    "tan": lambda w, u: w.tangent("tan", u, negative=False),
+    "tanh": lambda w, u: w.tangent("tanh", u, negative=True),
+    "atan2": _Writer.atan2,
+    "atan": lambda w, u: w.algebraic("atan", u, 1, 1, root=False),
+    "atanh": lambda w, u: w.algebraic("atanh", u, -1, 1, root=False),
+    "asin": lambda w, u: w.algebraic("asin", u, -1, 1, root=True),
+    "acos": lambda w, u: w.algebraic("acos", u, -1, 1, root=True, scale=-1),
+    "asinh": lambda w, u: w.algebraic("asinh", u, 1, 1, root=True),
+    "acosh": lambda w, u: w.algebraic("acosh", u, 1, -1, root=True),
 }

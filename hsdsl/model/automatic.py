@@ -1,4 +1,4 @@
-"""What `method: auto` is, for one run: chosen before it starts, from the expressions and from the start's surroundings.
+"""The method that `auto` is for one run: chosen before it starts, from the expressions and the start's surroundings.
 
 With a fixed step it is the table `dopri5`. With a tolerance it is
 
@@ -8,16 +8,16 @@ With a fixed step it is the table `dopri5`. With a tolerance it is
 `dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor` of a state, or no derivatives at the start
 ========= ============================================================================================
 
-A mode is called stiff where both hold at all of the last points of a short way along the flow from the start:
+A mode is stiff where both hold at the last points of a short way along the flow from the start:
 
 - the fastest decay, the largest -Re of an eigenvalue of the flow's Jacobian that does not oscillate faster than it
   decays, would alone keep an explicit method to :data:`LEAST_STEPS` steps until the end;
 - the curve there is straight, to a hundredth of the largest that each state has been, for at least :data:`APART` times
   of that decay.
 
-The way is one of linearly implicit steps of order 2, each no longer than twice the fast decay and than the curve is
-straight: what decays fast decays on it, and what oscillates goes on. Guards do not count, and what lies far from the
-start is not program_cache. With a precision asked for nothing is looked at, and no stiffness is found.
+The way has linearly implicit steps of order 2, each at most twice as long as the fast decay and as the straight part of
+the curve: fast decays decay on it, and oscillations go on. Guards do not count, and nothing far from the start is seen.
+A run with a precision is not examined, and counts as not stiff.
 """
 
 from __future__ import annotations
@@ -60,29 +60,28 @@ class Stiffness:
 def chosen(
     settings: Settings, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
 ) -> Settings:
-    """Return the settings with the method that `auto` is for them, and why."""
-    method, why = _chosen(settings, program, kernel, timeline, mode, x)
+    """The settings with the method that `auto` is for them, and the reason."""
+    method, why = METHODS[AUTO], "the step is fixed"
+    if settings.tolerance is not None:
+        method, why = _adaptive(float(settings.until), program, kernel, timeline, mode, x)
     if isinstance(method, TaylorMethod):
         method = method.for_tolerance(settings.tolerance, kernel.arithmetic)
     return replace(settings, method=method, method_chosen=f"{method.name}: {why}")
 
 
-def _chosen(
-    settings: Settings, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
+def _adaptive(
+    until: float, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
 ) -> tuple[Method, str]:
-    if settings.tolerance is None:
-        return METHODS[AUTO], "the step is fixed"
-    if kernel.arithmetic.digits is None:
-        near = list(_near(program, mode, len(x)))
-        for k in near:
-            stiff = stiffness(kernel, timeline, program.modes[k].name, k, x, float(settings.until))
-            if stiff is not None:
-                return METHODS["radau"], str(stiff)
-        if mode in near and not _has_derivatives(kernel, timeline, mode, x):
-            return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
-    for each in program.modes:
-        if each.tape is None:
-            return METHODS[AUTO], f"the flow of {each.name} has abs, sign, min, max or floor of a state"
+    near = list(_near(program, mode, len(x))) if kernel.arithmetic.digits is None else []
+    for k in near:
+        stiff = stiffness(kernel, timeline, program.modes[k].name, k, x, until)
+        if stiff is not None:
+            return METHODS["radau"], str(stiff)
+    if mode in near and not _has_derivatives(kernel, timeline, mode, x):
+        return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
+    kinked = next((each.name for each in program.modes if each.tape is None), None)
+    if kinked is not None:
+        return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max or floor of a state"
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
@@ -95,7 +94,7 @@ def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[
 
 
 def _near(program: Program, mode: int, states: int) -> Iterator[int]:
-    """The mode of the start and those its edges lead to, where they have as many states: x is a point of theirs."""
+    """The mode of the start and those its edges lead to, where they have as many states, so that x is in them."""
     if states == 0 or states > MOST_STATES:
         return
     targets = dict.fromkeys((mode, *(edge.target for edge in program.modes[mode].edges)))
@@ -105,12 +104,12 @@ def _near(program: Program, mode: int, states: int) -> Iterator[int]:
 def stiffness(
     kernel: Kernel, timeline: Timeline, name: str, mode: int, x: Sequence[Number], until: float
 ) -> Stiffness | None:
-    """Return how stiff a mode is near x at t = 0, None where it is not."""
+    """The stiffness of a mode near x at t = 0, None where it is not stiff."""
     try:
         look = _Look(kernel, timeline, mode, np.array(x, float))
         if look.decay() * until < LEAST_STEPS * REACH:
             return None
-        found = None
+        stiff = None
         for count in range(STEPS):
             decay = look.decay()
             if decay * until < LEAST_STEPS * REACH:
@@ -118,11 +117,11 @@ def stiffness(
             straight = look.straight(decay)
             if count >= STEPS - LAST and straight * decay < APART:
                 return None
-            found = Stiffness(name, 1 / decay, straight)
+            stiff = Stiffness(name, 1 / decay, straight)
             look.step(min(LENGTH / decay, straight))
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
-        return None  # it cannot be told here
-    return found
+        return None  # unknown
+    return stiff
 
 
 class _Look:

@@ -1,9 +1,9 @@
-"""How wrong is a run? The same run again, finer, and how far apart the two are."""
+"""The error of a run, estimated by the same run made finer and the distance of the two."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from hsdsl.arithmetic import Number
@@ -23,7 +23,7 @@ class Estimate:
     Attributes
     ----------
     settings : dict
-        What the finer run used.
+        The settings of the finer run that differ.
     same_transitions : bool
         Whether both made the same transitions in the same order and stopped alike.
     time : Number or None
@@ -42,18 +42,12 @@ class Estimate:
     largest: dict[str, Number] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Return the ``estimate`` object of ``hsdsl run --estimate --json``."""
-        return {
-            "settings": self.settings,
-            "same_transitions": self.same_transitions,
-            "time": self.time,
-            "final": self.final,
-            "largest": self.largest,
-        }
+        """The ``estimate`` object of ``hsdsl run --estimate --json``."""
+        return asdict(self)
 
     @property
     def sentence(self) -> str:
-        """What the estimate says, for a person."""
+        """The estimate, for a person."""
         finer = ", ".join(f"{name} {show(value)}" for name, value in self.settings.items())
         if not self.same_transitions:
             return f"estimate: unknown; the finer run ({finer}) makes other transitions, so neither can be trusted"
@@ -67,31 +61,32 @@ class Estimate:
         )
 
 
-def estimate(execution: Execution) -> Estimate:
+def estimate(run: Execution) -> Estimate:
     """Compare a run with the same run made finer.
 
     Raises
     ------
     UsageError
-        The execution was read from a file, so that it cannot be run again.
+        The run was read from a file, so that it cannot be run again.
     """
-    finer = execution.finer
+    finer = run.finer
     if finer is None:
         raise UsageError("an execution that was read from a file cannot be run again, so its error is not estimated")
-    given, tie = execution.settings, TIE * float(execution.time_span[1])
-    errors = Errors(execution, finer, float(given.get("tolerance") or 0), 0.0, tie)
-    changed = {
-        k: finer.settings[k] for k in ("step", "tolerance", "relaxation") if finer.settings.get(k) != given.get(k)
-    }
-    same = errors.parted is None
-    a, b = execution.final, finer.final
-    comparable = same and (a.mode, list(a.state)) == (b.mode, list(b.state))
+    given, tie = run.settings, TIE * float(run.time_span[1])
+    errors = Errors(run, finer, float(given.get("tolerance") or 0), 0.0, tie)
+    sizes = {k: finer.settings.get(k) for k in ("step", "tolerance", "relaxation")}
+    changed = {k: value for k, value in sizes.items() if value != given.get(k)}
+    if errors.parted is not None:
+        return Estimate(changed, False, None, None)
+    a, b = run.final, finer.final
+    comparable = (a.mode, list(a.state)) == (b.mode, list(b.state))
+    pairs = zip(corrected_times(run.transitions), corrected_times(finer.transitions), strict=False)
     return Estimate(
         changed,
-        same,
-        _time(execution, finer) if same else None,
+        True,
+        max((abs(one - other) for one, other in pairs), default=None),
         {name: abs(a.state[name] - b.state[name]) for name in a.state} if comparable else None,
-        _largest(execution, finer, float(errors.late[-1]) if len(errors.late) else 0.0) if same else None,
+        _largest(run, finer, float(errors.late[-1]) if len(errors.late) else 0.0),
     )
 
 
@@ -99,35 +94,27 @@ def _largest(coarse: Execution, fine: Execution, apart: float) -> dict[str, Numb
     start, end = coarse.time_span[0], min(coarse.time_span[1], fine.time_span[1])
     step = (end - start) / SAMPLES
     grid = [start + step * k for k in range(SAMPLES)] + [end]
-    clear = [t for t in grid if not any(_close(run, t, 2 * apart) for run in (coarse, fine))]
+    clear = [t for t in grid if not any(_is_near_transition(run, t, 2 * apart) for run in (coarse, fine))]
     if not clear:
         return None
     a, b = coarse.sample(clear), fine.sample(clear)
-    found: dict[str, Number] = {}
+    largest: dict[str, Number] = {}
     for name in (name for name in a.states if name in b.states):
-        differences = [abs(x - y) for x, y in zip(a[name].tolist(), b[name].tolist(), strict=True)]
+        differences = (abs(x - y) for x, y in zip(a[name].tolist(), b[name].tolist(), strict=True))
         if known := [d for d in differences if d == d]:
-            found[name] = max(known)
-    return found or None
+            largest[name] = max(known)
+    return largest or None
 
 
-def _close(run: Execution, t: Number, margin: Number) -> bool:
-    """Whether a transition of a run, or a wait behind one, is near a time."""
+def _is_near_transition(run: Execution, t: Number, margin: Number) -> bool:
+    """Whether a transition of a run, or the wait after one, is near a time."""
     times = run.transitions
-    k = bisect_right(times, t + margin, key=lambda made: made.time) - 1
-    if k < 0:
-        return False
-    resumed = times[k].resumed
-    return resumed is None or t - margin <= resumed
-
-
-def _time(execution: Execution, finer: Execution) -> Number | None:
-    pairs = zip(corrected_times(execution.transitions), corrected_times(finer.transitions), strict=False)
-    return max((abs(one - other) for one, other in pairs), default=None)
+    k = bisect_right(times, t + margin, key=lambda transition: transition.time) - 1
+    return k >= 0 and (times[k].resumed is None or t - margin <= times[k].resumed)
 
 
 def corrected_times(transitions: tuple[Transition, ...]) -> list[Number]:
-    """Return transition times less the time spent in strips before them."""
+    """Transition times less the time spent in strips before them."""
     times: list[Number] = []
     spent = 0
     for transition in transitions:

@@ -1,6 +1,6 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
-"""Whether a model is one mass against one stop, and its numbers: what the scheme paoli-schatzman can run."""
+"""One mass against one stop: recognised in a model, with its numbers, for the scheme paoli-schatzman."""
 
 from __future__ import annotations
 
@@ -21,14 +21,7 @@ HINT = "use scheme 'relaxed'"
 
 
 def one_stop(values: Values, x: tuple[Number, ...]) -> OneStop:
-    """Recognise x' = v, v' = f(t) - 2 a v - k x with one stop on x and v -> -c v there.
-
-    Parameters
-    ----------
-    values : Values
-        The model with its parameters' values.
-    x : tuple of Number
-        The state a run starts from.
+    """Recognise x' = v, v' = f(t) - 2 a v - k x with one stop on x and v -> -c v there; a run starts from ``x``.
 
     Raises
     ------
@@ -54,7 +47,7 @@ def _refusal(reason: str) -> UsageError:
 
 
 def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
-    """Return which of the two states is the position, and the numbers as expressions of parameters."""
+    """The index of the position among the two states, and the numbers as expressions of parameters."""
     mode, edge = _only(system)
     symbols = [symbol(name) for name in mode.states]
     known = set(system.parameter_symbols)
@@ -82,23 +75,23 @@ def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
 
 
 def _only(system: HybridSystem) -> tuple[Mode, Edge]:
-    """Return the one mode and its one transition."""
-    if len(system.modes) != 1:
-        raise _refusal(f"there are {len(system.modes)} modes")
-    mode = system.modes[0]
-    if len(mode.states) != 2:
-        raise _refusal(f"mode {mode.name} has {len(mode.states)} states, not a position and its velocity")
-    if mode.walls:
-        raise _refusal(f"mode {mode.name} has a wall, {mode.walls[0].text}")
-    if len(mode.edges) != 1:
-        raise _refusal(f"mode {mode.name} has {len(mode.edges)} transitions")
-    if mode.edges[0].condition is not None:
-        raise _refusal(f"transition {mode.edges[0].name} has an `if`")
-    return mode, mode.edges[0]
+    """The one mode and its one transition."""
+    mode, *others = system.modes
+    edges = mode.edges
+    for wrong, reason in (
+        (others, f"there are {len(system.modes)} modes"),
+        (len(mode.states) != 2, f"mode {mode.name} has {len(mode.states)} states, not a position and its velocity"),
+        (mode.walls, f"mode {mode.name} has a wall, {', '.join(wall.text for wall in mode.walls[:1])}"),
+        (len(edges) != 1, f"mode {mode.name} has {len(edges)} transitions"),
+        (any(e.condition is not None for e in edges), f"transition {', '.join(e.name for e in edges)} has an `if`"),
+    ):
+        if wrong:
+            raise _refusal(reason)
+    return mode, edges[0]
 
 
 def _position(edge: Edge, symbols: list[sp.Symbol], known: set[sp.Symbol]) -> int:
-    """Return which state the guard is a level of."""
+    """The index of the state that the guard is a level of."""
     residual = edge.surface.residual
     for k, x in enumerate(symbols):
         slope = residual.diff(x)

@@ -1,4 +1,4 @@
-"""``Model``: what can be done with a model, by name; what it is made of is in `hsdsl.model.pipeline`."""
+"""``Model``: a checked model with its operations; its stages are in `hsdsl.model.pipeline`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
     path : path
         A YAML file in the language; `-` is standard input.
     limits : Limits, optional
-        What the file may ask for, and where its data may lie, where the defaults are not to hold.
+        Caps on the file, and folders for its data, in place of the defaults.
     text : bytes, optional
         The file's content, where it is not to be read from ``path``.
 
@@ -73,9 +73,9 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
 
 
 class Model:
-    """A checked model. ``system`` is the mathematics, ``program`` what an engine runs, ``pipeline`` holds both.
+    """A checked model. ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` holds both.
 
-    It is what was read when it was loaded, also where its file changes later, and it can be pickled.
+    It stays as it was loaded, also where its file changes later, and it can be pickled.
     """
 
     def __init__(self, of: HybridSystem | Pipeline) -> None:
@@ -159,14 +159,9 @@ class Model:
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional
-            States and outputs that are asked for; states that none of them depends on are not integrated. The run is
-            that of :meth:`only`.
+            States and outputs; states that none of them depends on are not integrated (see :meth:`only`).
         watch : callable, optional
             Given the recorder before the run starts.
-
-        Returns
-        -------
-        Execution
 
         Raises
         ------
@@ -221,12 +216,12 @@ class Model:
         watch : callable, optional
             As for :meth:`simulate`.
         **asked
-            What else :meth:`simulate` takes, but ``precision`` and ``samples``.
+            Further arguments of :meth:`simulate`, but ``precision`` and ``samples``.
 
         Raises
         ------
         UsageError
-            What cannot be served: no compiled engine, a file that cannot be written, a full disk.
+            There is no compiled engine, the file cannot be written, or the disk is full.
         """
         from hsdsl.model.stream import check, stream
 
@@ -262,13 +257,12 @@ class Model:
         progress : callable, optional
             Called now and then with how many instances are done and how many there are.
         **asked
-            What else :meth:`simulate` takes for every instance: ``until``, ``scheme``, ``method``, ``step``,
-            ``tolerance``, ``relaxation``, ``max_transitions``, ``settings``, ``engine``.
+            Further arguments of :meth:`simulate` for every instance, but ``precision`` and ``outputs``.
 
         Raises
         ------
         UsageError
-            What cannot be served: a name, arrays of different shapes, no instance that can be run.
+            An unknown name, arrays of different shapes, or no instance that can be run.
         """
         from hsdsl.model.ensemble import run_ensemble
 
@@ -276,20 +270,10 @@ class Model:
         return run_ensemble(self, call, samples, transition_times, threads, progress)
 
     def only(self, asked: Sequence[str]) -> Model:
-        """Return the model with the states and outputs asked for and those they, or any transition, depend on.
+        """Return the model with these states and outputs and those they, or any transition, depend on.
 
-        What stays runs as a model written without the rest: adaptive steps follow what stays alone, and a state that
+        It runs as a model written without the rest: adaptive steps follow the remaining states alone, and a state that
         is left out can neither stop a run nor keep one from coming to rest.
-
-        Parameters
-        ----------
-        asked : sequence of str
-            Names of states and outputs.
-
-        Raises
-        ------
-        UsageError
-            A name that the model does not have.
         """
         names = tuple(sorted(set(asked)))
         for name in names:
@@ -309,16 +293,9 @@ class Model:
     def plot(
         self, execution: Execution, path: str | os.PathLike[str], parameters: Mapping[str, Any] | None = None
     ) -> None:
-        """Draw an execution of this model, with the levels of its guards; see `hsdsl.plot`.
+        """Draw an execution of this model to a .png, .svg or .html file, with the levels of its guards.
 
-        Parameters
-        ----------
-        execution : Execution
-            What to draw.
-        path : path
-            A name ending in .png, .svg or .html.
-        parameters : mapping, optional
-            The overrides the execution was run with: guards' levels depend on them.
+        The levels depend on ``parameters``, the overrides of the run.
         """
         from hsdsl.model.guards import guard_lines
         from hsdsl.plot import plot
@@ -354,7 +331,7 @@ class Model:
             The most passages of a path; left out, eight more than the fewest that connect the modes. The lower end
             holds for paths with more, too.
         seconds : float
-            About how long the search may take; then the interval is what is known by then, and ``certified`` says so.
+            The time for the search. After it the interval is wider, and ``certified`` says so.
         plot : path, optional
             Draw the shortest path found there (.png or .svg), where its modes have two coordinates.
 

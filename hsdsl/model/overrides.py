@@ -19,35 +19,28 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
     UsageError
         A text is not of that form.
     """
-    parameters: dict[str, str] = {}
-    initial: dict[str, str] = {}
-    settings: dict[str, str] = {}
+    groups: dict[str, dict[str, str]] = {"": {}, "initial": {}, "experiment": {}}
     for pair in pairs:
         name, equals, value = (part.strip() for part in pair.partition("="))
         if not (name and equals and value):
-            raise UsageError(f"--set wants NAME=VALUE, not '{pair}'", "for example --set c=0.8 or --set initial.v=20")
+            hint = "for example --set c=0.8 or --set initial.v=20"
+            raise UsageError(f"--set: expected NAME=VALUE, got '{pair}'", hint)
         group, dot, rest = name.partition(".")
-        if not dot:
-            parameters[name] = value
-        elif group == "initial":
-            initial[rest] = value
-        elif group == "experiment":
-            settings[rest] = value
-        else:
+        if dot and group not in ("initial", "experiment"):
             hint = did_you_mean(group, ("initial", "experiment"))
             raise UsageError(f"--set reaches NAME, initial.NAME and experiment.NAME, not '{name}'", hint)
+        groups[group if dot else ""][rest if dot else name] = value
+    parameters, initial, settings = groups.values()
     return parameters, initial, settings
 
 
-def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], request: Options) -> dict[str, Any]:
-    """Gather what a run is asked beyond its file, by the names of `--set`, each value as it was written."""
-    asked = {key: given.value for key, given in request.values.items() if given.origin not in (FILE, DEFAULT)}
-    found = {**parameters, **_below("initial", initial), **_below("experiment", asked)}
+def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], options: Options) -> dict[str, Any]:
+    """The overrides of a run, by the names of `--set`, each value as it was written."""
+    given = {key: option.value for key, option in options.values.items() if option.origin not in (FILE, DEFAULT)}
+    found = dict(parameters)
+    for group, values in (("initial", initial), ("experiment", given)):
+        found |= {f"{group}.{name}": value for name, value in values.items()}
     return {name: _written(value) for name, value in found.items()}
-
-
-def _below(group: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    return {f"{group}.{name}": value for name, value in given.items()}
 
 
 def _written(value: Any) -> Any:

@@ -1,10 +1,9 @@
-"""Points of a model's space, as people write them: ``free x=13 v=5``."""
+"""Points of a model's space, written as ``free x=13 v=5``, and the distance between two of them."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -36,32 +35,32 @@ def distance_of_points(
     plot: str | os.PathLike[str] | None = None,
 ) -> PointDistance:
     """Return how far apart two points of a model's space are; see `Model.distance`."""
-    if metric in CURVE_METRICS and metric not in METRICS:
+    if metric not in METRICS and metric in CURVE_METRICS:
         raise UsageError(
             f"'{metric}' is a distance between runs, not between points", f"between points: {' or '.join(METRICS)}"
         )
     if metric not in METRICS:
         raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, METRICS))
-    depth = None if metric == "quotient" else _relaxation(values, relaxation)
     if metric == "quotient" and relaxation is not None:
         raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
+    depth = None if metric == "quotient" else _relaxation(values, relaxation)
     check_hops(hops)
     space = make_space(values.system, [float(v) for v in values.parameters])
-    start, end = (read_place(values, space, given) if isinstance(given, str) else given for given in (p, q))
-    _check_inside(space, start, end)
-    budget.start()
+    start, end = (read_point(values, space, given) if isinstance(given, str) else given for given in (p, q))
     try:
-        found = distance(space, start, end, depth, hops, budget)
+        _check_inside(space, start, end)
+        budget.start()
+        result = distance(space, start, end, depth, hops, budget)
     except ValueError as error:
         raise UsageError(str(error)) from error
     if plot is not None:
         from hsdsl.plot.path import plot_path
 
-        plot_path(plot, space, found.path, f"Shortest path, length {found.interval.upper:.6g}")
-    return found
+        plot_path(plot, space, result.path, f"Shortest path, length {result.interval.upper:.6g}")
+    return result
 
 
-def read_place(values: Values, space: Space, text: str) -> Place:
+def read_point(values: Values, space: Space, text: str) -> Place:
     """Read ``MODE STATE=VALUE ...``; values are expressions of parameters.
 
     Raises
@@ -72,63 +71,46 @@ def read_place(values: Values, space: Space, text: str) -> Place:
     mode, _, rest = text.strip().partition(" ")
     if mode not in space.modes:
         raise UsageError(f"'{text}': the model has no mode '{mode}'", did_you_mean(mode, space.modes))
-    found = list(_ASSIGNMENT.finditer(rest))
-    ends = [*(m.start() for m in found[1:]), len(rest)]
-    if rest[: found[0].start() if found else len(rest)].strip():
-        raise UsageError(f"'{text}': after the mode come its states, as NAME=VALUE", _example(space, mode))
-    given: dict[str, str] = {}
-    for match, end in zip(found, ends, strict=False):
-        if match[1] in given:
-            raise UsageError(f"'{text}': {match[1]} is given twice")
-        given[match[1]] = rest[match.end() : end].strip().rstrip(",").strip()
-    return _place(values, space, mode, given, text)
-
-
-def _place(values: Values, space: Space, mode: str, given: Mapping[str, str], text: str) -> Place:
     names = space.domains[space.mode_index(mode)].coordinates
-    for name in given:
+    example = "for example: " + " ".join([mode, *(f"{name}=0" for name in names)])
+    before, *parts = _ASSIGNMENT.split(rest)
+    if before.strip():
+        raise UsageError(f"'{text}': after the mode come its states, as NAME=VALUE", example)
+    given: dict[str, str] = {}
+    for name, value in zip(parts[::2], parts[1::2], strict=True):
+        if name in given:
+            raise UsageError(f"'{text}': {name} is given twice")
         if name == "t" and not space.timed:
-            raise UsageError(
-                f"'{text}': time is no coordinate here, since no guard or reset depends on it", "leave out t"
-            )
+            sentence = "time is no coordinate here, since no guard or reset depends on it"
+            raise UsageError(f"'{text}': {sentence}", "leave out t")
         if name not in names:
             raise UsageError(f"'{text}': mode {mode} has no state '{name}'", did_you_mean(name, names))
+        given[name] = value.strip().rstrip(",").strip()
     if missing := [name for name in names if name not in given]:
-        raise UsageError(f"'{text}': no value is given for {', '.join(missing)}", _example(space, mode))
+        raise UsageError(f"'{text}': no value is given for {', '.join(missing)}", example)
     numbers = [float(values.number(given[name], f"{mode} {name}")) for name in names]
-    if space.timed:
-        return Place(mode, tuple(numbers[:-1]), t=numbers[-1])
-    return Place(mode, tuple(numbers))
-
-
-def _example(space: Space, mode: str) -> str:
-    names = space.domains[space.mode_index(mode)].coordinates
-    return "for example: " + " ".join([mode, *(f"{name}=0" for name in names)])
+    return Place(mode, tuple(numbers[:-1]), t=numbers[-1]) if space.timed else Place(mode, tuple(numbers))
 
 
 def _relaxation(values: Values, given: Any) -> float:
-    if given is None:
-        given = values.constant("relaxation")[0] if values.has("relaxation") else _default(values)
+    if given is None and values.has("relaxation"):
+        given = values.constant("relaxation")[0]
+    elif given is None:
+        given = least_relaxation(float(DEFAULTS["relaxation"]), float(values.constant("until")[0]))
     number = float(values.number(given, "relaxation"))
     if number <= 0:
         raise UsageError(f"relaxation must be positive, not {show(number)}")
     return number
 
 
-def _default(values: Values) -> float:
-    return least_relaxation(float(DEFAULTS["relaxation"]), float(values.constant("until")[0]))
-
-
 def _check_inside(space: Space, *places: Place) -> None:
     """Refuse points that are in no domain: the distance is between points of the space."""
-    try:
-        found = [coordinates(space, place) for place in places]
-    except ValueError as error:
-        raise UsageError(str(error)) from error
-    size = max(float(np.linalg.norm(x)) for _, x in found)
-    for place, (mode, x) in zip(places, found, strict=True):
-        excess, text = space.domains[mode].excess(x, size)
+    points = [coordinates(space, place) for place in places]
+    size = max(float(np.linalg.norm(x)) for _, x in points)
+    for place, (mode, x) in zip(places, points, strict=True):
+        domain = space.domains[mode]
+        excess, text = domain.excess(x, size)
         if not excess <= TOLERANCE:
-            at = ", ".join(f"{n} = {show(v)}" for n, v in zip(space.domains[mode].coordinates, x.tolist(), strict=True))
+            at = ", ".join(f"{n} = {show(v)}" for n, v in zip(domain.coordinates, x.tolist(), strict=True))
             beyond = f"where `{text}` has no value" if np.isnan(excess) else f"beyond `{text}`"
             raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")

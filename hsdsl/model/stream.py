@@ -29,18 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Streamed:
-    """What is known of a run whose rows are in a file.
-
-    Attributes
-    ----------
-    path : Path
-    rows, steps : int
-        How many rows were written, and how many there were.
-    transitions : int
-    stop : Stop
-    final : Samples
-        The last row.
-    """
+    """A run whose rows are in a file: the rows written, all steps, the number of transitions, and the last row."""
 
     path: Path
     rows: int
@@ -56,7 +45,7 @@ class Streamed:
 
 
 class Rows:
-    """Takes the chunks of a run, and writes the first row, every k-th, both rows of each jump and the last."""
+    """Writer of the chunks of a run: the first row, every k-th, both rows of each jump and the last."""
 
     def __init__(
         self,
@@ -128,13 +117,7 @@ class Rows:
 def check(
     path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, asked: Mapping[str, Any], model: Model
 ) -> Path:
-    """Refuse what no streamed run can be asked, and return where its rows go.
-
-    Raises
-    ------
-    UsageError
-        An argument there is not, a name that does not end in .csv, a column the model does not have.
-    """
+    """Refuse arguments that a streamed run does not take, and return the path of its rows."""
     check_arguments(asked, "a streamed run", without=("samples", "precision"))
     if asked.get("engine") == "python":
         raise UsageError("only the compiled engine streams", "leave out the engine, or what is to be streamed")

@@ -38,6 +38,12 @@ class Text:
         """A diagnostic about a place in this text, with the line it is on."""
         return Diagnostic(code, message, span, hint, self.lines[span.line - 1])
 
+    def fault(
+        self, code: str, message: str, line: int, column: int, hint: str | None = None, length: int = 1
+    ) -> Diagnostic:
+        """A diagnostic about so many characters at a 1-based line and column."""
+        return self.diagnostic(code, message, self.span(line, column, length), hint)
+
 
 def decode(path: str, data: bytes) -> Text:
     """The text of a model.

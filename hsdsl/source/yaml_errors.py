@@ -1,4 +1,4 @@
-"""What the YAML parser says, said again for a person who wanted to write mathematics."""
+"""Errors of the YAML parser, as diagnostics for a person who writes mathematics."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ _NO_SPACE = re.compile(r"\s*(?:- +)?([^\W\d]\w*):(\S.*)")
 _EQUATION = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?:'|\(t\))?\s*=\s*([^=].*)|\s*(?:der|diff)\((\w+)\)\s*=\s*([^=].*)")
 _DASH = re.compile(r"(\s*)-([^\W\d].*:.*)")
 _LAST_WORD = re.compile(r"([^\W\d]\w*)\s*$")
+_WHOLE_LINE = 9999  # characters, cut at the line's end
 _FAR = 100  # characters before a fault that are looked at
 _COMMENT = re.compile(r"//|/\*|%")
 _TEXTS = ("title", "source", "about")
@@ -51,16 +52,14 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
     if tab:
         return tab
     if "document start" in problem:
-        return text.diagnostic(
-            "HS010", "a second document begins here", text.span(line, column), "a file holds one model"
-        )
+        return text.fault("HS010", "a second document begins here", line, column, "a file holds one model")
     if "quoted scalar" in (error.context or ""):
         return _quoted(text, problem, (line, column), opened)
     if "block scalar" in (error.context or ""):
         return _misread(text, *opened)
     if "could not find expected ':'" in problem:
         message = "this line is neither a key nor part of a value"
-        return text.diagnostic("HS004", message, text.span(*opened, 9999), _with_colon(text.lines[opened[0] - 1]))
+        return text.fault("HS004", message, *opened, _with_colon(text.lines[opened[0] - 1]), _WHOLE_LINE)
     if "flow" in (error.context or ""):
         return _in_brackets(text, (line, column), opened)
     return _in_block(text, problem, line, column)
@@ -75,18 +74,17 @@ def _tab(text: Text, line: int) -> Diagnostic | None:
     blank = content[: len(content) - len(content.lstrip())]
     if "\t" not in blank:
         return None
-    span = text.span(line, blank.index("\t") + 1)
-    return text.diagnostic("HS005", "a tab stands where YAML wants spaces", span, "indent with spaces")
+    return text.fault(
+        "HS005", "YAML is indented with spaces, not tabs", line, blank.index("\t") + 1, "indent with spaces"
+    )
 
 
 def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
     if "escape" in problem or "hexdecimal" in problem or "hexadecimal" in problem:
         message = "the backslash here begins an escape that YAML does not know"
-        return text.diagnostic("HS004", message, text.span(*here), "use single quotes, where a backslash is itself")
-    mark = _character(text, *opened)
-    return text.diagnostic(
-        "HS004", "the quote that opens here is never closed", text.span(*opened), f"close it with `{mark}`"
-    )
+        return text.fault("HS004", message, *here, "use single quotes, where a backslash is itself")
+    hint = f"close it with `{_character(text, *opened)}`"
+    return text.fault("HS004", "the quote that opens here is never closed", *opened, hint)
 
 
 def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
@@ -95,21 +93,19 @@ def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> 
     closing = {"{": "}", "[": "]"}.get(bracket)
     if closing is None:
         hint = "remove it, or quote the value it belongs to"
-        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column), hint)
+        return text.fault("HS004", "this is not valid YAML from here on", line, column, hint)
     content = text.lines[line - 1] if line <= len(text.lines) else ""
-    if column > len(content) or (line != opened[0] and _character(text, line, column) == ":"):
+    found, below = _character(text, line, column), line != opened[0]
+    outdented = not content[: column - 1].strip() and column <= _indent(text.lines[opened[0] - 1]) + 1
+    if column > len(content) or (below and (found == ":" or outdented)):
         message = f"the `{bracket}` that opens here is never closed"
-        return text.diagnostic("HS004", message, text.span(*opened), f"close it with `{closing}`")
-    if line != opened[0] and not content[: column - 1].strip() and column <= _indent(text.lines[opened[0] - 1]) + 1:
-        message = f"the `{bracket}` that opens here is never closed"
-        return text.diagnostic("HS004", message, text.span(*opened), f"close it with `{closing}`")
-    found = _character(text, line, column)
+        return text.fault("HS004", message, *opened, f"close it with `{closing}`")
     message = f"YAML cannot read on at `{found}` inside `{bracket}` and `{closing}`"
     hint = f"{_QUOTE} if `{found}` belongs to one"
     name = _LAST_WORD.search(content, max(0, column - _FAR), column - 1)
     if found == ":" and name:
         hint = f"write a comma before `{name.group(1)}`, or quote the expression that `:` belongs to"
-    return text.diagnostic("HS007", message, text.span(line, column), hint)
+    return text.fault("HS007", message, line, column, hint)
 
 
 def _indent(content: str) -> int:
@@ -124,8 +120,8 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
     if "mapping values" in problem:
         if _KEY_AND_VALUE.match(before):
             message = "a colon followed by a space cannot stand inside a value"
-            return text.diagnostic("HS007", message, text.span(line, column), _two_colons(content, column))
-        return _without_colon(text, line) or _indentation(text, line, len(content) - len(content.lstrip()) + 1)
+            return text.fault("HS007", message, line, column, _two_colons(content, column))
+        return _without_colon(text, line) or _indentation(text, line, _indent(content) + 1)
     return _misread(text, line, column)
 
 
@@ -137,8 +133,8 @@ def _without_colon(text: Text, line: int) -> Diagnostic | None:
     content = text.lines[above - 1] if above > 0 else ""
     if not content.strip() or ":" in content or content.lstrip()[0] in "-#":
         return None
-    span = text.span(above, len(content) - len(content.lstrip()) + 1, 9999)
-    return text.diagnostic("HS004", "this line is neither a key nor part of a value", span, _with_colon(content))
+    message = "this line is neither a key nor part of a value"
+    return text.fault("HS004", message, above, _indent(content) + 1, _with_colon(content), _WHOLE_LINE)
 
 
 def _with_colon(content: str) -> str:
@@ -170,23 +166,20 @@ def _indentation(text: Text, line: int, column: int) -> Diagnostic:
     dash = _DASH.fullmatch(text.lines[line - 2]) if 2 <= line <= len(text.lines) else None
     if dash:
         message = "after the dash of a list item a space is missing"
-        span = text.span(line - 1, len(dash.group(1)) + 1, 9999)
-        return text.diagnostic("HS004", message, span, f"write - {shown(dash.group(2))}")
-    if content.lstrip().startswith("- "):
-        message = "a list item cannot stand here"
-    else:
-        message = "the indentation of this line fits no line above it"
+        hint = f"write - {shown(dash.group(2))}"
+        return text.fault("HS004", message, line - 1, len(dash.group(1)) + 1, hint, _WHOLE_LINE)
+    item = content.lstrip().startswith("- ")
+    message = "a list item cannot stand here" if item else "the indentation of this line fits no line above it"
     hint = "entries of one mapping or list begin in the same column; a key that has a value has no lines under it"
-    return text.diagnostic("HS006", message, text.span(line, column, 9999), hint)
+    return text.fault("HS006", message, line, column, hint, _WHOLE_LINE)
 
 
 def _misread(text: Text, line: int, column: int) -> Diagnostic:
     content = text.lines[line - 1] if line <= len(text.lines) else ""
     remark = _COMMENT.match(content, column - 1) or _COMMENT.match(content, _indent(content))
     if remark and content[: remark.start()].rstrip()[-1:] in ("", "}", "]"):
-        column = remark.start() + 1
-        message = f"`{remark.group()}` begins no comment"
-        return text.diagnostic("HS004", message, text.span(line, column, len(remark.group())), "write `#` before it")
+        message, length = f"`{remark.group()}` begins no comment", len(remark.group())
+        return text.fault("HS004", message, line, remark.start() + 1, "write `#` before it", length)
     found = _VALUE.match(content)
     start = found.start("value") if found else column - 1
     first = content[start : start + 1]
@@ -194,10 +187,10 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
         start, first = column - 1, content[column - 1 : column]
     if first not in _MEANS:
         hint = "remove it, or quote the value it belongs to"
-        return text.diagnostic("HS004", "this is not valid YAML from here on", text.span(line, column), hint)
+        return text.fault("HS004", "this is not valid YAML from here on", line, column, hint)
     message = f"a value that begins with `{first}` is {_MEANS[first]} in YAML"
     hint = "quote the whole expression, or none of it" if first in "'\"" else quote(content, start)
-    return text.diagnostic("HS007", message, text.span(line, start + 1, 9999), hint)
+    return text.fault("HS007", message, line, start + 1, hint, _WHOLE_LINE)
 
 
 def quote(content: str, start: int) -> str:
