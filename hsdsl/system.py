@@ -141,6 +141,36 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class KnownTransition:
+    """A transition known exactly; numbers are texts of expressions of parameters."""
+
+    time: str
+    edge: str | None = None
+    before: dict[str, str] = field(default_factory=dict[str, str])
+    after: dict[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(frozen=True)
+class KnownState:
+    """States and outputs known exactly at a time; numbers are texts of expressions of parameters."""
+
+    time: str
+    mode: str | None
+    values: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Exact knowledge of a run with some overrides, and the bound ``trust`` on its absolute error."""
+
+    settings: dict[str, str]
+    source: str | None
+    trust: str | None
+    transitions: tuple[KnownTransition, ...]
+    states: tuple[KnownState, ...]
+
+
+@dataclass(frozen=True)
 class HybridSystem:
     """A whole model. ``modes`` are in file order."""
 
@@ -155,7 +185,7 @@ class HybridSystem:
     units: dict[str, str]
     initial: Initial
     experiment: Experiment
-    reference: tuple[dict[str, Any], ...]  # checked plain data, numbers as text
+    reference: tuple[Reference, ...]
     files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
 
     def __post_init__(self) -> None:

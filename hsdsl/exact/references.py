@@ -72,7 +72,7 @@ def reference(model: Referenced, block: int = 0) -> Execution:
 
 def references_of(model: Referenced) -> list[Mapping[str, str]]:
     """The overrides of each block of a model's ``reference:`` section, by names such as ``initial.w``."""
-    return [block.get("set", {}) for block in model.system.reference]
+    return [block.settings for block in model.system.reference]
 
 
 def _start(model: Referenced, block: int) -> Point:

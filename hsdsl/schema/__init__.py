@@ -8,6 +8,7 @@ from hsdsl.schema.documents import (
     ModelDocument,
     ParameterEntry,
     ReferenceDocument,
+    ReferenceStateDocument,
     ReferenceTransitionDocument,
     TransitionDocument,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "ModelDocument",
     "ParameterEntry",
     "ReferenceDocument",
+    "ReferenceStateDocument",
     "ReferenceTransitionDocument",
     "TransitionDocument",
     "json_schema",

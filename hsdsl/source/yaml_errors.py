@@ -74,9 +74,7 @@ def _tab(text: Text, line: int) -> Diagnostic | None:
     blank = content[: len(content) - len(content.lstrip())]
     if "\t" not in blank:
         return None
-    return text.fault(
-        "HS005", "YAML is indented with spaces, not tabs", line, blank.index("\t") + 1, "indent with spaces"
-    )
+    return text.fault("HS005", "expected spaces, got a tab", line, blank.index("\t") + 1, "indent with spaces")
 
 
 def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:

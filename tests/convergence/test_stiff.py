@@ -45,13 +45,13 @@ def test_end_against_reference(name: str, scheme: str) -> None:
     """The tolerance bounds each step's error relative to the largest size of a state, and so the error at the end."""
     model = hsdsl.load(PROBLEMS[name])
     (reference,) = model.system.reference
-    (known,) = reference["states"]
+    (known,) = reference.states
     for tolerance, steps, errors in zip(TOLERANCES, MOST_STEPS[name], MOST_ERRORS[name], strict=True):
         run = model.simulate(tolerance=tolerance, scheme=scheme, engine="c")
         for k, (state, value) in enumerate(run.final.state.items()):
             largest = float(np.max(np.abs(run.values[:, k])))
-            off = abs(value - float(known[state]))
-            assert off <= errors * tolerance * largest + float(reference["trust"]), (tolerance, state)
+            off = abs(value - float(known.values[state]))
+            assert off <= errors * tolerance * largest + float(reference.trust), (tolerance, state)
         assert len(run.times) <= steps, tolerance
 
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from hsdsl.elaborate import elaborate, parameter_expression
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
-from hsdsl.system import TIME, HybridSystem
+from hsdsl.system import TIME, HybridSystem, KnownState, KnownTransition, Reference
 
 X, V, A = (sp.Symbol(n, real=True) for n in "xva")
 HEAD = "hsdsl: 1\n"
@@ -208,20 +208,20 @@ def test_experiment_and_initial_are_expressions():
     assert made.experiment.step == A / 100 and made.experiment.tolerance is None and made.experiment.scheme is None
 
 
-def test_references_are_plain_data():
+def test_references_have_numbers_as_text():
     rest = (
         "reference:\n  - set: {initial.x: -0.4, experiment.method: rk4}\n    source: a book\n    trust: 1e-9\n"
         "    transitions: [1/3, {time: 0.5, edge: hit, before: {v: 1}}]\n    states: [{time: 2*pi, mode: A, x: 1}]\n"
     )
     made = model("    transitions: [{name: hit, when: x >= 1, to: A}]\n", rest)
     assert made.reference == (
-        {
-            "set": {"initial.x": "-0.4", "experiment.method": "rk4"},
-            "source": "a book",
-            "trust": "1e-9",
-            "transitions": [{"time": "1/3"}, {"time": "0.5", "edge": "hit", "before": {"v": "1"}}],
-            "states": [{"time": "2*pi", "mode": "A", "x": "1"}],
-        },
+        Reference(
+            {"initial.x": "-0.4", "experiment.method": "rk4"},
+            "a book",
+            "1e-9",
+            (KnownTransition("1/3"), KnownTransition("0.5", "hit", {"v": "1"})),
+            (KnownState("2*pi", "A", {"x": "1"}),),
+        ),
     )
 
 
