@@ -14,7 +14,7 @@ from hsdsl.chart.result import Attempt
 from hsdsl.chart.stopwatch import Timed
 from hsdsl.plot.work_precision import Line, Mark, Panel
 
-COLUMNS = (
+COLUMNS: tuple[str, ...] = (
     "model", "tool", "scheme", "method", "size", "value", "seconds", "fastest", "slowest", "first", "error",
     "rho_lower", "rho_upper", "transitions", "verdict", "why",
 )  # fmt: skip
