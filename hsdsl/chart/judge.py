@@ -1,4 +1,4 @@
-"""How wrong a result is, and whether it is the right execution at all."""
+"""The error of a result, and whether it is the right execution."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from hsdsl.execution import Execution
 from hsdsl.metrics import Interval
 from hsdsl.model.distances import distance
 
-OUT_OF_SCALE = 0.1  # an error beyond this share of what the states span is a wrong answer, whatever else is right
+OUT_OF_SCALE = 0.1  # of the span of the states: a larger error is a wrong result
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """``verdict`` is ``right``, ``wrong`` (another execution) or ``failed`` (no end); ``why`` says what of.
+    """``verdict`` is ``right``, ``wrong`` (another execution) or ``failed`` (no end); ``why`` is the reason.
 
-    ``error`` is the largest difference of any state over the samples clear of jumps
-    (of states that both have there, whatever the modes), NaN where no sample compares.
+    ``error`` is the largest difference of any state over the samples clear of jumps at which both have it, NaN where
+    no sample compares.
     """
 
     verdict: str
@@ -38,15 +38,14 @@ class Judgement:
 def judge(scene: Scene, result: Result) -> Judgement:
     """Compare a result with the exact execution."""
     clear = scene.clear
-    exact, found = scene.exact_values[clear], result.values[clear]
-    same = scene.exact_modes[clear] == result.modes[clear]
-    comparable = np.isfinite(exact) & np.isfinite(found)
-    error = float(np.abs(exact - found)[comparable].max()) if comparable.any() else nan
+    apart = np.abs(scene.exact_values[clear] - result.values[clear])
+    error = float(np.nanmax(np.where(np.isfinite(apart), apart, nan), initial=-inf))
+    error = nan if error == -inf else error
     if result.problem:
         return Judgement("failed", error, result.transitions, result.problem)
-    if wrong := _wrong(scene, result, error, int(np.count_nonzero(~same))):
-        return Judgement("wrong", error, result.transitions, wrong)
-    return Judgement("right", error, result.transitions)
+    others = int(np.count_nonzero(scene.exact_modes[clear] != result.modes[clear]))
+    why = _wrong(scene, result, error, others)
+    return Judgement("wrong" if why else "right", error, result.transitions, why)
 
 
 def _wrong(scene: Scene, result: Result, error: float, others: int) -> str:
@@ -62,7 +61,7 @@ def _wrong(scene: Scene, result: Result, error: float, others: int) -> str:
 
 
 def rho(scene: Scene, execution: Execution) -> Interval | None:
-    """Return the distance to the exact execution, None where there is none to be had."""
+    """Return the distance to the exact execution."""
     if not execution.stop.complete:
         return Interval(nan, inf)
     return distance(execution, scene.exact, model=scene.model)

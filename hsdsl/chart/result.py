@@ -1,4 +1,4 @@
-"""What is run, and what comes back, whatever ran it."""
+"""Attempts, one tool at one setting each, and their results."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Array = npt.NDArray[Any]
 
 
 class Refused(Exception):
-    """A tool cannot run a model; the text says why."""
+    """A tool cannot run a model; the text gives the reason."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A run at the scene's sample times; what only the judge asks for is made when it does, outside the clock.
+    """A run at the scene's sample times; modes and transitions are computed outside the clock.
 
     Attributes
     ----------
@@ -42,12 +42,12 @@ class Result:
 
     @cached_property
     def modes(self) -> Array:
-        """The mode at each sample, shape (samples,), empty where the run had ended."""
+        """The mode at each sample, shape (samples,), empty after the end of the run."""
         return self.find_modes()
 
     @cached_property
     def transitions(self) -> int | None:
-        """How many were made; None where the tool cannot say."""
+        """The number of transitions; None where the tool does not count them."""
         return self.count()
 
 
@@ -64,10 +64,10 @@ class Attempt:
 
     @property
     def label(self) -> str:
-        """What a person calls it."""
-        return " ".join(part for part in (self.tool, self.scheme, self.method) if part)
+        """Tool, scheme and method."""
+        return " ".join(filter(None, (self.tool, self.scheme, self.method)))
 
     @property
     def setting(self) -> str:
-        """Its setting in words."""
+        """Its tolerance or step."""
         return f"{self.size} {self.value:.3g}"

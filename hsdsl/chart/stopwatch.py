@@ -1,4 +1,4 @@
-"""Warm times, in turns: what disturbs the machine disturbs everything that is compared."""
+"""Warm times, in turns: a disturbance of the machine affects everything that is compared."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from hsdsl.chart.result import Attempt, Result
 
-Looked = TypeVar("Looked")
-ENOUGH = 0.02  # seconds of an attempt in one turn: what takes less is repeated
+Judged = TypeVar("Judged")
+ENOUGH = 0.02  # seconds of an attempt in one turn: a shorter one is repeated
 
 
 @dataclass(frozen=True)
@@ -35,49 +35,44 @@ class Timed:
 
 def race(
     attempts: Sequence[Attempt],
-    look: Callable[[Attempt, Result], Looked],
+    judge: Callable[[Attempt, Result], Judged],
     rounds: int,
     patience: float,
     watch: Callable[[str], None],
-) -> Iterator[tuple[Attempt, Looked, Timed]]:
-    """Warm every attempt and look at what it gives, which is not kept, then time all of them in turns.
+) -> Iterator[tuple[Attempt, Judged, Timed]]:
+    """Warm every attempt and judge its result, then time all of them in turns.
 
-    What took longer than ``patience`` the first time is not run again, and the tool's attempts after it are left out:
-    they are given in the order of rising effort.
+    An attempt that took longer than ``patience`` is not run again, and the tool's attempts after it are left out:
+    attempts come in the order of rising effort.
     """
-    warmed: list[tuple[Attempt, Looked, float]] = []
+    warmed: list[tuple[Attempt, Judged, float]] = []
     exhausted: set[str] = set()
     for attempt in attempts:
         if attempt.label in exhausted:
             continue
         watch(f"{attempt.label} {attempt.setting}")
-        result, seconds = _once(attempt)
-        warmed.append((attempt, look(attempt, result), seconds))
+        began = time.perf_counter()
+        result = attempt.run()
+        seconds = time.perf_counter() - began
+        warmed.append((attempt, judge(attempt, result), seconds))
         del result
         if seconds > patience:
             exhausted.add(attempt.label)
-    turns: dict[int, list[float]] = {k: [] for k in range(len(warmed))}
+    turns: list[list[float]] = [[] for _ in warmed]
     for turn in range(rounds):
-        for k, (attempt, _, seconds) in enumerate(warmed):
+        for times, (attempt, _, seconds) in zip(turns, warmed, strict=True):
             if seconds <= patience:
                 watch(f"turn {turn + 1} of {rounds}: {attempt.label} {attempt.setting}")
-                turns[k].append(_turn(attempt))
-    for k, (attempt, looked, seconds) in enumerate(warmed):
-        yield attempt, looked, Timed(tuple(turns[k] or [seconds]), seconds)
-
-
-def _once(attempt: Attempt) -> tuple[Result, float]:
-    began = time.perf_counter()
-    result = attempt.run()
-    return result, time.perf_counter() - began
+                times.append(_turn(attempt))
+    for times, (attempt, judged, seconds) in zip(turns, warmed, strict=True):
+        yield attempt, judged, Timed(tuple(times or [seconds]), seconds)
 
 
 def _turn(attempt: Attempt) -> float:
     began = time.perf_counter()
-    count = 0
-    while True:
+    count, spent = 0, 0.0
+    while spent < ENOUGH:
         attempt.run()
         count += 1
         spent = time.perf_counter() - began
-        if spent >= ENOUGH:
-            return spent / count
+    return spent / count

@@ -2,7 +2,7 @@
 
 Stored executions are the files of ``stored/`` (written by ``models/references/build.py``) and of the folder
 ``references`` next to the model. The one that starts where the model does and satisfies its flow, guards, resets and
-domains is the model's reference, whatever the name of its file.
+domains is the model's reference; names of files do not count.
 """
 
 from __future__ import annotations

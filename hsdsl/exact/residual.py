@@ -1,7 +1,4 @@
-"""Whether an execution solves a model: its slopes against the flow, its jumps against guards and resets.
-
-The model as it is read now is asked, so that a reference can be told from one that an edited model no longer has.
-"""
+"""The defect of an execution in a model: of slopes in the flow, of jumps in guards and resets."""
 
 from __future__ import annotations
 
@@ -22,10 +19,9 @@ SHORTEST = 1e-9  # pieces shorter than this have no slope in floats
 def residual(program: Program, run: Execution) -> float:
     """Return the largest relative defect of an execution at its model's parameters; 0 is a solution.
 
-    Compared are slopes with the flow within each piece, guards and resets at each transition, and at every row how far
-    it is outside its domain. A defect counts relative to 1 plus the size of what is compared, and a slope's only as far
-    as it exceeds its round-off and what round-off of the state makes of a stiff flow. Where the state rests, only that
-    it stands on a guard is looked at.
+    Compared are slopes with the flow within each piece, guards and resets at each transition, and rows with the domain.
+    A defect counts relative to 1 plus the size of the compared values. A slope's defect counts beyond its round-off and
+    the effect of the state's round-off on a stiff flow. A state at rest must lie on a guard.
 
     Raises
     ------
@@ -33,7 +29,7 @@ def residual(program: Program, run: Execution) -> float:
         The model has no such mode, states or transition, or has inputs that jump or bend.
     """
     if program.inputs or program.switches:
-        raise ValueError("a model with inputs that jump or bend is not compared")
+        raise ValueError("models with inputs that jump or bend are not compared")
     check = _Check(program)
     flows = max((check.flow(run, arc) for arc in run.arcs if arc.kind == "flow"), default=0.0)
     return max(flows, *(check.jump(t) for t in run.transitions), 0.0)
