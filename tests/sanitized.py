@@ -19,7 +19,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO
 from hsdsl.model import Model
-from hsdsl.simulate import chunks
+from hsdsl.simulate import output_buffers
 from hsdsl.simulate.compiled import SCHEMES
 
 
@@ -54,7 +54,7 @@ def main() -> None:
 
 def in_chunks() -> int:
     """In chunks so small that every run fills several."""
-    chunks.LEAST_ROWS, chunks.MOST_ROWS = 12, 200
+    output_buffers.LEAST_ROWS, output_buffers.MOST_ROWS = 12, 200
     count = 0
     for name in CASES:
         for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():

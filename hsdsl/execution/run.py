@@ -46,7 +46,7 @@ class Execution(Deferred):
         ``assessment(execution, estimated) -> Verdict``: the verdict, where ``estimated`` holds it against a finer run
         also where steps are fixed; without it the verdict stays what it is.
     repetition : callable or None
-        ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.finer`).
+        ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.refinement`).
     """
 
     model: str

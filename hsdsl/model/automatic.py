@@ -34,7 +34,7 @@ from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
-from hsdsl.simulate.timeline import Timeline
+from hsdsl.simulate.input_segments import Timeline
 
 LEAST_STEPS = 1000
 REACH = 3.3  # the length of an explicit step, in times of decay, that is still stable (dopri5 on the real axis)

@@ -21,7 +21,7 @@ from hsdsl.model.values import Columns, evaluate_parameters, initial_columns
 from hsdsl.model.workers import Progress, Recorder, run_compiled, run_in_turn
 from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept
-from hsdsl.simulate.layouts import Layouts
+from hsdsl.simulate.state_layouts import StateLayouts
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
@@ -256,7 +256,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
         start=start.reshape(len(base.states), len(columns.rows)).T[places],
         time=request.times(np.array([settings[k].until for k in places], dtype=float)),
     )
-    kinds = list(Layouts(model.program, base.states).kinds)
+    kinds = list(StateLayouts(model.program, base.states).kinds)
     return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
 
 

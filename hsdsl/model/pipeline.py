@@ -24,7 +24,7 @@ from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, prepare
-from hsdsl.simulate.timeline import Timeline, make_timeline
+from hsdsl.simulate.input_segments import Timeline, make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem

@@ -18,8 +18,8 @@ from hsdsl.execution.samples import split
 from hsdsl.model.options import check_arguments
 from hsdsl.model.settings import whole
 from hsdsl.program import Program
-from hsdsl.simulate.layouts import Layouts
-from hsdsl.simulate.prepared import Prepared, Watch
+from hsdsl.simulate.plan import Prepared, Watch
+from hsdsl.simulate.state_layouts import StateLayouts
 from hsdsl.store.sidecar import forget_sidecar
 from hsdsl.store.table import write_csv
 
@@ -57,7 +57,7 @@ class Rows:
     ) -> None:
         self._program, self._every, self._columns, self._write = program, every, columns, write
         self._names = tuple(dict.fromkeys((*states, *program.all_states)))
-        self._layouts = Layouts(program, states)
+        self._layouts = StateLayouts(program, states)
         self._arc = 0, 0, 0  # the last one's mode, jump and layout
         self._held: dict[str, Array] | None = None  # the last row: whether a jump follows it is not known yet
         self.written = self.steps = 0

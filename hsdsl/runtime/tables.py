@@ -24,7 +24,7 @@ REASONS = (
     "until", "until in strip", "until on guard", "final", "zeno", "limit", "reset not finite", "here not finite",
     "entered outside", "stuck", "interrupted", "left", "step not finite", "accumulated",
 )  # fmt: skip
-OBSTACLES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved", "jump")
+FAILURES = ("error", "wall", "deep", "flat", "inward", "not finite", "error", "creeping", "unsolved", "jump")
 
 
 class Edge(ctypes.Structure):
@@ -205,7 +205,7 @@ class Stop(ctypes.Structure):
     mode: int
     dimension: int
     edge: int
-    obstacle: int
+    failure: int
     surface: int
     segment: int
     time: float
@@ -215,7 +215,7 @@ class Stop(ctypes.Structure):
     scales: Any
 
     _fields_ = (
-        *((name, c_int32) for name in ("reason", "mode", "dimension", "edge", "obstacle", "surface")),
+        *((name, c_int32) for name in ("reason", "mode", "dimension", "edge", "failure", "surface")),
         ("segment", c_int64),
         ("time", c_double),
         ("h", c_double),

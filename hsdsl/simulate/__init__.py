@@ -22,7 +22,7 @@
 `compiled`          the same loop in C: what it is given
 `telling`           what it says of a run, in the same words
 `layouts`           which states its arcs have
-`desk`, `chunks`    where the compiled loop works, and what it writes to; `columns` is what it has written
+`workspace`, `chunks`    where the compiled loop works, and what it writes to; `columns` is what it has written
 `ensemble`          many instances by the compiled loop
 `interrupt`         Ctrl-C while it runs
 `verdict`           do the theorem's hypotheses hold for a run?
@@ -31,7 +31,7 @@
 
 from __future__ import annotations
 
-from hsdsl.simulate.prepared import SCHEMES, Prepared, prepare
+from hsdsl.simulate.plan import SCHEMES, Prepared, prepare
 from hsdsl.simulate.settings import Settings
 
 __all__ = ["SCHEMES", "Prepared", "Settings", "prepare"]

@@ -23,15 +23,15 @@ from hsdsl.runtime import methods, tables
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
-from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
-from hsdsl.simulate.desk import Desk, Desks
+from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
-from hsdsl.simulate.layouts import Layouts
+from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.timeline import Timeline
+from hsdsl.simulate.state_layouts import StateLayouts
+from hsdsl.simulate.workspace import Workspace, Workspaces
 
 SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
     "relaxed": (ButcherTableau, TaylorMethod, RadauMethod),
@@ -44,7 +44,7 @@ class CompiledPlan:
 
     Attributes
     ----------
-    layouts : Layouts
+    layouts : StateLayouts
         The kinds of arcs; the first is what a run begins with.
     """
 
@@ -61,10 +61,10 @@ class CompiledPlan:
         assert settings.method is not None
         method, model = methods.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
-        self.program, self.compiled, self.layouts = program, compiled, Layouts(program, states)
+        self.program, self.compiled, self.layouts = program, compiled, StateLayouts(program, states)
         scheme = settings.scheme
         key = settings.method, scheme, shape
-        self.desks: Desks = compiled.shared(key, lambda: Desks(compiled, method, scheme, shape))
+        self.workspaces: Workspaces = compiled.shared(key, lambda: Workspaces(compiled, method, scheme, shape))
         self._settings = task_settings(settings, program.all_states)
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(timeline)
@@ -75,12 +75,12 @@ class CompiledPlan:
         self.until, self.memory = settings.until, settings.memory
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
-    def lay(self, desk: Desk) -> None:
-        """Put everything on a desk, unless it lies there from the run before."""
-        desk.clear(0 if desk.chunks.sink else self._rows, self.memory)
-        if desk.laid is self:
+    def lay(self, workspace: Workspace) -> None:
+        """Put everything on a workspace, unless it lies there from the run before."""
+        workspace.clear(0 if workspace.chunks.sink else self._rows, self.memory)
+        if workspace.laid is self:
             return
-        task, desk.laid = desk.task, self
+        task, workspace.laid = workspace.task, self
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
         task.mode, (task.dimension, task.x) = self._mode, self._start
@@ -125,13 +125,13 @@ class _Timeline:
 
 @dataclass
 class CompiledRun:
-    """One run of the compiled loop at a desk, to be looked at while it is under way.
+    """One run of the compiled loop at a workspace, to be looked at while it is under way.
 
-    A desk that another run works at afterwards tells of that one.
+    A workspace that another run works at afterwards tells of that one.
     """
 
     plan: CompiledPlan
-    desk: Desk
+    workspace: Workspace
     fresh: Callable[[], Run]
     _columns: Columns | None = None
     _accumulated: Stop | None = None
@@ -147,7 +147,7 @@ class CompiledRun:
     @property
     def now(self) -> Number:
         """Time of the last row written."""
-        return self.desk.task.now
+        return self.workspace.task.now
 
     @property
     def until(self) -> Number:
@@ -157,12 +157,12 @@ class CompiledRun:
     @property
     def made(self) -> int:
         """How many transitions were made."""
-        return self.desk.task.made
+        return self.workspace.task.made
 
     def follow(self) -> tuple[Stop, Columns]:
         """Run to the end: why it stopped, and the columns that were written."""
         self._run()
-        self._columns = self.desk.chunks.whole(self.desk.pack, self.plan.layouts)
+        self._columns = self.workspace.chunks.whole(self.workspace.pack, self.plan.layouts)
         return self._stop(), self._columns
 
     def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
@@ -172,41 +172,41 @@ class CompiledRun:
             self._note(self.run, chunk["note"])
             sink(chunk)
 
-        self.desk.chunks.sink = take
+        self.workspace.chunks.sink = take
         self._run()
-        rest = self.desk.chunks.rest()
+        rest = self.workspace.chunks.rest()
         self._note(self.run, rest["note"])
         return self._stop(), rest
 
     def _run(self) -> None:
-        self.plan.lay(self.desk)
-        with Noted(self.desk.press):
-            self.desk.simulate()
-        if self.desk.failed:
-            raise self.desk.failed[0]
+        self.plan.lay(self.workspace)
+        with Noted(self.workspace.press):
+            self.workspace.simulate()
+        if self.workspace.failed:
+            raise self.workspace.failed[0]
 
     def _note(self, run: Run, notes: Array) -> None:
         if len(notes):
-            from hsdsl.simulate.telling import told
+            from hsdsl.simulate.messages import told
 
             said: list[tuple[int, int, int, int, float, float]] = notes.tolist()
             for note in said:
                 self._accumulated = told(run, *note) or self._accumulated
 
     def _stop(self) -> Stop:
-        found = self.desk.task.stop
+        found = self.workspace.task.stop
         reason = tables.REASONS[found.reason]
         if reason == "until":
             return stops.reached(found.time)
         if reason == "final":
             return stops.entered_final(self.plan.program.modes[found.mode].name, found.time)
-        if reason == "interrupted" and self.desk.chunks.full:
+        if reason == "interrupted" and self.workspace.chunks.full:
             return stops.memory(self.plan.memory, self.now)
         if reason == "interrupted":
             return stops.interrupted(self.now)
-        from hsdsl.simulate.telling import stop
+        from hsdsl.simulate.messages import stop
 
         run = self.run
         if reason == "accumulated" and self._accumulated is not None:
             return self._accumulated
-        return stop(run, self.desk, reason, self.made)
+        return stop(run, self.workspace, reason, self.made)

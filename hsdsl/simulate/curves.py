@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import Polynomial, State
-from hsdsl.simulate import notes
-from hsdsl.simulate.along import Piece, affine_curve, interpolated
+from hsdsl.simulate import diagnostics
 from hsdsl.simulate.interpolation import along_steps, interpolation
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.surface_polynomials import Piece, affine_curve, interpolated
 from hsdsl.simulate.surfaces import at
 
 IN_A_STEP = 64  # pieces of a surface, at most
@@ -16,7 +16,7 @@ LOST_IN_A_STEP, LOST_SHORTEST = 16, 2**9  # the same in a mode whose surfaces ev
 Curves = list[list[Piece]]
 
 
-def curves_along(run: Run, here: Here, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:
+def curves_along(run: Run, here: ModeState, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:
     """Give the pieces of each surface along ``piece``, a step's interpolant from (t, x) to (t + h, z).
 
     Raises
@@ -35,7 +35,7 @@ def curves_along(run: Run, here: Here, t: Number, h: Number, x: State, z: State,
         return surfaces(t + s * h, *at(x, piece, s))
 
     def allowed(k: int) -> Number:
-        return max(here.surfaces.noise(k, t, x), here.surfaces.noise(k, t + h, z))
+        return max(here.surfaces.roundoff_bound(k, t, x), here.surfaces.roundoff_bound(k, t + h, z))
 
     lost = here.mode.name in run.control.lost
     most, shortest = (LOST_IN_A_STEP, LOST_SHORTEST) if lost else (IN_A_STEP, SHORTEST)
@@ -46,15 +46,15 @@ def curves_along(run: Run, here: Here, t: Number, h: Number, x: State, z: State,
     return curves
 
 
-def _lose(run: Run, here: Here, t: Number, curves: Curves) -> None:
+def _lose(run: Run, here: ModeState, t: Number, curves: Curves) -> None:
     """Give up following a mode's surfaces: visits beyond them may be missed from here on."""
     run.control.lost.add(here.mode.name)
     for k, pieces in enumerate(curves):
         if not all(piece.certain for piece in pieces):
-            notes.unsettled(run.recorder, here.mode.name, k, t)
+            diagnostics.unsettled(run.recorder, here.mode.name, k, t)
 
 
-def _affine_curves(here: Here, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:
+def _affine_curves(here: ModeState, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:
     slopes = [gradient(t, *x) for gradient in here.kernel.gradients]
     starts = here.kernel.surfaces(t, *x)
     return [affine_curve(start, row, h, piece, share) for start, row in zip(starts, slopes, strict=True)]

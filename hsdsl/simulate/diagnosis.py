@@ -10,7 +10,7 @@ from hsdsl.integrators import RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import NoSeries, terms
 from hsdsl.simulate.chatter import jump_between
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.stops import show
 
 NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is looked for
@@ -19,7 +19,7 @@ NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is look
 Place = tuple[Number, State]
 
 
-def not_finite(run: Run, here: Here, t: Number, places: Iterable[Place]) -> Stop:
+def not_finite(run: Run, here: ModeState, t: Number, places: Iterable[Place]) -> Stop:
     """Stop at time t, naming the first expression without a finite value at one of ``places``."""
     for place in places:
         if found := without_value(run, here, *place):
@@ -36,7 +36,7 @@ def not_finite(run: Run, here: Here, t: Number, places: Iterable[Place]) -> Stop
     return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
 
 
-def without_value(run: Run, here: Here, t: Number, x: State) -> str | None:
+def without_value(run: Run, here: ModeState, t: Number, x: State) -> str | None:
     """Name the first expression without a finite value at a place."""
     for name, routine in run.kernel.expressions(run.program.modes.index(here.mode), here.segment.data):
         try:
@@ -48,7 +48,7 @@ def without_value(run: Run, here: Here, t: Number, x: State) -> str | None:
     return None
 
 
-def without_value_later(run: Run, here: Here, t: Number) -> str | None:
+def without_value_later(run: Run, here: ModeState, t: Number) -> str | None:
     """Name an expression that time alone takes beyond all numbers before the segment ends, and when, by halving."""
     last, later = t, here.segment.end
     found = without_value(run, here, later, here.x)
@@ -60,7 +60,7 @@ def without_value_later(run: Run, here: Here, t: Number) -> str | None:
     return found
 
 
-def jump_near(run: Run, here: Here, slope: State) -> str | None:
+def jump_near(run: Run, here: ModeState, slope: State) -> str | None:
     """Name a component of the flow that jumps a few steps ahead of a state or behind it, and the place."""
     h, flow = run.control.h, here.kernel.flow
     for n in range(-NEAR, NEAR + 1):
@@ -74,7 +74,7 @@ def jump_near(run: Run, here: Here, slope: State) -> str | None:
     return None
 
 
-def has_no_series(run: Run, here: Here, t: Number) -> bool:
+def has_no_series(run: Run, here: ModeState, t: Number) -> bool:
     """Whether the method is Taylor's and cannot expand the flow where the run stands."""
     method = run.settings.method
     series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
@@ -87,7 +87,7 @@ def has_no_series(run: Run, here: Here, t: Number) -> bool:
     return False
 
 
-def has_no_jacobian(run: Run, here: Here, t: Number) -> bool:
+def has_no_jacobian(run: Run, here: ModeState, t: Number) -> bool:
     """Whether the method is implicit and the flow has no derivatives where the run stands."""
     if not isinstance(run.settings.method, RadauMethod):
         return False
@@ -98,11 +98,11 @@ def has_no_jacobian(run: Run, here: Here, t: Number) -> bool:
     return not all(map(run.arithmetic.isfinite, slopes))
 
 
-def _largest(here: Here) -> str:
+def _largest(here: ModeState) -> str:
     sized = zip(here.arc.values[-1], here.arc.states, here.mode.flow_texts, strict=True)
     value, state, text = max(sized, key=lambda entry: abs(entry[0]))
     return f"{state}, whose flow is {text} and whose value is {show(value)},"
 
 
-def _state(here: Here, x: State) -> str:
+def _state(here: ModeState, x: State) -> str:
     return ", ".join(f"{name} = {show(value)}" for name, value in zip(here.arc.states, x, strict=True))

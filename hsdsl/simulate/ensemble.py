@@ -13,9 +13,9 @@ from hsdsl.execution import REASONS, Array
 from hsdsl.runtime import tables
 from hsdsl.runtime.sampling import BLOCK
 from hsdsl.simulate.compiled import CompiledPlan, task_settings
-from hsdsl.simulate.layouts import Layouts
+from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.timeline import Timeline
+from hsdsl.simulate.state_layouts import StateLayouts
 
 TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
 # why a run ends, by what the loop calls it; where it is stuck only its sentence tells
@@ -100,9 +100,9 @@ class CompiledEnsemble:
         table.stop = self._stop.ctypes.data
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
-        place.desk.run_ensemble(table)
-        if place.desk.failed:
-            raise place.desk.failed[0]
+        place.workspace.run_ensemble(table)
+        if place.workspace.failed:
+            raise place.workspace.failed[0]
         known = np.array([*(ENDED.get(reason, reason) for reason in tables.REASONS), "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
 
@@ -118,18 +118,18 @@ class Place:
         self,
         plan: CompiledPlan,
         names: tuple[str, ...],
-        layouts: Layouts,
+        layouts: StateLayouts,
         samples: int,
     ) -> None:
         self.table = tables.Ensemble()
-        self.desk = plan.desks.new(self.table.task)
-        plan.lay(self.desk)
+        self.workspace = plan.workspaces.new(self.table.task)
+        plan.lay(self.workspace)
         model, chunk, room = plan.compiled.table, self.table.task.chunk, samples + BLOCK
         self._memory = np.zeros(room * (2 + len(names)) + 2 * model.width)
         self._arcs = np.zeros(chunk.arc_room, np.int32)
         sampling, start = self.table.sampling, self._memory.ctypes.data
         ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
-        sampling.width, sampling.degree = model.width, self.desk.degree
+        sampling.width, sampling.degree = model.width, self.workspace.degree
         sampling.columns, sampling.outputs = len(names), model.outputs
         sampling.dimension, sampling.column = plan.sampled.columns(layouts.kinds, names)
         sampling.time, sampling.row, sampling.states = start, start + 8 * room, start + 16 * room

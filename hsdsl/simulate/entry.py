@@ -11,7 +11,7 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
 from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.run import Here, Run, reset
+from hsdsl.simulate.run import ModeState, Run, reset
 from hsdsl.simulate.stops import endless, entered_final, show
 from hsdsl.simulate.surfaces import Crossing
 
@@ -23,11 +23,11 @@ def enter(
     t: Number,
     x: State,
     scale: State,
-    before: Here | None = None,
+    before: ModeState | None = None,
     since: Number = 0,
     inside: frozenset[int] = frozenset(),
     reset_at: Number = None,
-) -> Here | Stop:
+) -> ModeState | Stop:
     """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops.
 
     A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. So
@@ -77,7 +77,7 @@ def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tupl
 LEFT = "leaves it, and no transition is possible there"
 
 
-def left_domain(here: Here, surface: int, t: Number, how: str) -> Stop:
+def left_domain(here: ModeState, surface: int, t: Number, how: str) -> Stop:
     """Stop at a wall (the paper's n' = infinity)."""
     wall = here.mode.walls[surface - len(here.mode.edges)]
     return Stop(

@@ -8,7 +8,7 @@ from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators import TaylorMethod
-from hsdsl.simulate.isolate import total
+from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.settings import Settings
 
 RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial

@@ -12,39 +12,39 @@ from collections.abc import Callable
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate import notes
-from hsdsl.simulate.along import Rise, deflated, rises_along
+from hsdsl.simulate import diagnostics
+from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
-from hsdsl.simulate.isolate import stays_below
-from hsdsl.simulate.relaxed import Landing, go_on, no_way_on, sizes, standing_on
+from hsdsl.simulate.relaxed import Event, go_on, no_way_on, sizes, standing_on
 from hsdsl.simulate.rest import rests
-from hsdsl.simulate.resting import RestSteps, release
-from hsdsl.simulate.run import Here, Run, choose, reset
-from hsdsl.simulate.spans import Span, Stepping, stepping
+from hsdsl.simulate.root_isolation import stays_below
+from hsdsl.simulate.run import ModeState, Run, choose, reset
+from hsdsl.simulate.sticking import RestSteps, release
 from hsdsl.simulate.stops import reached, reached_in_strip
-from hsdsl.simulate.surfaces import Crossing, Obstacle, close_bracket
-from hsdsl.simulate.tails import close_tail, contraction
+from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
+from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
+from hsdsl.simulate.zeno import close_tail, contraction
 
 FREE = 16  # transitions within the relaxation that cost no time
 MOST_CORRECTIONS = 8
 
 
-def located(run: Run, here: Here | Stop) -> Stop:
+def located(run: Run, here: ModeState | Stop) -> Stop:
     """Follow the execution from ``here`` until it stops."""
     while not isinstance(here, Stop):
         outcome = flow(run, here) if here.t < here.segment.end else here
-        if isinstance(outcome, Landing):
+        if isinstance(outcome, Event):
             here = jump(run, here, outcome)
-        elif isinstance(outcome, Here) and not outcome.t < outcome.segment.end:
+        elif isinstance(outcome, ModeState) and not outcome.t < outcome.segment.end:
             here = at_boundary(run, outcome)
         else:
             here = outcome
     return here
 
 
-def flow(run: Run, here: Here) -> Landing | Here | Stop:
+def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     """Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state."""
     edge = rests(run, here)
     until = None if edge is None else release(run, here, edge)
@@ -52,34 +52,34 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         return follow(run, here, stepping(run, here), here.segment.end)
     still = here.resting(edge)
     outcome = follow(run, still, RestSteps(run, still), until)
-    notes.at_rest(run.recorder, here.mode.edges[edge].name, here.t, here.arc.times[-1])
-    if not isinstance(outcome, Here) or not until < here.segment.end:
+    diagnostics.at_rest(run.recorder, here.mode.edges[edge].name, here.t, here.arc.times[-1])
+    if not isinstance(outcome, ModeState) or not until < here.segment.end:
         return outcome
     mode, surfaces = run.program.modes.index(here.mode), here.surfaces
-    return run.place(mode, here.mode.states, until, here.x, surfaces.scale, stood_on=surfaces.stood_on)
+    return run.place(mode, here.mode.states, until, here.x, surfaces.scale, active=surfaces.active)
 
 
-def follow(run: Run, here: Here, steps: Stepping, limit: Number) -> Landing | Here | Stop:
+def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event | ModeState | Stop:
     """Step until a surface is crossed, or to a time in the segment."""
     t, x, arc = here.t, here.x, here.arc
     before: Span | None = None
     while t < limit:
         span = steps.next(t, x, limit)
-        if isinstance(span, Obstacle):
+        if isinstance(span, StepFailure):
             return stuck(run, here.moved(t, x), span)
         try:
             if event := first_event(run, here, before, span):
                 return event
         except DOMAIN_ERRORS:
             return not_finite(run, here.moved(t, x), t, [(t, x), (span.t1, span.z)])
-        if here.surfaces.stood_on:
+        if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
         arc.append(span.t1, span.z, span.piece)
         t, x, before = span.t1, span.z, span
     return here.moved(t, x)
 
 
-def first_event(run: Run, here: Here, before: Span | None, span: Span) -> Landing | Stop | None:
+def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> Event | Stop | None:
     """Say what happens first along a step: a guard, a wall with no guard on it, or nothing."""
     edges = len(here.mode.edges)
     found = [c for k in range(len(span.curves)) if (c := first_crossing(run, here, span, k))]
@@ -95,45 +95,45 @@ def first_event(run: Run, here: Here, before: Span | None, span: Span) -> Landin
         return None
     chosen, alternatives = choose(here, guards, run)
     write(here, span, chosen)
-    return Landing(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
+    return Event(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
 
 
-def largest(here: Here, before: Span | None, span: Span, crossing: Crossing) -> State:
+def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing) -> State:
     """The sizes of the numbers behind a crossing's state: the terms of its step and of the one before."""
     found = tuple(map(max, sizes(span.x, crossing.state, here), span.sizes(crossing.theta)))
     if before is not None:
         found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
-    if crossing.edge in here.surfaces.stood_on:  # it is off the surface by as much as the state was that it came from
+    if crossing.edge in here.surfaces.active:  # it is off the surface by as much as the state was that it came from
         found = tuple(map(max, found, here.surfaces.scale))
     return found
 
 
-def write(here: Here, span: Span, crossing: Crossing) -> None:
+def write(here: ModeState, span: Span, crossing: Crossing) -> None:
     """Record the part of a step that leads to a crossing."""
     if crossing.theta > 0:
         here.arc.append(crossing.time, crossing.state, span.cut(crossing.theta))
 
 
-def first_crossing(run: Run, here: Here, span: Span, k: int) -> Crossing | None:
+def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | None:
     """Find the first point of a step where surface k is crossed and its condition holds."""
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
-    pieces = deflated(span.curves[k]) if k in surfaces.stood_on else span.curves[k]
+    pieces = deflated(span.curves[k]) if k in surfaces.active else span.curves[k]
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
         return touched(run, here, span, k, pieces)
-    first, last = surfaces.noise(k, span.t, span.x), surfaces.noise(k, span.t1, span.z)
+    first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
     for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:
-                notes.unsettled(run.recorder, here.mode.name, k, time)
+                diagnostics.unsettled(run.recorder, here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return touched(run, here, span, k, pieces)
 
 
-def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
+def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
     """Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket."""
-    stands, s, best = k in here.surfaces.stood_on, rise.share, None
+    stands, s, best = k in here.surfaces.active, rise.share, None
 
     def residual(s: Number) -> Number:
         time, q = span.point(s)
@@ -145,7 +145,7 @@ def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number,
         if best is not None and not abs(r) < best[0]:
             break
         best = (abs(r), s)
-        if rise.slope == 0 or abs(r) <= here.surfaces.noise(k, time, q, entry=stands):
+        if rise.slope == 0 or abs(r) <= here.surfaces.roundoff_bound(k, time, q, entry=stands):
             return s, time, q
         s = min(s * 0 + 1, max(s * 0, s - r / rise.slope))
     assert best is not None
@@ -153,7 +153,7 @@ def settled(here: Here, span: Span, k: int, rise: Rise) -> tuple[Number, Number,
     return s, *span.point(s)
 
 
-def bracketed(residual: Callable[[Number], Number], s: Number, here: Here) -> Number:
+def bracketed(residual: Callable[[Number], Number], s: Number, here: ModeState) -> Number:
     """Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there."""
     unit = here.surfaces.arithmetic.unit
     width, one = 8 * unit * max(s, unit), s * 0 + 1
@@ -168,7 +168,7 @@ def bracketed(residual: Callable[[Number], Number], s: Number, here: Here) -> Nu
     return s
 
 
-def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
+def jump(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
     """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
     crossing, until = landing.crossing, run.settings.until
     t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
@@ -176,7 +176,7 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
         return stop
     outcome, resumed = reset(here, crossing, landing.scale, run), t
     if crowded(run, t):
-        notes.crowded(run.recorder, FREE, t)
+        diagnostics.crowded(run.recorder, FREE, t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
@@ -195,7 +195,7 @@ def jump(run: Run, here: Here, landing: Landing) -> Here | Stop:
     if isinstance(entered, Stop):
         return entered
     if run.returns(here, crossing, entered):
-        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return diagnostics.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
     return close_tail(run, entered, crossing.edge)
 
 
@@ -216,7 +216,7 @@ def crowded(run: Run, t: Number) -> bool:
     return flown <= run.settings.relaxation
 
 
-def at_boundary(run: Run, here: Here) -> Here | Stop:
+def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
@@ -224,16 +224,16 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)
-    return jump(run, here, Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
+    return jump(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
 
 
-def stuck(run: Run, here: Here, obstacle: Obstacle) -> Landing | Stop:
+def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:
     """No step is short enough: take a guard that the state stands on, or stop and say why."""
-    if obstacle.kind in ("not finite", "unsolved") and (standing := standing_on(run, here)):
+    if failure.kind in ("not finite", "unsolved") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))
     try:
         slope = here.kernel.flow(here.t, *here.x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, here.t, [(here.t, here.x)])
-    return no_way_on(run, here, obstacle, slope)
+    return no_way_on(run, here, failure, slope)

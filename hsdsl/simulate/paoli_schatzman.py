@@ -22,7 +22,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.recorder import Counted
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
 
@@ -53,7 +53,7 @@ class Path:
         return self.slope(n) if self.contact[n] else (self.z[n + 1] - self.z[n - 1]) / (2 * self.h)
 
 
-def paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
+def paoli_schatzman(run: Run, here: ModeState | Stop) -> Stop:
     """Follow the scheme from ``here`` to the end; ``run.settings.one_stop`` is the model's structure."""
     one_stop, h = run.settings.one_stop, run.settings.step
     if one_stop is None or h is None:
@@ -79,7 +79,7 @@ def paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
     return ended or failed or Stop("until", run.settings.until, f"reached t = {show(run.settings.until)}")
 
 
-def routines_of(run: Run, here: Here) -> Callable[[Number], ModeKernel]:
+def routines_of(run: Run, here: ModeState) -> Callable[[Number], ModeKernel]:
     """Make the function that gives the mode's routines bound to the input segment of a time."""
     if len(run.timeline.segments) == 1:
         return lambda t: here.kernel
@@ -95,7 +95,9 @@ def routines_of(run: Run, here: Here) -> Callable[[Number], ModeKernel]:
     return routines
 
 
-def step_through(run: Run, here: Here, path: Path, routines: Callable[[Number], ModeKernel], steps: int) -> Stop | None:
+def step_through(
+    run: Run, here: ModeState, path: Path, routines: Callable[[Number], ModeKernel], steps: int
+) -> Stop | None:
     """Fill ``path`` up to the step after ``steps``; say why it ends before that, if it does."""
     o = run.settings.one_stop
     assert o is not None
@@ -122,7 +124,7 @@ def step_through(run: Run, here: Here, path: Path, routines: Callable[[Number], 
     return None
 
 
-def write(run: Run, here: Here, path: Path, steps: int) -> Stop | None:
+def write(run: Run, here: ModeState, path: Path, steps: int) -> Stop | None:
     """Write the rows of a path, and the transitions recognised in it; stop at the limit of transitions."""
     one_stop, until = run.settings.one_stop, run.settings.until
     assert one_stop is not None

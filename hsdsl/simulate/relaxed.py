@@ -14,23 +14,23 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
-from hsdsl.simulate import notes
+from hsdsl.simulate import diagnostics
 from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.chatter import Chatter
 from hsdsl.simulate.diagnosis import jump_near, not_finite
 from hsdsl.simulate.entry import LEFT, enter, left_domain
-from hsdsl.simulate.patience import Patience
-from hsdsl.simulate.run import Here, Run, choose, reset
+from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.scales import error_ratio
+from hsdsl.simulate.stall_detection import Patience
 from hsdsl.simulate.stops import reached, reached_in_strip, show
-from hsdsl.simulate.surfaces import TIE, Crossing, Obstacle, Trial
+from hsdsl.simulate.surfaces import TIE, Crossing, StepFailure, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-NOT_FINITE, TOO_WRONG, UNSOLVED = Obstacle("not finite"), Obstacle("error"), Obstacle("unsolved")
+NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
 
 
 @dataclass(frozen=True)
-class Landing:
+class Event:
     """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that."""
 
     crossing: Crossing
@@ -39,48 +39,48 @@ class Landing:
     scale: State
 
 
-Found = Sequence[Crossing] | Obstacle  # no crossing: the step ended inside the domain
+Found = Sequence[Crossing] | StepFailure  # no crossing: the step ended inside the domain
 Attempted = tuple[Found, State, Stages, State | None]
 Attempt = Callable[[Number, Number, Number, State, State], Attempted]
 
 
-def relaxed(run: Run, here: Here | Stop) -> Stop:
+def relaxed(run: Run, here: ModeState | Stop) -> Stop:
     """Follow the relaxed execution from ``here`` until it stops."""
     while not isinstance(here, Stop):
         outcome = flow(run, here)
-        if isinstance(outcome, Landing):
+        if isinstance(outcome, Event):
             here = through_strip(run, here, outcome)
-        elif isinstance(outcome, Here):
+        elif isinstance(outcome, ModeState):
             here = at_boundary(run, outcome)
         else:
             here = outcome
     return here
 
 
-def flow(run: Run, here: Here) -> Landing | Here | Stop:
+def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
     control, method, arc = run.control, run.stepper(here), here.arc
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = 16 + 2 * run.arithmetic.bits
     t, x, limit, patience, chatter = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit), Chatter()
-    stood_on, emerging = here.surfaces.stood_on, here.surfaces.emerging
+    active, emerging = here.surfaces.active, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return not_finite(run, here, t, [(t, x)])
     control.begin(arc.scales, slope)
     while t < limit:
-        h, halvings, ratio, obstacle = control.h, 0, None, TOO_WRONG
+        h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             found, z, stages, end = attempt(t, h, t1, x, slope)
-            if estimate and end is not None and not isinstance(found, Obstacle):
+            if estimate and end is not None and not isinstance(found, StepFailure):
                 ratio = error_ratio(run, here, method, estimate(h, stages, end), t, h, x, z)
                 found = assess(here, found, ratio, Trial(t, h, t1, x, slope, z, stages, here.kernel.flow, method))
-            if not isinstance(found, Obstacle):
+            if not isinstance(found, StepFailure):
                 break
-            obstacle = found
+            failure = found
             too_long = found is TOO_WRONG or (found is UNSOLVED and estimate is not None)
             if too_long and halvings == 0:
                 control.reject(h, None if found is UNSOLVED else ratio)
@@ -92,12 +92,12 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found or end is None:
-            return Landing(*choose(here, found, run), t1, sizes(x, z, here))
-        if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, obstacle, t, x, t1, z)):
+            return Event(*choose(here, found, run), t1, sizes(x, z, here))
+        if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
         if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
-            return stuck(run, here.moved(t, x), Obstacle("jump"), slope)
-        if stood_on or emerging:
+            return stuck(run, here.moved(t, x), StepFailure("jump"), slope)
+        if active or emerging:
             here.surfaces.leave(t1, z)
         arc.times.append(t1)
         arc.values.append(z)
@@ -108,7 +108,7 @@ def flow(run: Run, here: Here) -> Landing | Here | Stop:
     return here.moved(t, x)
 
 
-def attempts(run: Run, here: Here, method: Stepper) -> Attempt:
+def attempts(run: Run, here: ModeState, method: Stepper) -> Attempt:
     """Make the function that tries one step from (t, x) and says where it ended.
 
     It returns what was found, the step's end z, the stages, and the flow at z if it has a value there.
@@ -138,14 +138,14 @@ def attempts(run: Run, here: Here, method: Stepper) -> Attempt:
     return attempt
 
 
-def assess(here: Here, found: Found, ratio: Number, trial: Trial) -> Found:
+def assess(here: ModeState, found: Found, ratio: Number, trial: Trial) -> Found:
     """Look again at an adaptive step that ended where it may: its error, and whether it left the domain on the way."""
     if ratio > 1:
         return TOO_WRONG
     return found or here.surfaces.excursion(trial) or ()
 
 
-def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
+def through_strip(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
     """Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14)."""
     crossing, epsilon, until = landing.crossing, run.settings.relaxation, run.settings.until
     t, q, depth = crossing.time, crossing.state, crossing.depth
@@ -169,11 +169,11 @@ def through_strip(run: Run, here: Here, landing: Landing) -> Here | Stop:
     run.record(here, crossing, resumed, after, landing.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
     if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
-        return notes.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return diagnostics.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
     return entered
 
 
-def moves_on(here: Here, crossing: Crossing, entered: Here) -> bool:
+def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:
     """Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest."""
     if here.mode is entered.mode:
         return False
@@ -184,7 +184,7 @@ def moves_on(here: Here, crossing: Crossing, entered: Here) -> bool:
     return len(one) != len(other) or not takes_back(one, other, [abs(f) for f in one], [f * 0 for f in one])
 
 
-def at_boundary(run: Run, here: Here) -> Here | Stop:
+def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
@@ -200,7 +200,7 @@ def at_boundary(run: Run, here: Here) -> Here | Stop:
     return reached(t)
 
 
-def go_on(run: Run, here: Here) -> Here | Stop:
+def go_on(run: Run, here: ModeState) -> ModeState | Stop:
     """Enter the next segment of the inputs: anew where one of them jumps."""
     t, x, mode, surfaces = here.t, here.x, run.program.modes.index(here.mode), here.surfaces
     if run.timeline.at(t).jump:
@@ -209,42 +209,42 @@ def go_on(run: Run, here: Here) -> Here | Stop:
         except DOMAIN_ERRORS:
             return not_finite(run, here, t, [(t, x)])
         return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside)
-    after = run.place(mode, here.mode.states, t, x, surfaces.scale, stood_on=surfaces.stood_on)
+    after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
     after.surfaces.emerging.update(surfaces.emerging)
     return after
 
 
-def standing_on(run: Run, here: Here) -> list[Crossing]:
+def standing_on(run: Run, here: ModeState) -> list[Crossing]:
     """Guards that the state stands on, to round-off or a tie relative to the time passed."""
     t, x, zero = here.t, here.x, run.arithmetic.zero
     return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, TIE * t)]
 
 
-def stuck(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Landing | Stop:
+def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Event | Stop:
     """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
-    shrunk = obstacle.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
+    shrunk = failure.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
     if shrunk and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Landing(chosen, alternatives, here.t, sizes(here.x, here.x, here))
-    return no_way_on(run, here, obstacle, slope)
+        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+    return no_way_on(run, here, failure, slope)
 
 
-def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
+def no_way_on(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Stop:
     """Stop where no step is short enough, and say why."""
     t, x = here.t, here.x
-    if obstacle.kind == "wall" and obstacle.surface is not None:
-        return left_domain(here, obstacle.surface, t, LEFT)
+    if failure.kind == "wall" and failure.surface is not None:
+        return left_domain(here, failure.surface, t, LEFT)
     instant = run.arithmetic.sqrt(run.arithmetic.unit) * t
     grown = any(
         0 < s < instant * abs(f) for s, f in zip(here.arc.scales, slope, strict=True)
     )  # faster than time can follow
-    if obstacle.kind == "not finite" or (obstacle.kind in ("error", "unsolved", "creeping") and grown):
+    if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and grown):
         h = run.control.h
         ahead = (
             (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True))) for n in range(40, -1, -1)
         )
         return not_finite(run, here, t, ahead)
-    if obstacle.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
+    if failure.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
         why = f"{jump}, and the solution is driven back across that"
         return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {here.mode.name}: {why}")
     why = {
@@ -253,11 +253,11 @@ def no_way_on(run: Run, here: Here, obstacle: Obstacle, slope: State) -> Stop:
         "creeping": "steps had to be cut below a thousandth thousands of times in a row",
         "flat": "the gradient of a guard's surface vanishes on it, as that of sign, floor and squares: "
         "write the guard without them, x >= 1 for floor(x) >= 1",
-    }.get(obstacle.kind, "a guard can neither be passed within the relaxation nor avoided")
+    }.get(failure.kind, "a guard can neither be passed within the relaxation nor avoided")
     return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
 
 
-def sizes(x: State, z: State, here: Here) -> State:
+def sizes(x: State, z: State, here: ModeState) -> State:
     """Return the sizes of the numbers that a point between x and z is computed from.
 
     A state that has not moved since the mode was entered still carries the sizes that it came in with.

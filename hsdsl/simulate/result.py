@@ -14,10 +14,10 @@ from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
 from hsdsl.integrators.stepper import State
 from hsdsl.program import Program
 from hsdsl.runtime.sampling import Sampler
-from hsdsl.simulate import notes
-from hsdsl.simulate.chunks import arcs_of, transitions_of
+from hsdsl.simulate import diagnostics
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.compiled import CompiledRun
+from hsdsl.simulate.output_buffers import arcs_of, transitions_of
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 
@@ -180,16 +180,16 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
         **({"scale": dict(settings.scale)} if settings.scale else {}),
         **({} if samples is None else {"samples": samples}),
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
-        **({"left_out": {"states": list(left_out), "reason": notes.LEFT_OUT}} if left_out else {}),
+        **({"left_out": {"states": list(left_out), "reason": diagnostics.LEFT_OUT}} if left_out else {}),
     }
 
 
 def _assessment(run: Run, execution: Execution, estimated: bool) -> Verdict:
     if run.settings.one_stop is not None:
-        return Verdict("unknown", notes.TWO_STEP)
-    from hsdsl.simulate.verdict import Looking, assess  # not every run is asked for it
+        return Verdict("unknown", diagnostics.TWO_STEP)
+    from hsdsl.simulate.verdict import RunView, assess  # not every run is asked for it
 
-    return assess(Looking(run, execution, estimated), run.recorder.departures, run.recorder.doubts)
+    return assess(RunView(run, execution, estimated), run.recorder.departures, run.recorder.doubts)
 
 
 def _assessed(under_way: CompiledRun, execution: Execution, estimated: bool) -> Verdict:

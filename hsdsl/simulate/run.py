@@ -14,15 +14,15 @@ from hsdsl.kernel import Kernel, ModeKernel
 from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate.cascade import Cascade
 from hsdsl.simulate.control import Control
+from hsdsl.simulate.input_segments import Segment, Timeline
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import limit, reset_not_finite
 from hsdsl.simulate.surfaces import TIE, Crossing, Surfaces
-from hsdsl.simulate.timeline import Segment, Timeline
 
 
 @dataclass(frozen=True)
-class Here:
+class ModeState:
     """Where a run stands, ready to flow: mode, input segment, time and state.
 
     ``scale`` is the size of the numbers each state was computed from when the mode was entered.
@@ -36,11 +36,11 @@ class Here:
     t: Number
     x: State
 
-    def moved(self, t: Number, x: State) -> Here:
+    def moved(self, t: Number, x: State) -> ModeState:
         """Return the same place in the mode's life, later."""
-        return Here(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
+        return ModeState(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
 
-    def resting(self, edge: int | None) -> Here:
+    def resting(self, edge: int | None) -> ModeState:
         """Return the same place as one at rest on the guard of an edge."""
         return replace(self, surfaces=replace(self.surfaces, resting=edge))
 
@@ -62,7 +62,7 @@ class Run:
         """The run's number type."""
         return self.kernel.arithmetic
 
-    def stepper(self, here: Here) -> Stepper:
+    def stepper(self, here: ModeState) -> Stepper:
         """The method for the mode that the run is in."""
         method = self.settings.method
         assert method is not None
@@ -90,9 +90,9 @@ class Run:
         t: Number,
         x: State,
         scale: State,
-        before: Here | None = None,
-        stood_on: set[int] | None = None,
-    ) -> Here:
+        before: ModeState | None = None,
+        active: set[int] | None = None,
+    ) -> ModeState:
         """Enter a mode: bind its routines to the input segment of this time and open an arc.
 
         A final mode without a flow has the states, and so the outputs, of the mode ``before`` it.
@@ -103,10 +103,10 @@ class Run:
         if outputs is None and before is not None and before.mode.states == states:
             outputs = before.kernel.outputs
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
-        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(stood_on or ()))
-        return Here(program, kernel, surfaces, segment, arc, t, x)
+        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
+        return ModeState(program, kernel, surfaces, segment, arc, t, x)
 
-    def wait(self, here: Here, rows: list[tuple[Number, Number]], q: State) -> None:
+    def wait(self, here: ModeState, rows: list[tuple[Number, Number]], q: State) -> None:
         """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""
         mode = self.program.modes.index(here.mode)
 
@@ -115,7 +115,7 @@ class Run:
 
         self.recorder.strip(here.arc, rows, q, outputs if rows[-1][0] > here.segment.end else here.arc.outputs)
 
-    def returns(self, here: Here, made: Crossing, entered: Here) -> bool:
+    def returns(self, here: ModeState, made: Crossing, entered: ModeState) -> bool:
         """Whether a transition from an arc without any flow led back to where its cascade has been."""
         return self.cascade.returns(made.time > here.arc.times[0], self.program.modes.index(entered.mode), entered.x)
 
@@ -127,7 +127,7 @@ class Run:
 
     def record(
         self,
-        here: Here,
+        here: ModeState,
         crossing: Crossing,
         resumed: Number | None,
         after: State | None,
@@ -152,7 +152,7 @@ class Run:
         )
 
 
-def choose(here: Here, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
+def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
     """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
 
     Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. Returns the
@@ -168,7 +168,7 @@ def choose(here: Here, crossings: Sequence[Crossing], run: Run) -> tuple[Crossin
     return chosen, tuple(edges[k].name for k in sorted(tied) if k != edge)
 
 
-def reset(here: Here, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
+def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
     """Apply a reset to the values before the jump; also the sizes of the numbers the new state came from."""
     k, t, q = crossing.edge, crossing.time, crossing.state
     edge, isfinite = here.mode.edges[k], run.arithmetic.isfinite

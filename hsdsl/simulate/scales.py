@@ -12,11 +12,11 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.linear import Vector
 from hsdsl.integrators.scales import resolved, rows_of
 from hsdsl.integrators.stepper import State, Stepper
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
 
 
 def error_ratio(
-    run: Run, here: Here, method: Stepper, error: State, t: Number, h: Number, x: State, z: State
+    run: Run, here: ModeState, method: Stepper, error: State, t: Number, h: Number, x: State, z: State
 ) -> Number:
     """Error ratio of a step from (t, x) to z; at most 1 is acceptable."""
     control, had = run.control, here.arc.scales
@@ -36,7 +36,7 @@ def error_ratio(
     return ratio
 
 
-def flow_sizes(run: Run, here: Here, slope: State) -> Vector:
+def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
     """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
     mode, scales = run.program.modes.index(here.mode), here.arc.scales
     found: Vector = []
@@ -49,7 +49,7 @@ def flow_sizes(run: Run, here: Here, slope: State) -> Vector:
     return found
 
 
-def instant(run: Run, here: Here, slope: State) -> Number:
+def instant(run: Run, here: ModeState, slope: State) -> Number:
     """A time in which no state moves by more than about half the digits of its scale."""
     least = run.settings.until
     for s, f in zip(here.arc.scales, slope, strict=True):

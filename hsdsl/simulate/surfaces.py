@@ -39,7 +39,7 @@ class Crossing:
 
 
 @dataclass(frozen=True)
-class Obstacle:
+class StepFailure:
     """Why a trial step ends outside the relaxed domain."""
 
     kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump"]
@@ -102,8 +102,8 @@ def shortened(piece: Polynomial, theta: Number) -> Polynomial:
 def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: State, scale: State) -> Number:
     """Below this a surface value counts as zero: 32 u (|L| + |R| + |dr/dt| |t| + sum |dr/dx_i| |x_i|).
 
-    ``scale`` holds the sizes of the numbers a state was computed from (see `Here.scale`): a state that a reset or a
-    cancellation made small carries the round-off of what made it.
+    ``scale`` holds the sizes of the numbers a state was computed from (see `ModeState.scale`): a state that a reset
+    or a cancellation made small carries the round-off of what made it.
     """
     total = magnitude + abs(gradient[0]) * abs(t)
     for g, a, s in zip(gradient[1:], x, scale, strict=True):
@@ -116,7 +116,7 @@ class Surfaces:
     """A mode's surfaces with what is needed to judge a point.
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
-    ``stood_on``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
+    ``active``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
     state while it waited in a strip, and that the flow leads back through. ``resting`` is the edge on whose guard the
     state rests, if it does.
     """
@@ -125,11 +125,11 @@ class Surfaces:
     edges: tuple[EdgeProgram, ...]
     scale: State
     arithmetic: Arithmetic
-    stood_on: set[int] = field(default_factory=set[int])
+    active: set[int] = field(default_factory=set[int])
     emerging: set[int] = field(default_factory=set[int])
     resting: int | None = None
 
-    def noise(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
+    def roundoff_bound(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
         """Round-off of surface k at a point; where its gradient has no value only the sides count."""
         magnitude, unit = self.kernel.magnitudes(t, *x)[k], self.arithmetic.unit
         try:
@@ -138,7 +138,7 @@ class Surfaces:
                 raise ValueError("a surface as steep as a wall")
         except DOMAIN_ERRORS:
             return ROUNDOFF_UNITS * unit * magnitude
-        scale = self.scale if entry or k in self.stood_on else tuple(self.arithmetic.zero for _ in x)
+        scale = self.scale if entry or k in self.active else tuple(self.arithmetic.zero for _ in x)
         return roundoff(unit, magnitude, gradient, t, x, scale)
 
     def enter(
@@ -158,28 +158,28 @@ class Surfaces:
         beyond: list[int] = []
         then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)
         for k, r in enumerate(values):
-            noise = self.noise(k, t, x, entry=True)
+            noise = self.roundoff_bound(k, t, x, entry=True)
             if since and abs(r) > noise:
                 noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
             if r > noise and not then[k] > noise:
-                self.stood_on.add(k)
+                self.active.add(k)
                 if self.kernel.rates[k](t, *x)[0] < 0:
                     self.emerging.add(k)
             elif r > noise or (k in inside and r >= -noise):
                 beyond.append(k)
             elif r >= -noise:
-                self.stood_on.add(k)
+                self.active.add(k)
         return beyond
 
     def inside(self, t: Number, x: State) -> frozenset[int]:
         """Edges without an `if` whose surfaces the state has not reached."""
         values, plain = self.kernel.surfaces(t, *x), [k for k, edge in enumerate(self.edges) if not edge.conditional]
-        return frozenset(k for k in plain if values[k] < -self.noise(k, t, x))
+        return frozenset(k for k in plain if values[k] < -self.roundoff_bound(k, t, x))
 
     def leave(self, t: Number, x: State) -> None:
         """Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false."""
         values = self.kernel.surfaces(t, *x)
-        self.stood_on.difference_update([k for k in self.stood_on if abs(values[k]) > self.noise(k, t, x)])
+        self.active.difference_update([k for k in self.active if abs(values[k]) > self.roundoff_bound(k, t, x)])
         if self.emerging:
             inside = [k for k in self.emerging if values[k] <= 0 or not self._falls(k, t, x)]
             self.emerging.difference_update(inside)
@@ -211,14 +211,14 @@ class Surfaces:
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], rates[k](t, *x)[0]
-                near = abs(r) <= max(self.noise(k, t, x), rate * since)
+                near = abs(r) <= max(self.roundoff_bound(k, t, x), rate * since)
                 if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)
             except DOMAIN_ERRORS:
                 continue
         return found
 
-    def excursion(self, trial: Trial) -> Obstacle | None:
+    def excursion(self, trial: Trial) -> StepFailure | None:
         """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
 
         Only where the flow points out of a surface at the step's start and back in at its end; asked of adaptive steps,
@@ -231,7 +231,7 @@ class Surfaces:
                 out = self._rate(gradient(trial.t, *trial.x), trial.slope)
                 back = self._rate(gradient(trial.t1, *trial.z), trial.end)
                 if out > 0 >= back and self._beyond_within(trial, k):
-                    return Obstacle("deep", k)
+                    return StepFailure("deep", k)
             except DOMAIN_ERRORS:
                 continue
         return None
@@ -243,33 +243,33 @@ class Surfaces:
         return total
 
     def _beyond_within(self, trial: Trial, k: int) -> bool:
-        if self.kernel.surfaces(trial.t, *trial.x)[k] > self.noise(k, trial.t, trial.x):
+        if self.kernel.surfaces(trial.t, *trial.x)[k] > self.roundoff_bound(k, trial.t, trial.x):
             return False  # transparent, and beyond already
         for i in range(1, SCAN):
             s = (self.arithmetic.zero + i) / SCAN
             t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
-            if self.kernel.surfaces(t, *x)[k] > self.noise(k, t, x):
+            if self.kernel.surfaces(t, *x)[k] > self.roundoff_bound(k, t, x):
                 return k >= len(self.edges) or bool(self.kernel.conditions[k](t, *x)[0])
         return False
 
-    def judge(self, trial: Trial, values: Vector, epsilon: Number) -> list[Crossing] | Obstacle:
+    def judge(self, trial: Trial, values: Vector, epsilon: Number) -> list[Crossing] | StepFailure:
         """Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
 
         Raises one of ``DOMAIN_ERRORS`` where a surface or condition has no finite value on the way.
         """
-        noise = {k: self.noise(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
+        noise = {k: self.roundoff_bound(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
         beyond = [k for k in noise if not values[k] <= noise[k]]
         for k in beyond:
             if k >= len(self.edges) and k not in self.emerging:
-                return Obstacle("wall", k)
-            if not self._transparent(k) and (obstacle := self._too_deep(trial, values, noise, k, epsilon)):
-                return obstacle
+                return StepFailure("wall", k)
+            if not self._transparent(k) and (failure := self._too_deep(trial, values, noise, k, epsilon)):
+                return failure
         crossings: list[Crossing] = []
         for k in beyond:
             if k >= len(self.edges):
                 continue
             found = self._crossing(trial, values, noise, k, epsilon)
-            if isinstance(found, Obstacle):
+            if isinstance(found, StepFailure):
                 return found
             if found is not None:
                 crossings.append(found)
@@ -277,15 +277,15 @@ class Surfaces:
 
     def _too_deep(
         self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
-    ) -> Obstacle | None:
+    ) -> StepFailure | None:
         norm = self.norm(trial.t1, trial.z, k)
         if not norm > 0:
-            return Obstacle("flat", k)
-        return None if values[k] <= epsilon * norm + noise[k] else Obstacle("deep", k)
+            return StepFailure("flat", k)
+        return None if values[k] <= epsilon * norm + noise[k] else StepFailure("deep", k)
 
     def _crossing(
         self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
-    ) -> Crossing | Obstacle | None:
+    ) -> Crossing | StepFailure | None:
         """Find the last up-crossing of surface k on the interpolant; None where the surface is transparent there."""
         piece = trial.piece
         found = self._on(trial, piece, k)
@@ -298,14 +298,14 @@ class Surfaces:
             found = self._on(trial, piece, k) or found
             inward = self._inward(trial, found, noise[k], k)
         if inward:
-            return Obstacle("inward", k)
+            return StepFailure("inward", k)
         theta, time, q = found
         if not self.kernel.conditions[k](time, *q)[0]:
             return None
-        if obstacle := self._too_deep(trial, values, noise, k, epsilon):
-            return obstacle
+        if failure := self._too_deep(trial, values, noise, k, epsilon):
+            return failure
         if self._deeper_before(trial, piece, theta, k, values[k] + noise[k]):
-            return Obstacle("deep", k)
+            return StepFailure("deep", k)
         return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
 
     def _transparent(self, k: int) -> bool:
@@ -329,7 +329,7 @@ class Surfaces:
     def _smallest(self, trial: Trial, k: int) -> Number:
         """How close to zero a crossing of this step can be told: round-off of its own numbers, no older ones."""
         sizes = tuple(max(abs(a), abs(b)) for a, b in zip(trial.x, trial.z, strict=True))
-        return self.noise(k, trial.t1, sizes) * ROOT_SHARE
+        return self.roundoff_bound(k, trial.t1, sizes) * ROOT_SHARE
 
     def _on(self, trial: Trial, piece: Polynomial, k: int) -> tuple[Number, Number, State] | None:
         """Return (theta, time, state) of the last up-crossing on ``piece``; None if r was beyond all along."""
@@ -339,7 +339,7 @@ class Surfaces:
 
         theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
         if theta is None:
-            if self._transparent(k) and value(self.arithmetic.zero) > self.noise(k, trial.t, trial.x):
+            if self._transparent(k) and value(self.arithmetic.zero) > self.roundoff_bound(k, trial.t, trial.x):
                 return None
             theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
         if theta == 0:

@@ -10,16 +10,16 @@ from collections.abc import Sequence
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.along import Piece, slope_of
-from hsdsl.simulate.isolate import total
-from hsdsl.simulate.run import Here, Run
-from hsdsl.simulate.spans import Span
+from hsdsl.simulate.dense_steps import Span
+from hsdsl.simulate.root_isolation import total
+from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.surface_polynomials import Piece, slope_of
 from hsdsl.simulate.surfaces import ROUNDOFF_UNITS, Crossing, at
 
 TURNINGS = 60  # halvings of a step
 
 
-def touched(run: Run, here: Here, span: Span, k: int, pieces: list[Piece]) -> Crossing | None:
+def touched(run: Run, here: ModeState, span: Span, k: int, pieces: list[Piece]) -> Crossing | None:
     """Return where in a step surface k is reached so and its condition holds, on the step's own polynomial."""
     c, one = pieces[0].coefficients, run.arithmetic.zero + 1
     if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None:
@@ -32,7 +32,7 @@ def touched(run: Run, here: Here, span: Span, k: int, pieces: list[Piece]) -> Cr
             return None
         share = turning(c, one)
         time, q = span.t + share * span.h, at(span.x, span.piece, share)
-    elif not abs(span.ends[k]) <= here.surfaces.noise(k, span.t, span.x):
+    elif not abs(span.ends[k]) <= here.surfaces.roundoff_bound(k, span.t, span.x):
         return None
     if not ends_at(run, here, k, time, q):
         return None
@@ -49,7 +49,7 @@ def turning(c: Sequence[Number], one: Number) -> Number:
     return low
 
 
-def ends_at(run: Run, here: Here, k: int, time: Number, q: State) -> bool:
+def ends_at(run: Run, here: ModeState, k: int, time: Number, q: State) -> bool:
     """Whether a state is on surface k, within the error of a step, and the flow has no value beyond."""
     zero, tolerance = run.arithmetic.zero, run.control.tolerance
     gradient = here.kernel.gradients[k](time, *q)[1:]

@@ -19,7 +19,7 @@ from hsdsl.errors import UsageError
 from hsdsl.model import Model
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import runtime
-from hsdsl.simulate import chunks
+from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
@@ -37,8 +37,8 @@ def test_both_sides_have_one_idea_of_every_structure():
 
 @needs_compiler
 def test_rows_in_many_chunks_are_the_same_rows(monkeypatch):
-    monkeypatch.setattr(chunks, "LEAST_ROWS", 16)
-    monkeypatch.setattr(chunks, "MOST_ROWS", 64)
+    monkeypatch.setattr(output_buffers, "LEAST_ROWS", 16)
+    monkeypatch.setattr(output_buffers, "MOST_ROWS", 64)
     oscillator = hsdsl.load(OSCILLATOR)
     for settings in (
         {"method": "dopri5", "tolerance": 1e-6},

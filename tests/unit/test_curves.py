@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from hsdsl.elaborate import elaborate
 from hsdsl.model import Model
-from hsdsl.simulate.along import affine_curve
-from hsdsl.simulate.isolate import value
+from hsdsl.simulate.root_isolation import value
+from hsdsl.simulate.surface_polynomials import affine_curve
 from hsdsl.simulate.surfaces import at
 
 TEXT = """

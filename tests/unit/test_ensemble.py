@@ -16,7 +16,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.execution.same import same
 from hsdsl.model import Model
-from hsdsl.simulate import chunks
+from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
@@ -100,7 +100,7 @@ def test_modes_of_several_sizes_inputs_and_failures(engine):
 
 @needs_compiler
 def test_small_chunks_give_the_same(monkeypatch):
-    monkeypatch.setattr(chunks, "LEAST_ROWS", 16)
+    monkeypatch.setattr(output_buffers, "LEAST_ROWS", 16)
     for loaded in (hsdsl.load(OSCILLATOR), model(MODES)):
         name = "a" if "a" in loaded.program.parameters and "c" not in loaded.program.parameters else "c"
         values = np.linspace(0.3, 0.9, 5)

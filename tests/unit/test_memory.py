@@ -11,7 +11,7 @@ from engines import COMPILER
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.limits import Limits
-from hsdsl.simulate import chunks
+from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
@@ -68,8 +68,8 @@ def test_memory_that_is_refused_by_the_system_ends_a_run_as_well(monkeypatch):
 
     original = np.empty
     model = hsdsl.load(OSCILLATOR)
-    monkeypatch.setattr(chunks, "MOST_ROWS", 1 << 14)  # what the tests before have left room for
-    monkeypatch.setattr(chunks.np, "empty", empty)
+    monkeypatch.setattr(output_buffers, "MOST_ROWS", 1 << 14)  # what the tests before have left room for
+    monkeypatch.setattr(output_buffers.np, "empty", empty)
     run = model.simulate(engine="c", step=1e-7, method="rk4", until=1)
     monkeypatch.undo()
     assert run.stop.reason == "memory_limit" and run.times[-1] == run.stop.time > 0

@@ -16,7 +16,7 @@ from engines import needs_compiler
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.simulate import chunks
+from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 CASES = Path(__file__).parents[1] / "conformance" / "cases"
@@ -38,7 +38,7 @@ def table(path):
     ids=lambda p: p.stem,
 )
 def test_rows_are_those_of_a_kept_run(path, rows, every, tmp_path, monkeypatch):
-    monkeypatch.setattr(chunks, "LEAST_ROWS", rows)
+    monkeypatch.setattr(output_buffers, "LEAST_ROWS", rows)
     model, asked = (
         hsdsl.load(path),
         {"scheme": "relaxed", "method": "rk4", "step": "0.0171", "relaxation": 1e-3, "until": 8},

@@ -12,7 +12,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.limits import Limits, applied
 from hsdsl.lower import lower
-from hsdsl.simulate.timeline import Timeline, make_timeline
+from hsdsl.simulate.input_segments import Timeline, make_timeline
 
 MODEL = """hsdsl: 1
 parameters: {{p: 0.3}}

@@ -5,7 +5,7 @@
 
 /* Component k of the flow at the share s of the way from (t, x) to (t1, z). */
 static int flow_between(hs_run *run, int k, double t, const double *x, double t1, const double *z, double s, double *f) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   for (int i = 0; i < here->dimension; i++) run->at[i] = x[i] + s * (z[i] - x[i]);
   if (here->table->flow(here->p, t + s * (t1 - t), run->at, run->source)) return RAISED;
   *f = run->source[k];

@@ -15,7 +15,7 @@ static int surfaces_along(hs_run *run, double s, double *values) {
 static int noise_at_ends(hs_run *run, int k, double *allowed) {
   const hs_span *span = &run->span;
   double first, last;
-  if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t + span->h, run->z, 0, &last))
+  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t + span->h, run->z, 0, &last))
     return RAISED;
   *allowed = hs_max(first, last);
   return 0;

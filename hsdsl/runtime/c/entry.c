@@ -29,7 +29,7 @@ static void choose_entry(hs_run *run, const int *beyond, double t) {
    that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
 static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since, int jumped,
                  double reset_at) {
-  hs_here before = run->here;
+  hs_mode_state before = run->here;
   forget(&run->task->visited);
   for (;; from_here = 1, jumped = 0, reset_at = t) {
     place(run, mode, dimension, t, from_here ? &before : 0);

@@ -28,9 +28,9 @@
 #include "stepper.c"
 
 #include "control.c"
-#include "patience.c"
+#include "stall_detection.c"
 #include "surfaces.c"
-#include "timeline.c"
+#include "input_segments.c"
 #include "recorder.c"
 #include "run.c"
 #include "visited.c"
@@ -38,13 +38,13 @@
 #include "cascade.c"
 #include "chatter.c"
 #include "relaxed.c"
-#include "isolate.c"
-#include "along.c"
+#include "root_isolation.c"
+#include "surface_polynomials.c"
 #include "curves.c"
-#include "spans.c"
+#include "dense_steps.c"
 #include "rest.c"
-#include "resting.c"
-#include "tails.c"
+#include "sticking.c"
+#include "zeno.c"
 #include "touching.c"
 #include "located.c"
 #include "sample.c"
@@ -109,7 +109,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->noise = numbers(store, m);
   run->gradient = numbers(store, w + 1);
   run->both = numbers(store, 2 * (int64_t)w);
-  run->stood_on = take(store, m, sizeof(int));
+  run->active_surfaces = take(store, m, sizeof(int));
   run->beyond = take(store, m, sizeof(int));
   run->emerging = take(store, m, sizeof(int));
   run->tied = take(store, e, sizeof(int));

@@ -102,7 +102,7 @@ typedef struct {
 
 typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
 
-/* What a run says besides: see hsdsl/simulate/notes.py. `surface` is an edge where there is no doubt about a surface. */
+/* What a run says besides: see hsdsl/simulate/diagnostics.py. `surface` is an edge where there is no doubt about a surface. */
 typedef struct {
   int32_t kind;
   int32_t mode;
@@ -166,7 +166,7 @@ typedef enum {
   HS_CREEPING,
   HS_UNSOLVED,
   HS_JUMP
-} hs_obstacle;
+} hs_step_failure;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;
    `slope` and `h` are the state and time at the end of a step along which something has no value; `scales` are those of
@@ -176,7 +176,7 @@ typedef struct {
   int32_t mode;
   int32_t dimension;
   int32_t edge;
-  int32_t obstacle;
+  int32_t failure;
   int32_t surface; /* -1 for none */
   int64_t segment;
   double time;

@@ -8,7 +8,7 @@ enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON,
 static int is_passed_by(hs_run *run, int k) {
   const hs_curves *curves = &run->curves;
   run->bernstein_of = 0;
-  if (run->stood_on[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
+  if (run->active_surfaces[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
   if (!(run->ends[k] <= 0)) return 0;
   for (int i = 0; i < curves->parts; i++)
     if (!stays_below(run, coefficients_of(curves, i, k), *degree_of(curves, i, k), *off_of(curves, i, k))) return 0;
@@ -46,7 +46,7 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
     least = fabs(r), best = s;
     crossing->theta = s;
     if (rise->slope == 0) return 0;
-    if (noise_of(run, k, crossing->time, crossing->state, run->stood_on[k], &noise)) return RAISED;
+    if (roundoff_bound(run, k, crossing->time, crossing->state, run->active_surfaces[k], &noise)) return RAISED;
     if (fabs(r) <= noise) return 0;
     s = hs_min(1.0, hs_max(s * 0, s - r / rise->slope));
   }
@@ -60,7 +60,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   double first, last;
   if (is_passed_by(run, k)) return touched(run, k, crossing);
-  if (noise_of(run, k, span->t, run->x, 0, &first) || noise_of(run, k, span->t1, run->z, 0, &last)) return RAISED;
+  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last)) return RAISED;
   hs_walk walk = begin_walk(k, hs_max(first, last), coefficients_of(&run->curves, 0, k)[0] > first, run->ends[k] > last);
   hs_rise rise;
   while (next_rise(run, &walk, &rise)) {
@@ -85,7 +85,7 @@ static void largest(hs_run *run) {
     double *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
-    if (run->stood_on[crossing->edge]) *found = hs_max(*found, run->scale[s]);
+    if (run->active_surfaces[crossing->edge]) *found = hs_max(*found, run->scale[s]);
   }
 }
 
@@ -143,7 +143,7 @@ static int first_event(hs_run *run) {
 }
 
 /* No step is short enough: take a guard that the state stands on, or stop and say why. */
-static int located_stuck(hs_run *run, hs_obstacle kind) {
+static int located_stuck(hs_run *run, hs_step_failure kind) {
   const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
@@ -152,7 +152,7 @@ static int located_stuck(hs_run *run, hs_obstacle kind) {
   }
   if (run->here.table->flow(run->here.p, run->here.t, run->x, run->task->stop.slope))
     return stopped(run, HS_HERE_NOT_FINITE, run->here.t);
-  run->task->stop.obstacle = kind;
+  run->task->stop.failure = kind;
   run->task->stop.surface = -1;
   return stopped(run, HS_STUCK, run->here.t);
 }
@@ -179,14 +179,14 @@ HS_INLINE void go_to_end(hs_run *run) {
 
 /* Step until a surface is crossed, or to a time in the segment. */
 HS_INLINE int follow(hs_run *run, const int n, double limit) {
-  hs_here *const here = &run->here;
+  hs_mode_state *const here = &run->here;
   run->sloped = run->creeping = run->has_before = run->chatter = 0;
   run->ratio = 1;
   forget_steps(run);
   while (here->t < limit) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
-    const hs_obstacle obstacle = run->resting < 0 ? next_span(run, n, limit) : next_rest(run, n, limit);
-    if (obstacle != HS_CLEAR) return located_stuck(run, obstacle);
+    const hs_step_failure failure = run->resting < 0 ? next_span(run, n, limit) : next_rest(run, n, limit);
+    if (failure != HS_CLEAR) return located_stuck(run, failure);
     const int event = first_event(run);
     if (event == WITHOUT_VALUE) return step_not_finite(run);
     if (event != GOES_ON) return event;
@@ -199,7 +199,7 @@ HS_INLINE int follow(hs_run *run, const int n, double limit) {
 
 /* Rest until a surface is crossed, to the segment's end, or until the guard of edge k lets go of the state. */
 static int rest(hs_run *run, int k, double until) {
-  hs_here *const here = &run->here;
+  hs_mode_state *const here = &run->here;
   const double from = here->t;
   run->resting = k;
   const int outcome = follow(run, here->dimension, until);

@@ -64,7 +64,7 @@ static void begin(hs_run *run, int kind) {
 
 /* Write a strip: the state waits at q while time and depth pass through `rows`; inputs go on. */
 static void strip(hs_run *run, int rows, double (*row)[2], const double *q) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const int further = row[rows - 1][0] > run->task->timeline->end[here->segment];
   begin(run, HS_STRIP);
   for (int i = 0; i < rows; i++) {

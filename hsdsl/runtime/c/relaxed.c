@@ -8,7 +8,7 @@ enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and r
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
 HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const hs_mode *mode = here->table;
   hs_trial *trial = &run->trial;
   const int m = mode->surfaces;
@@ -27,7 +27,7 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
   }
   if (!hs_finite(sum(run->z, n) + sum(run->ahead, m))) return NOT_FINITE;
   if (judge(run, run->ahead, &found)) return trial->ends = 0, NOT_FINITE;
-  if (found.obstacle != HS_CLEAR || found.crossings || ends(run, trial)) {
+  if (found.failure != HS_CLEAR || found.crossings || ends(run, trial)) {
     ends(run, trial);
     return found;
   }
@@ -59,7 +59,7 @@ static int standing_on(hs_run *run) {
 }
 
 /* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
-static int stuck(hs_run *run, hs_obstacle kind, int surface) {
+static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP;
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
@@ -68,7 +68,7 @@ static int stuck(hs_run *run, hs_obstacle kind, int surface) {
     run->landed_at = run->here.t;
     return LANDED;
   }
-  run->task->stop.obstacle = kind;
+  run->task->stop.failure = kind;
   run->task->stop.surface = surface;
   copy(run->task->stop.slope, run->slope, run->here.dimension);
   return stopped(run, HS_STUCK, run->here.t);
@@ -95,7 +95,7 @@ static int interrupted(hs_run *run) {
 
 /* Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9). */
 HS_INLINE int flow_in(hs_run *run, const int n) {
-  hs_here *here = &run->here;
+  hs_mode_state *here = &run->here;
   hs_control *control = &run->control;
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const double limit = run->task->timeline->end[here->segment];
@@ -115,7 +115,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       else
         h = limit - here->t, t1 = limit;
       found = attempt(run, n, h, t1);
-      if (adaptive && run->trial.ends && found.obstacle == HS_CLEAR) {
+      if (adaptive && run->trial.ends && found.failure == HS_CLEAR) {
         local_error(run, h);
         ratio = error_ratio(run, h);
         if (ratio > 1)
@@ -123,17 +123,17 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
         else if (!found.crossings)
           found = excursion(run, &run->trial);
       }
-      if (found.obstacle == HS_CLEAR) break;
+      if (found.failure == HS_CLEAR) break;
       last = found;
-      const int too_long = found.obstacle == HS_ERROR || (found.obstacle == HS_UNSOLVED && adaptive);
+      const int too_long = found.failure == HS_ERROR || (found.failure == HS_UNSOLVED && adaptive);
       if (too_long && halvings == 0) {
-        reject(control, h, found.obstacle == HS_UNSOLVED ? NAN : ratio);
+        reject(control, h, found.failure == HS_UNSOLVED ? NAN : ratio);
         h = control->h;
       } else {
         h = h / 2, halvings++;
       }
       if (halvings > MOST_HALVINGS || (too_long && (struggles(control) || !(here->t + h > here->t))))
-        return stuck(run, found.obstacle, found.surface);
+        return stuck(run, found.failure, found.surface);
     }
     if (ratio == ratio && halvings == 0) accept(control, h, ratio);
     if (found.crossings || !run->trial.ends) {
@@ -143,7 +143,7 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
       return LANDED;
     }
     if (halvings || !(t1 > here->t)) {
-      const hs_obstacle given_up = patience_ends(run, halvings, last.obstacle, last.surface, t1);
+      const hs_step_failure given_up = patience_ends(run, halvings, last.failure, last.surface, t1);
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
     if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
@@ -175,8 +175,8 @@ static int in_strip(hs_run *run, hs_reason reason, double t) {
 }
 
 /* Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest. */
-static int moves_on(hs_run *run, const hs_here *before, int unknown) {
-  const hs_here *here = &run->here;
+static int moves_on(hs_run *run, const hs_mode_state *before, int unknown) {
+  const hs_mode_state *here = &run->here;
   if (before->mode == here->mode) return 0;
   if (unknown || here->table->flow(here->p, here->t, run->x, run->end)) return 1;
   if (before->dimension != here->dimension) return 1;
@@ -207,7 +207,7 @@ static int through_strip(hs_run *run) {
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
-  const hs_here before = run->here;
+  const hs_mode_state before = run->here;
   const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
   if (entered != GOES_ON || !returns(run, t > before.entered_at)) return entered;
@@ -217,7 +217,7 @@ static int through_strip(hs_run *run) {
 /* Enter the next segment of the inputs: anew where one of them jumps. */
 static int go_on(hs_run *run) {
   const double t = run->here.t;
-  const hs_here before = run->here;
+  const hs_mode_state before = run->here;
   const int64_t segment = segment_at(run->task->timeline, t);
   if (run->task->timeline->jump[segment]) {
     if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);

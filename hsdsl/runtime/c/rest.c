@@ -31,7 +31,7 @@ static double rest_noise(const hs_run *run, int s) { return SAME_UNITS * HS_UNIT
 
 /* Whether edge k is possible and its reset leaves the state where it is, on a surface that does not move. */
 static int stays(hs_run *run, double t, const double *x, int k) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   int still = 1;
   if (here->table->edge[k].reset(here->p, t, x, run->after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
@@ -43,7 +43,7 @@ static int stays(hs_run *run, double t, const double *x, int k) {
 
 /* Which derivative of the surface along the flow decides: 1 or 2; 0 where the first one points inwards. */
 static int push_order(hs_run *run, double t, const double *x, int k) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   double rate, size = 0.0;
   if (here->table->flow(here->p, t, x, run->end) || here->table->gradients[k](here->p, t, x, run->gradient) ||
       here->table->rates[k](here->p, t, x, &rate) || flow_sizes(run, t, x, run->end))
@@ -55,7 +55,7 @@ static int push_order(hs_run *run, double t, const double *x, int k) {
 
 /* The first or second derivative of surface k along the flow through x, at time t. */
 static int push(hs_run *run, double t, const double *x, int k, int order, double *value) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const hs_mode *mode = here->table;
   double ahead;
   if (order == 1) return mode->rates[k](here->p, t, x, value);
@@ -81,7 +81,7 @@ static int is_pushed(hs_run *run, double t, const double *x, int k) {
 
 /* Whether the flow moves the state only in the direction that the reset takes back. */
 static int moves_alone(hs_run *run, double t, const double *x, int k) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const int n = here->dimension;
   double *const slope = run->end, *const ahead = run->at, *const back = run->after;
   if (here->table->flow(here->p, t, x, slope)) return RAISED;
@@ -99,10 +99,10 @@ static int moves_alone(hs_run *run, double t, const double *x, int k) {
 
 /* The edge on whose guard the state rests; -1 where it moves. */
 static int rests(hs_run *run) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   if (!here->standing || here->dimension != here->table->dimension || !here->dimension) return -1;
   for (int k = 0; k < here->table->edges; k++)
-    if (run->stood_on[k] && here->table->edge[k].target == here->mode && stays(run, here->t, run->x, k) == 1 &&
+    if (run->active_surfaces[k] && here->table->edge[k].target == here->mode && stays(run, here->t, run->x, k) == 1 &&
         is_pushed(run, here->t, run->x, k) == 1 && moves_alone(run, here->t, run->x, k) == 1)
       return k;
   return -1;

@@ -21,8 +21,8 @@ static void hand_on_scales(hs_run *run, const hs_mode *from, const hs_mode *to) 
 
 /* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
    A final mode without a flow has the states, and so the outputs, of the mode before it. */
-static void place(hs_run *run, int mode, int dimension, double t, const hs_here *before) {
-  hs_here here;
+static void place(hs_run *run, int mode, int dimension, double t, const hs_mode_state *before) {
+  hs_mode_state here;
   here.mode = mode;
   here.dimension = dimension;
   here.table = &run->model->mode[mode];

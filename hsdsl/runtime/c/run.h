@@ -42,9 +42,9 @@ typedef struct {
   const double *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const double *outputs_p;
-  int standing, emerging;  /* numbers of surfaces in stood_on and in run->emerging */
+  int standing, emerging;  /* numbers of surfaces in active_surfaces and in run->emerging */
   double t, entered_at;
-} hs_here;
+} hs_mode_state;
 
 /* One step as tried, from (t, x) to (t1, z). */
 typedef struct {
@@ -54,9 +54,9 @@ typedef struct {
   hs_polynomial piece;
 } hs_trial;
 
-/* What a trial step found: crossings, an obstacle, or nothing. */
+/* What a trial step found: crossings, an failure, or nothing. */
 typedef struct {
-  hs_obstacle obstacle;
+  hs_step_failure failure;
   int surface;
   int crossings;
 } hs_found;
@@ -145,7 +145,7 @@ typedef struct {
   const hs_method *method;
   int width;
   double epsilon, until;
-  hs_here here;
+  hs_mode_state here;
   hs_trial trial;
   hs_control control;
   hs_patience patience;
@@ -162,7 +162,7 @@ typedef struct {
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
   double *values, *ahead, *magnitudes, *noise; /* one for each surface */
-  int *stood_on, *beyond, *emerging;
+  int *active_surfaces, *beyond, *emerging;
   double *source;      /* the flow that led to a transition, or between two states */
   int *tied;           /* one for each edge */
   double *gradient;    /* width + 1 */

@@ -11,7 +11,7 @@ enum { RAISED = -1 };
 static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0};
 static const hs_found TOO_WRONG = {HS_ERROR, -1, 0}, UNSOLVED = {HS_UNSOLVED, -1, 0};
 
-static hs_found obstacle(hs_obstacle kind, int surface) {
+static hs_found failure(hs_step_failure kind, int surface) {
   const hs_found found = {kind, surface, 0};
   return found;
 }
@@ -64,15 +64,15 @@ static int surface(hs_run *run, int k, double t, const double *x, double *r) {
 }
 
 /* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
-static int noise_of(hs_run *run, int k, double t, const double *x, int entry, double *noise) {
-  const hs_here *here = &run->here;
+static int roundoff_bound(hs_run *run, int k, double t, const double *x, int entry, double *noise) {
+  const hs_mode_state *here = &run->here;
   const int n = here->dimension;
   if (here->table->magnitudes(here->p, t, x, run->magnitudes)) return RAISED;
   double total = run->magnitudes[k];
   double *const g = run->gradient;
   if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
     total = total + fabs(g[0]) * fabs(t);
-    const int scaled = entry || run->stood_on[k];
+    const int scaled = entry || run->active_surfaces[k];
     for (int s = 0; s < n; s++) total = total + fabs(g[s + 1]) * hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0);
   }
   *noise = ROUNDOFF_UNITS * HS_UNIT * total;
@@ -90,20 +90,20 @@ static int enter_surfaces(hs_run *run, double t, double since, int jumped, doubl
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double noise, rate;
     const int inside = jumped && beyond[k];
-    run->stood_on[k] = run->emerging[k] = beyond[k] = 0;
-    if (noise_of(run, k, t, run->x, 1, &noise)) return RAISED;
+    run->active_surfaces[k] = run->emerging[k] = beyond[k] = 0;
+    if (roundoff_bound(run, k, t, run->x, 1, &noise)) return RAISED;
     if (since != 0 && fabs(values[k]) > noise) {
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
     }
     if (values[k] > noise && !(then[k] > noise)) {
-      run->stood_on[k] = 1, run->here.standing++;
+      run->active_surfaces[k] = 1, run->here.standing++;
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       if (rate < 0) run->emerging[k] = 1, run->here.emerging++;
     } else if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
     else if (values[k] >= -noise)
-      run->stood_on[k] = 1, run->here.standing++;
+      run->active_surfaces[k] = 1, run->here.standing++;
   }
   return 0;
 }
@@ -116,7 +116,7 @@ static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
     double noise;
     inside[k] = 0;
     if (k >= mode->edges || mode->edge[k].conditional) continue;
-    if (noise_of(run, k, t, x, 0, &noise)) return RAISED;
+    if (roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
     inside[k] = run->values[k] < -noise;
   }
   return 0;
@@ -126,8 +126,8 @@ static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
 static void leave(hs_run *run, double t, const double *x) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
     double r, noise;
-    if (!run->stood_on[k] || surface(run, k, t, x, &r) || noise_of(run, k, t, x, 0, &noise)) continue;
-    if (fabs(r) > noise) run->stood_on[k] = 0, run->here.standing--;
+    if (!run->active_surfaces[k] || surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) continue;
+    if (fabs(r) > noise) run->active_surfaces[k] = 0, run->here.standing--;
   }
   for (int k = 0; run->here.emerging && k < run->here.table->surfaces; k++) {
     double r, rate = 0.0;
@@ -177,7 +177,7 @@ static int standing(hs_run *run, double t, const double *x, double since, int *f
     double r, rate, noise;
     found[k] = 0;
     if (k == run->resting || surface(run, k, t, x, &r) || rate_of(run, k, t, x, &rate)) continue;
-    if (noise_of(run, k, t, x, 0, &noise)) continue;
+    if (roundoff_bound(run, k, t, x, 0, &noise)) continue;
     if (fabs(r) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1) found[k] = 1, count++;
   }
   return count;
@@ -210,13 +210,13 @@ static int piece_of(hs_run *run, hs_trial *trial) {
 static int beyond_within(hs_run *run, hs_trial *trial, int k) {
   const hs_mode *mode = run->here.table;
   double r, noise;
-  if (surface(run, k, trial->t, run->x, &r) || noise_of(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+  if (surface(run, k, trial->t, run->x, &r) || roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
   if (r > noise) return 0; /* transparent, and beyond already */
   for (int i = 1; i < SCAN; i++) {
     const double s = (0.0 + i) / SCAN, t = trial->t + s * trial->h;
     if (piece_of(run, trial)) return RAISED;
     at(run, &trial->piece, s, run->at);
-    if (surface(run, k, t, run->at, &r) || noise_of(run, k, t, run->at, 0, &noise)) return RAISED;
+    if (surface(run, k, t, run->at, &r) || roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
     if (r > noise) return k >= mode->edges ? 1 : condition(run, k, t, run->at);
   }
   return 0;
@@ -236,7 +236,7 @@ static hs_found excursion(hs_run *run, hs_trial *trial) {
     double out, back;
     if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
     if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
-    if (out > 0 && 0 >= back && beyond_within(run, trial, k) == 1) return obstacle(HS_DEEP, k);
+    if (out > 0 && 0 >= back && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
   }
   return CLEAR;
 }
@@ -296,7 +296,7 @@ static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, doub
 static int smallest(hs_run *run, int k, double *small) {
   double *const sizes = run->at;
   for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
-  if (noise_of(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
+  if (roundoff_bound(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
   *small = *small * ROOT_SHARE;
   return 0;
 }
@@ -326,7 +326,7 @@ static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossin
     if (is_transparent(run, k)) {
       at(run, piece, 0.0, run->at);
       if (surface(run, k, trial->t + 0.0 * trial->h, run->at, &r)) return RAISED;
-      if (noise_of(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+      if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
       if (r > noise) return 0;
     }
     theta = 0.0; /* on the surface to round-off: it is crossed as the step begins */
@@ -353,12 +353,12 @@ static int inward_of(hs_run *run, int k, const hs_crossing *crossing, double *in
 static int too_deep(hs_run *run, int k, const double *values, hs_found *found) {
   double norm;
   if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
-  if (!(norm > 0)) return *found = obstacle(HS_FLAT, k), 1;
+  if (!(norm > 0)) return *found = failure(HS_FLAT, k), 1;
   if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
-  return *found = obstacle(HS_DEEP, k), 1;
+  return *found = failure(HS_DEEP, k), 1;
 }
 
-/* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an obstacle. */
+/* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an failure. */
 static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *crossing, hs_found *found) {
   hs_trial *trial = &run->trial;
   const hs_polynomial *piece = &trial->piece;
@@ -375,13 +375,13 @@ static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *cr
     }
     if (crossed_on(run, piece, k, crossing) == RAISED || inward_of(run, k, crossing, &inward)) return RAISED;
   }
-  if (inward != 0) return *found = obstacle(HS_INWARD, k), 0;
+  if (inward != 0) return *found = failure(HS_INWARD, k), 0;
   status = condition(run, k, crossing->time, crossing->state);
   if (status != 1) return status;
   status = too_deep(run, k, values, found);
   if (status) return status == RAISED ? RAISED : 0;
   status = deeper_before(run, piece, crossing->theta, k, values[k] + run->noise[k]);
-  if (status) return status == RAISED ? RAISED : (*found = obstacle(HS_DEEP, k), 0);
+  if (status) return status == RAISED ? RAISED : (*found = failure(HS_DEEP, k), 0);
   crossing->edge = k;
   crossing->depth = hs_min(run->epsilon, values[k] / norm);
   shortened(run, piece, crossing->theta, &crossing->piece);
@@ -394,10 +394,10 @@ static int judge(hs_run *run, const double *values, hs_found *found) {
   const hs_mode *mode = run->here.table;
   *found = CLEAR;
   for (int k = 0; k < mode->surfaces; k++)
-    if (!(values[k] <= 0) && noise_of(run, k, run->trial.t1, run->z, 0, &run->noise[k])) return RAISED;
+    if (!(values[k] <= 0) && roundoff_bound(run, k, run->trial.t1, run->z, 0, &run->noise[k])) return RAISED;
   for (int k = 0; k < mode->surfaces; k++) {
     if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    if (k >= mode->edges && !run->emerging[k]) return *found = obstacle(HS_WALL, k), 0;
+    if (k >= mode->edges && !run->emerging[k]) return *found = failure(HS_WALL, k), 0;
     if (is_transparent(run, k)) continue;
     const int status = too_deep(run, k, values, found);
     if (status) return status == RAISED ? RAISED : 0;
@@ -407,7 +407,7 @@ static int judge(hs_run *run, const double *values, hs_found *found) {
     if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
     const int status = crossing_of(run, k, values, &run->crossings[count], found);
     if (status == RAISED) return RAISED;
-    if (found->obstacle != HS_CLEAR) return 0;
+    if (found->failure != HS_CLEAR) return 0;
     count += status;
   }
   found->crossings = count;

@@ -4,7 +4,7 @@
 
 /* Whether a crossing's state is on surface k, within the error of a step, and the flow has no value beyond. */
 static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const int n = here->dimension;
   double r, off = 0.0, norm = 0.0;
   const double time = crossing->time, *const q = crossing->state, *const g = run->gradient + 1;
@@ -54,7 +54,7 @@ static int touched(hs_run *run, int k, hs_crossing *crossing) {
     crossing->time = span->t + share * span->h;
     at(run, &span->piece, share, crossing->state);
   } else {
-    if (noise_of(run, k, span->t, run->x, 0, &noise)) return RAISED;
+    if (roundoff_bound(run, k, span->t, run->x, 0, &noise)) return RAISED;
     if (!(fabs(run->ends[k]) <= noise)) return 0;
   }
   const int ends = ends_at(run, k, crossing);

@@ -25,28 +25,28 @@ from collections.abc import Iterator, Sequence
 from hsdsl.execution import Stop, Transition, Verdict
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations
-from hsdsl.simulate.verdict.choices import choices
+from hsdsl.simulate.verdict.commutation import choices
 from hsdsl.simulate.verdict.crossings import crossings
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.flows import flows
 from hsdsl.simulate.verdict.landings import landings
-from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.misses import misses
 from hsdsl.simulate.verdict.reliability import reliability
+from hsdsl.simulate.verdict.run_view import RunView
 
-__all__ = ["Looking", "assess"]
+__all__ = ["RunView", "assess"]
 
 MOST_NAMED = 4  # findings of one kind
 INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
 LEFT = ("left_domain", "zeno")
 
 
-def assess(run: Looking, departures: Sequence[str], doubts: Sequence[str]) -> Verdict:
+def assess(run: RunView, departures: Sequence[str], doubts: Sequence[str]) -> Verdict:
     """Say whether the theorem's hypotheses hold for a run, are left, or cannot be told.
 
     Parameters
     ----------
-    run : Looking
+    run : RunView
         What was recorded.
     departures, doubts : sequence of str
         What the loop itself noted: where it left what the theorem is about, and what it could not check.
@@ -84,7 +84,7 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
             yield f"and {len(same) - MOST_NAMED} more like the last"
 
 
-def _unchecked(run: Looking, stop: Stop, transitions: Sequence[Transition]) -> Iterator[str]:
+def _unchecked(run: RunView, stop: Stop, transitions: Sequence[Transition]) -> Iterator[str]:
     if stop.reason in INCOMPLETE:
         yield f"the run did not get to its end: {stop.message}"
     elif run.errors is None:

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from itertools import accumulate, pairwise
 
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 
 CROWD = 16  # transitions within the relaxation of flow
 
 
-def accumulations(run: Looking) -> Iterator[str]:
+def accumulations(run: RunView) -> Iterator[str]:
     """Say where transitions first crowd together, and where they are last seen to."""
     relaxation, made = run.run.settings.relaxation, run.transitions
     if len(made) <= CROWD:

@@ -11,11 +11,11 @@ from hsdsl.execution import Arc, Transition
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.run_view import RunView
 
 
-def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
+def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every transition that the flow made."""
     found: list[Finding] = []
     slowest: Number | None = None
@@ -44,7 +44,7 @@ def crossings(run: Looking) -> tuple[list[Finding], list[str]]:
     return found, [each + (f", {times(least)} what the error could undo" if least is not None else "")]
 
 
-def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
+def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
     """How often the error fits into what keeps the crossing; None where nothing tells."""
     if run.errors is None:
         return None
@@ -58,7 +58,7 @@ def _margin(run: Looking, place: Place, k: int, arc: Arc | None, made: Transitio
 
 
 def _findings(
-    run: Looking, place: Place, k: int, rate: Number, margin: Number | None, made: Transition
+    run: RunView, place: Place, k: int, rate: Number, margin: Number | None, made: Transition
 ) -> list[Finding]:
     found: list[Finding] = []
     where = f"{made.edge} at t = {show(made.time)}"

@@ -8,15 +8,15 @@ from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
-from hsdsl.simulate.verdict.choices import commute
+from hsdsl.simulate.verdict.commutation import commute
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.judged import judged
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 
 TWICE = 2  # as long as it takes to reach a surface: reached together
 
 
-def at_its_end(run: Looking, arc: Arc, crossed: int | None) -> Iterator[Finding]:
+def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]:
     """Surfaces about to be reached where another is crossed or an input jumps: an error may change their order."""
     place, until = run.at_row(arc, arc.last), run.run.settings.until
     if crossed is None and (place.t >= until or not run.run.timeline.at(place.t).jump):
@@ -24,7 +24,7 @@ def at_its_end(run: Looking, arc: Arc, crossed: int | None) -> Iterator[Finding]
     if crossed is None:
         place = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
-        if k == crossed or place.value(k) > place.noise(k) or not place.rate(k) > 0:
+        if k == crossed or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
         finding = judged(run, place, k, arc.last, "is about to reach")
         if finding is None:
@@ -44,7 +44,7 @@ def at_its_end(run: Looking, arc: Arc, crossed: int | None) -> Iterator[Finding]
             yield Finding("order", "unknown", f"{sentence}, and it matters")
 
 
-def at_the_end(run: Looking) -> Iterator[Finding]:
+def at_the_end(run: RunView) -> Iterator[Finding]:
     """Surfaces that would be reached just behind the end, and a transition just before it."""
     if run.errors is None or run.unreliable or run.stop.reason != "until" or not run.flows:
         return

@@ -18,7 +18,7 @@ from hsdsl.enclosures import as_range
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.looking import Looking, visited
+from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 14
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 STEEP = re.compile(r"\b(?:sqrt|asin|acos|acosh)\(|\*\* *(?:\(|[a-zA-Z_]|\d*\.|\d+/)")
 
 
-def flows(run: Looking) -> tuple[list[Finding], list[str]]:
+def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at the flow of every mode along all steps in it."""
     jumping = [mode for mode in visited(run) if mode.jumps]
     found = [_jumping(jumping)] if jumping else []
@@ -48,14 +48,14 @@ def _jumping(modes: Sequence[ModeProgram]) -> Finding:
     return Finding("jump", "unknown", sentence)
 
 
-def _named(run: Looking, what: str, how: str, parts: Parts, _: Any) -> Iterator[Finding]:
+def _named(run: RunView, what: str, how: str, parts: Parts, _: Any) -> Iterator[Finding]:
     if len(parts):
         first = float((parts.time + parts.start * parts.length).min())
         name = run.run.program.modes[parts.mode].name
         yield Finding("flow", "unknown", f"{what} of mode {name} {how} close to t = {show(first)}")
 
 
-def _unseen(run: Looking, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
+def _unseen(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     """Parts of steps on which the flow may be what the step's polynomial does not show."""
     number = np.zeros(int(steps.row.max(initial=0)) + 1, dtype=int)
     number[steps.row] = np.arange(len(steps))
@@ -70,7 +70,7 @@ def _unseen(run: Looking, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     return undecided(steps, decides, HALVINGS)
 
 
-def _beyond(run: Looking, parts: Parts) -> Array:
+def _beyond(run: RunView, parts: Parts) -> Array:
     """How far the enclosed flow lies beyond the derivatives of the polynomials; shape (N, n)."""
     n, (below, above) = len(parts), parts.slopes()
     flow = [as_range(f) for f in parts.bound(run).flow(parts.times, *parts.states())]
@@ -78,7 +78,7 @@ def _beyond(run: Looking, parts: Parts) -> Array:
     return np.stack(sides, axis=1) if sides else np.zeros((n, 0))
 
 
-def _steep(run: Looking, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
+def _steep(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     """Parts of steps on which a derivative of the flow may have no bound."""
 
     def decides(parts: Parts) -> NDArray[np.bool_]:

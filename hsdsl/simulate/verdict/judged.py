@@ -8,8 +8,8 @@ from hsdsl.arithmetic import Number
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.run_view import RunView
 
 ROUNDS = 48  # of closing in on a zero
 TWICE = 2  # as deep as a strip: beyond a surface
@@ -19,12 +19,12 @@ def has_condition(place: Place, k: int) -> bool:
     return k < len(place.mode.edges) and place.mode.edges[k].conditional
 
 
-def may_hold(run: Looking, place: Place, k: int, row: int) -> bool:
+def may_hold(run: RunView, place: Place, k: int, row: int) -> bool:
     """Whether the `if` of an edge holds at a place or at a state that the error moves it to."""
     return place.conditions(k, run.around(place, row)) != {False}
 
 
-def judged(run: Looking, place: Place, k: int, row: int, how: str) -> Finding | None:
+def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | None:
     """Say whether the error could make another execution of a surface that the run is close to, or beyond."""
     value, shift, conditional = place.value(k), run.shift(place, k, row), has_condition(place, k)
     if conditional and not may_hold(run, place, k, row):
@@ -39,9 +39,9 @@ def judged(run: Looking, place: Place, k: int, row: int, how: str) -> Finding | 
     return None
 
 
-def _level(run: Looking, place: Place, k: int) -> Number:
+def _level(run: RunView, place: Place, k: int) -> Number:
     """Below this a surface value is none: round-off, and a strip of the relaxed scheme."""
-    level = place.noise(k)
+    level = place.roundoff_bound(k)
     if run.run.settings.scheme == "relaxed":
         slopes = place.kernel.gradients[k](place.t, *place.x)
         level = level + TWICE * run.run.settings.relaxation * sum((abs(g) for g in slopes), level * 0)

@@ -16,15 +16,15 @@ from hsdsl.program import JUMPS
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.run_view import RunView
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
 ROUNDS = 3  # of Newton's method, back onto a guard
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
-def landings(run: Looking) -> tuple[list[Finding], list[str]]:
+def landings(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at where every arc of flow begins, and at every reset."""
     if run.errors is None:
         return [], []
@@ -45,8 +45,8 @@ def landings(run: Looking) -> tuple[list[Finding], list[str]]:
     return found, []
 
 
-def _on(run: Looking, arc: Arc, place: Place, k: int, made: Transition | None) -> Iterator[Finding]:
-    value, rate, noise = place.value(k), place.rate(k), place.noise(k)
+def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -> Iterator[Finding]:
+    value, rate, noise = place.value(k), place.rate(k), place.roundoff_bound(k)
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
     if arc.first == 0:
@@ -67,13 +67,13 @@ def _on(run: Looking, arc: Arc, place: Place, k: int, made: Transition | None) -
     yield Finding("landing", "unknown", f"the reset of {made.edge} lands {times(margin)} the error away from {where}")
 
 
-def _tied(run: Looking, made: Transition) -> bool:
+def _tied(run: RunView, made: Transition) -> bool:
     """Whether a transition follows another at one instant: `choices` looks at these."""
     before = run.transitions[made.index - 1] if made.index else None
     return before is not None and before.resumed is not None and made.time - before.resumed <= run.tie(made.time)
 
 
-def _keeps(run: Looking, made: Transition, k: int, value: Number) -> bool:
+def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
     """Whether states near the one before a transition, moved along its guard, land where surface k has its value."""
     before, edge = run.before(made)
     target = before.mode.edges[edge].target
@@ -97,7 +97,7 @@ def _untouched(place: Place, edge: int) -> bool:
     return place.mode.affine and all(text == name for name, text, slope in rows if slope)
 
 
-def _along(run: Looking, place: Place, edge: int, error: State) -> Iterator[State]:
+def _along(run: RunView, place: Place, edge: int, error: State) -> Iterator[State]:
     """The state moved by the error in each component, and then back onto the guard."""
     for moved in place.moved_by(error):
         x = moved
@@ -111,7 +111,7 @@ def _along(run: Looking, place: Place, edge: int, error: State) -> Iterator[Stat
         yield x
 
 
-def _continuous(run: Looking, made: Transition) -> Iterator[Finding]:
+def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     """Whether the reset of a transition, and the inputs, are continuous around it."""
     assert run.errors is not None
     place, k = run.before(made)
@@ -129,7 +129,7 @@ def _continuous(run: Looking, made: Transition) -> Iterator[Finding]:
         yield Finding("reset", "unknown", f"the reset of {where} jumps within the error")
 
 
-def _samples_near(run: Looking, t: Number) -> Iterator[tuple[float, bool]]:
+def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
     """The boundaries of the input segments on either side of a time, and whether an input jumps there."""
     segment = run.run.timeline.at(t)
     yield float(segment.start), segment.jump
@@ -137,7 +137,7 @@ def _samples_near(run: Looking, t: Number) -> Iterator[tuple[float, bool]]:
         yield float(segment.end), run.run.timeline.at(segment.end).jump
 
 
-def _spread(run: Looking, place: Place, k: int, error: list[float], late: float) -> list[float]:
+def _spread(run: RunView, place: Place, k: int, error: list[float], late: float) -> list[float]:
     """How far apart the results of a reset may be over a box around a place."""
     data = [Range(float(v), float(v)) for v in run.run.timeline.at(place.t).data]
     kernel = run.run.kernel.enclosing.bind(run.index(place.mode.name), data)

@@ -19,7 +19,7 @@ from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 from hsdsl.simulate.verdict.transparent import passed_at, transparent
 
@@ -45,7 +45,7 @@ class Miss(NamedTuple):
     time: Number
 
 
-def misses(run: Looking) -> tuple[list[Finding], list[str]]:
+def misses(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every surface along every arc."""
     if run.errors is None:
         return [], []
@@ -74,7 +74,7 @@ def misses(run: Looking) -> tuple[list[Finding], list[str]]:
     return [*found, *at_the_end(run)], [*said, *(passed_at(name, at) for name, at in passed.items())]
 
 
-def _turning(run: Looking, steps: Parts) -> list[Open]:
+def _turning(run: RunView, steps: Parts) -> list[Open]:
     """Where surfaces may turn close to zero, by the enclosures."""
     mode = run.run.program.modes[steps.mode]
     count = len(mode.edges) + len(mode.walls)
@@ -115,7 +115,7 @@ def _together(spans: list[Open]) -> list[Open]:
     return joined
 
 
-def _turned(run: Looking, arc: Arc, each: Open) -> Finding | None:
+def _turned(run: RunView, arc: Arc, each: Open) -> Finding | None:
     """Look at a surface on parts of a step that the enclosures leave open."""
     k, last = each.surface, each.row + 1 == arc.last
     if last and run.crossed.get(arc.last) == k and each.end >= 1:
@@ -140,7 +140,7 @@ def _shares(each: Open) -> list[float]:
     return [each.start + (each.end - each.start) * i / (LOOKS - 1) for i in range(LOOKS)]
 
 
-def _nearest(run: Looking, steps: Parts) -> Miss | None:
+def _nearest(run: RunView, steps: Parts) -> Miss | None:
     """The turning point that comes closest to its surface, measured in errors."""
     mode = run.run.program.modes[steps.mode]
     count, best = len(mode.edges) + len(mode.walls), None

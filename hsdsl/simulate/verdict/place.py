@@ -38,9 +38,9 @@ class Place:
         terms = (abs(g * f) for g, f in zip(gradient[1:], slope, strict=True))
         return TANGENT_UNITS * self.surfaces.arithmetic.unit * sum(terms, abs(gradient[0]))
 
-    def noise(self, k: int) -> Number:
+    def roundoff_bound(self, k: int) -> Number:
         """Round-off of surface k."""
-        return self.surfaces.noise(k, self.t, self.x)
+        return self.surfaces.roundoff_bound(k, self.t, self.x)
 
     def moved_by(self, error: State) -> Iterator[State]:
         """The state, and with each component moved by its error either way."""

@@ -6,13 +6,13 @@ from hsdsl.enclosures import Range, as_range
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS, SAFE
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 
 PLACES = 64  # of a run where the round-off of its flow is looked at
 ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
 
 
-def reliability(run: Looking) -> tuple[list[Finding], list[str]]:
+def reliability(run: RunView) -> tuple[list[Finding], list[str]]:
     """Say from when on the run and its finer repetition differ in more than digits."""
     if run.unreliable is None:
         return [], []
@@ -20,7 +20,7 @@ def reliability(run: Looking) -> tuple[list[Finding], list[str]]:
     return [Finding("reliability", "unknown", f"the run is unreliable from t = {show(time)} on: {why}")], []
 
 
-def unreliable(run: Looking) -> tuple[float, str] | None:
+def unreliable(run: RunView) -> tuple[float, str] | None:
     """From when on the run is unreliable, and why; None where it is not."""
     if run.errors is None:
         return None
@@ -35,7 +35,7 @@ def unreliable(run: Looking) -> tuple[float, str] | None:
     return min(found, default=None)
 
 
-def _roundoff(run: Looking) -> dict[str, float]:
+def _roundoff(run: RunView) -> dict[str, float]:
     """What round-off in the flow alone may move each state by over the run.
 
     A state that stays near zero by cancellation has no digit right, and nothing is wrong with it.

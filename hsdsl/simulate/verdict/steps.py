@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hsdsl.enclosures import Range, as_range
 from hsdsl.kernel import ModeKernel
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 
 Array = NDArray[np.float64]
 MOST_PARTS = 1 << 15  # looked at together
@@ -107,12 +107,12 @@ class Parts:
         """The data as a kernel over intervals takes them."""
         return [Range(column, column) for column in self.data.T]
 
-    def bound(self, run: Looking) -> ModeKernel:
+    def bound(self, run: RunView) -> ModeKernel:
         """The mode's routines over intervals, with the data of these parts."""
         return run.run.kernel.enclosing.bind(self.mode, self.bound_data)
 
 
-def steps_of(run: Looking) -> Iterator[Parts]:
+def steps_of(run: RunView) -> Iterator[Parts]:
     """Give the steps of all arcs of flow, those of a mode together, as many at once as memory allows."""
     times = np.asarray(run.execution.times, dtype=float)
     ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
@@ -125,7 +125,7 @@ def steps_of(run: Looking) -> Iterator[Parts]:
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
 
-def _steps(run: Looking, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
+def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
     execution, n, errors = run.execution, len(states), run.errors
     times = np.asarray(execution.times, dtype=float)
     values = np.asarray(execution.values[rows, :n], dtype=float)
@@ -142,7 +142,7 @@ def _steps(run: Looking, mode: int, states: Sequence[str], rows: NDArray[np.int6
     return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ _to_bernstein(whole.shape[2] - 1), error, data)
 
 
-def _data(run: Looking, times: Array) -> Array:
+def _data(run: RunView, times: Array) -> Array:
     segments = run.run.timeline.segments
     if len(segments) == 1:
         return np.array([segments[0].data], dtype=float)

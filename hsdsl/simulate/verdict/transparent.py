@@ -11,11 +11,11 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.judged import closed_in
-from hsdsl.simulate.verdict.looking import Looking
+from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low
 
 
-def transparent(run: Looking, steps: Parts, passed: dict[str, list[Number]]) -> Iterator[Finding]:
+def transparent(run: RunView, steps: Parts, passed: dict[str, list[Number]]) -> Iterator[Finding]:
     """Surfaces passed where their condition does not hold: does it all around? Notes in ``passed`` where it does."""
     edges = run.run.program.modes[steps.mode].edges
     if not any(edge.conditional for edge in edges):
@@ -33,7 +33,9 @@ def transparent(run: Looking, steps: Parts, passed: dict[str, list[Number]]) -> 
             if run.crossed.get(arc.last) == k and row + 1 == arc.last:
                 continue
             place = closed_in(run.between(arc, row), lambda place: place.value(k))  # noqa: B023
-            if place.value(k) > 0 or abs(place.value(k)) <= SAFE * run.shift(place, k, row + 1) + place.noise(k):
+            if place.value(k) > 0 or abs(place.value(k)) <= SAFE * run.shift(place, k, row + 1) + place.roundoff_bound(
+                k
+            ):
                 if place.conditions(k, run.around(place, row + 1)) == {False}:
                     passed.setdefault(edge.name, []).append(place.t)
                 else:

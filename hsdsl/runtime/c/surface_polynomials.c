@@ -1,4 +1,4 @@
-/* Surfaces along one step, as polynomials of the share s of the step. See hsdsl/simulate/along.py. */
+/* Surfaces along one step, as polynomials of the share s of the step. See hsdsl/simulate/surface_polynomials.py. */
 
 #define MOST_SPLITS 30 /* MOST_HALVINGS there */
 #define MOST_FIRST 3

@@ -1,4 +1,4 @@
-/* When to stop trying ever shorter steps. See hsdsl/simulate/patience.py. */
+/* When to stop trying ever shorter steps. See hsdsl/simulate/stall_detection.py. */
 
 #define IDLE_UNITS 64
 #define MOST_IDLE 64
@@ -7,7 +7,7 @@
 
 /* Whether the surface in the way did not come nearer: its round-off is larger than what the step adds. */
 static int still(hs_run *run, int surface, double t1) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   if (surface < 0) return 0;
   if (here->table->values(here->p, here->t, run->x, run->values)) return 0;
   const double before = run->values[surface];
@@ -21,8 +21,8 @@ static int unmoved(const hs_run *run) {
   return 1;
 }
 
-/* Count a step from run->x to run->z that was halved because of `obstacle`; say what ends the run, if anything. */
-static hs_obstacle patience_ends(hs_run *run, int halvings, hs_obstacle obstacle, int surface, double t1) {
+/* Count a step from run->x to run->z that was halved because of `failure`; say what ends the run, if anything. */
+static hs_step_failure patience_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, double t1) {
   hs_patience *patience = &run->patience;
   const double t = run->here.t;
   if (t != patience->reached) patience->idle = patience->creeping = 0;
@@ -30,6 +30,6 @@ static hs_obstacle patience_ends(hs_run *run, int halvings, hs_obstacle obstacle
   const int small = t1 - t <= IDLE_UNITS * HS_UNIT * hs_max(t, run->control.h);
   patience->idle = small || still(run, surface, t1) ? patience->idle + 1 : 0;
   patience->creeping = halvings >= CREEPING ? patience->creeping + 1 : 0;
-  if (patience->idle > MOST_IDLE || (small && unmoved(run))) return obstacle;
+  if (patience->idle > MOST_IDLE || (small && unmoved(run))) return failure;
   return patience->creeping > MOST_CREEPING ? HS_CREEPING : HS_CLEAR;
 }

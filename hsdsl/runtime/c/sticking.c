@@ -1,5 +1,5 @@
 /* A state at rest over time (M11): how long its guard holds it, and the steps of that time.
-   See hsdsl/simulate/resting.py. run->held is what holds it, on a window of time. */
+   See hsdsl/simulate/sticking.py. run->held is what holds it, on a window of time. */
 
 #define CORRECTIONS 8
 #define LOOKS 8
@@ -88,7 +88,7 @@ static int release(hs_run *run, int k, double *until) {
 }
 
 /* Make one step over a state at rest, shorter where surfaces vary too fast for one. */
-static hs_obstacle next_rest(hs_run *run, int n, double limit) {
+static hs_step_failure next_rest(hs_run *run, int n, double limit) {
   const double t = run->here.t;
   hs_span *const span = &run->span;
   double h = longest_rest(run), t1;

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.simulate.interpolation import interpolation
-from hsdsl.simulate.isolate import ROUNDING, Coefficients, last_root, rises, total, value
+from hsdsl.simulate.root_isolation import ROUNDING, Coefficients, last_root, rises, total, value
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_FIRST = 3  # of a step's first piece, before the step is made shorter

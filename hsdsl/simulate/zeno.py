@@ -12,9 +12,9 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate import notes
+from hsdsl.simulate import diagnostics
 from hsdsl.simulate.rest import is_pushed, moves_alone, stays
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
 
 LEAST_FLIGHTS = 3
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
@@ -38,7 +38,7 @@ def _one_edge(one: Transition, other: Transition) -> bool:
     return same and one.source == one.target and not one.entry
 
 
-def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
+def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     """Go to the limit of a tail that is nearly over; stop at one where more than the impacts goes on."""
     made = run.recorder.transitions
     found = contraction(made)
@@ -61,28 +61,30 @@ def close_tail(run: Run, here: Here, k: int) -> Here | Stop:
         return here
     edge = here.mode.edges[k].name
     if not alone:
-        return notes.accumulates(run.recorder, edge, end, here.t)
-    notes.replaced(run.recorder, edge, len(made) - 1, end, left)
+        return diagnostics.accumulates(run.recorder, edge, end, here.t)
+    diagnostics.replaced(run.recorder, edge, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     mode = run.program.modes.index(here.mode)
     rest = run.place(mode, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
-    rest.surfaces.stood_on.add(k)
+    rest.surfaces.active.add(k)
     return rest
 
 
-def meets_another(here: Here, limit: Here, k: int) -> bool:
+def meets_another(here: ModeState, limit: ModeState, k: int) -> bool:
     """Whether a surface other than k is passed on the way to a limit."""
     surfaces = here.surfaces
     before, after = here.kernel.surfaces(here.t, *here.x), here.kernel.surfaces(limit.t, *limit.x)
     for j, (one, two) in enumerate(zip(before, after, strict=True)):
-        rises = two > surfaces.noise(j, limit.t, limit.x) and not one > surfaces.noise(j, here.t, here.x)
+        rises = two > surfaces.roundoff_bound(j, limit.t, limit.x) and not one > surfaces.roundoff_bound(
+            j, here.t, here.x
+        )
         if j != k and rises:
             return True
     return False
 
 
-def fixed_point(run: Run, here: Here, k: int, t: Number) -> State | None:
+def fixed_point(run: Run, here: ModeState, k: int, t: Number) -> State | None:
     """The point on the guard that repeated resets run to (Aitken's acceleration, by component)."""
     reset, x = here.kernel.resets[k], here.x
     for _ in range(MOST_ROUNDS):
@@ -91,7 +93,7 @@ def fixed_point(run: Run, here: Here, k: int, t: Number) -> State | None:
             break
         two = reset(t, *one)
         x = tuple(map(_accelerated, x, one, two))
-    if abs(here.kernel.surfaces(t, *x)[k]) > here.surfaces.noise(k, t, x, entry=True):
+    if abs(here.kernel.surfaces(t, *x)[k]) > here.surfaces.roundoff_bound(k, t, x, entry=True):
         return None
     return x
 

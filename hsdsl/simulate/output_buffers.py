@@ -13,7 +13,7 @@ from hsdsl.limits import DEFAULT
 from hsdsl.program import Program
 from hsdsl.runtime import tables
 from hsdsl.simulate.columns import Columns, Counts, Gathered, Packed, Shape
-from hsdsl.simulate.layouts import Layouts
+from hsdsl.simulate.state_layouts import StateLayouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
 MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
@@ -24,7 +24,7 @@ BY_TRANSITION = ("transition", "before", "after")
 Sink = Callable[[dict[str, Array]], Any]
 
 
-class Chunks:
+class OutputBuffers:
     """The chunks of one run; ``table`` is the one that is being written.
 
     A small one that is enough for its run is copied from and used again.
@@ -112,7 +112,7 @@ class Chunks:
         used["alternatives"] = self._columns["alternatives"][:alternatives]
         return used
 
-    def whole(self, pack: Callable[[int], int], layouts: Layouts) -> Columns:
+    def whole(self, pack: Callable[[int], int], layouts: StateLayouts) -> Columns:
         """Take away every column from the start of the run, or copy them where the chunk can be used again.
 
         ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it
@@ -135,7 +135,7 @@ class Chunks:
         return Gathered(whole, layouts.width(layouts.of_arcs(whole["arc"]["mode"])))
 
 
-def arcs_of(whole: Columns, program: Program, layouts: Layouts) -> Iterator[Arc]:
+def arcs_of(whole: Columns, program: Program, layouts: StateLayouts) -> Iterator[Arc]:
     """Make the arcs of whole columns."""
     rows = len(whole["times"])
     opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()

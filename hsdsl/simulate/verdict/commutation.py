@@ -12,8 +12,8 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.looking import Looking
 from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.run_view import RunView
 
 SAME = 1e-9  # relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
@@ -21,7 +21,7 @@ LONGEST = 64  # transitions at one instant
 Landed = tuple[str, State]
 
 
-def choices(run: Looking) -> tuple[list[Finding], list[str]]:
+def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every transition that others were passed over for."""
     found: list[Finding] = []
     commuting: list[Number] = []
@@ -50,7 +50,7 @@ def choices(run: Looking) -> tuple[list[Finding], list[str]]:
     return found, [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
 
 
-def commute(run: Looking, place: Place, tied: Sequence[int], since: Number = 0) -> bool:
+def commute(run: RunView, place: Place, tied: Sequence[int], since: Number = 0) -> bool:
     """Whether each of the tied edges of a place, taken first, leads to the same point.
 
     Surfaces that are reached within the time ``since`` count as reached together.
@@ -63,7 +63,7 @@ def commute(run: Looking, place: Place, tied: Sequence[int], since: Number = 0) 
     return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
 
 
-def _same(run: Looking, one: Landed | None, other: Landed | None) -> bool:
+def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
         return False
     names = run.run.program.modes[run.index(one[0])].states
@@ -72,7 +72,7 @@ def _same(run: Looking, one: Landed | None, other: Landed | None) -> bool:
     return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
 
 
-def settle(run: Looking, place: Place, k: int, since: Number) -> Landed | None:
+def settle(run: RunView, place: Place, k: int, since: Number) -> Landed | None:
     """Take edge k, then what fires at the same instant; None where that has no end."""
     for _ in range(LONGEST):
         edge = place.mode.edges[k]

@@ -16,14 +16,14 @@ from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
-from hsdsl.simulate.chunks import Chunks, grown
 from hsdsl.simulate.columns import Shape
+from hsdsl.simulate.output_buffers import OutputBuffers, grown
 
 VISITED = 64
-MOST_KEPT = 4  # desks of one model and method
+MOST_KEPT = 4  # workspaces of one model and method
 
 
-class Desk:
+class Workspace:
     """One task with its memory. One run works there at a time."""
 
     def __init__(
@@ -33,7 +33,7 @@ class Desk:
         self.task, self.degree = task, shape.degree
         self.pressed, self.failed = False, list[BaseException]()
         self.laid: object = None  # the plan that the task is filled in from
-        self.chunks = Chunks(self.task.chunk, shape)
+        self.chunks = OutputBuffers(self.task.chunk, shape)
         self._width = model.width
         self._workspace = np.empty(compiled.workspace(method, scheme))
         self._x, self._slope, self._scales = (np.empty(self._width) for _ in range(3))
@@ -64,7 +64,7 @@ class Desk:
         return self._runtime.hs_pack(self._where, to)
 
     def run_ensemble(self, ensemble: tables.Ensemble) -> None:
-        """Run instances to their end, their task being the desk's; the interpreter is free meanwhile."""
+        """Run instances to their end, their task being the workspace's; the interpreter is free meanwhile."""
         self._runtime.hs_run_ensemble(ctypes.addressof(ensemble))
 
     def press(self, number: int, frame: FrameType | None) -> None:
@@ -102,32 +102,32 @@ class Desk:
         return 0
 
 
-class Desks:
-    """The free desks of one model, method and scheme."""
+class Workspaces:
+    """The free workspaces of one model, method and scheme."""
 
     def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
         self._made_of = compiled, method, scheme, shape
-        self._free: list[Desk] = []
+        self._free: list[Workspace] = []
 
-    def take(self) -> Desk:
-        """Return a desk that nobody works at."""
+    def take(self) -> Workspace:
+        """Return a workspace that nobody works at."""
         try:
             return self._free.pop()
         except IndexError:
             return self.new(tables.Task())
 
-    def new(self, task: tables.Task) -> Desk:
-        """Make a desk for a task."""
-        return Desk(task, *self._made_of)
+    def new(self, task: tables.Task) -> Workspace:
+        """Make a workspace for a task."""
+        return Workspace(task, *self._made_of)
 
-    def leave(self, desk: Desk) -> None:
-        """Let the next run have a desk."""
+    def leave(self, workspace: Workspace) -> None:
+        """Let the next run have a workspace."""
         if len(self._free) < MOST_KEPT:
-            self._free.append(desk)
+            self._free.append(workspace)
 
 
-# The three functions that C calls are made once; they find the desk by its task's place in memory.
-_desks: WeakValueDictionary[int, Desk] = WeakValueDictionary()
+# The three functions that C calls are made once; they find the workspace by its task's place in memory.
+_desks: WeakValueDictionary[int, Workspace] = WeakValueDictionary()
 
 
 def _answer_flush(task: int) -> int:

@@ -16,18 +16,18 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
-from hsdsl.simulate.along import Piece, TooFast, settles, without_zeros
 from hsdsl.simulate.chatter import Chatter
 from hsdsl.simulate.curves import Curves, curves_along
 from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE
-from hsdsl.simulate.isolate import value
-from hsdsl.simulate.patience import CREEPING, MOST_CREEPING
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.root_isolation import value
+from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.scales import error_ratio
-from hsdsl.simulate.surfaces import Obstacle, at, shortened
+from hsdsl.simulate.stall_detection import CREEPING, MOST_CREEPING
+from hsdsl.simulate.surface_polynomials import Piece, TooFast, settles, without_zeros
+from hsdsl.simulate.surfaces import StepFailure, at, shortened
 
-TOO_FAST = Obstacle("not finite")  # a surface, for one step
+TOO_FAST = StepFailure("not finite")  # a surface, for one step
 BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
 LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
 
@@ -57,12 +57,12 @@ class Span:
 class Stepping(Protocol):
     """What makes steps in one mode, on one segment of the inputs."""
 
-    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step that the error allows, not beyond ``limit``; or say what stands in the way."""
         ...
 
 
-def stepping(run: Run, here: Here) -> Stepping:
+def stepping(run: Run, here: ModeState) -> Stepping:
     """Choose by the method."""
     if isinstance(run.settings.method, TaylorMethod):
         series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
@@ -79,13 +79,13 @@ class TableSteps:
     """
 
     run: Run
-    here: Here
+    here: ModeState
     method: Stepper
     slope: State | None = None
     at_time: Number = None
     _chatter: Chatter = field(default_factory=Chatter)
 
-    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step: rejected by the error estimate, halved where something has no value."""
         control, flow, halvings = self.run.control, self.here.kernel.flow, 0
         try:
@@ -103,12 +103,12 @@ class TableSteps:
                 ratio, span = tried
                 assert self.slope is not None
                 if control.tolerance is not None and self._chatter.across(flow, t, x, slope, t1, span.z, self.slope):
-                    return Obstacle("jump")
+                    return StepFailure("jump")
                 if control.tolerance is not None and halvings == 0:
                     control.accept(h, ratio)
                 control.slow_enough(mode, h)
                 self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
-                return span if self._creeping <= MOST_CREEPING else Obstacle("creeping")
+                return span if self._creeping <= MOST_CREEPING else StepFailure("creeping")
             if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
                 control.reject(h, None if tried is UNSOLVED else self._ratio)
                 h = control.within_reach(mode, control.h)
@@ -122,7 +122,7 @@ class TableSteps:
     _ratio: Number = 1
     _creeping: int = 0
 
-    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | Obstacle:
+    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | StepFailure:
         flow, method, control = self.here.kernel.flow, self.method, self.run.control
         try:
             z, stages = method.step(flow, t, h, x, slope)
@@ -182,12 +182,12 @@ class SeriesSteps:
     """Steps of Taylor's method; smooth surfaces have series of their own."""
 
     run: Run
-    here: Here
+    here: ModeState
     method: TaylorMethod
     series: Taylor
     steps: Stepper
 
-    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
         run, order, mode = self.run, self.method.order, self.here.mode.name
         try:
@@ -219,7 +219,7 @@ class SeriesSteps:
 
     def _try(
         self, t: Number, h: Number, t1: Number, x: State, stages: Stages, lines: tuple[Series, ...]
-    ) -> Span | Obstacle:
+    ) -> Span | StepFailure:
         run, here, power, parts = self.run, self.here, self.run.arithmetic.zero + 1, list[State]()
         for c in stages[:-1]:
             power = power * h
@@ -282,7 +282,9 @@ class SeriesSteps:
             for c in row or ():
                 scaled.append(c * power)
                 power = power * h
-            if not scaled or not self._converges(scaled, end, lambda k: 4 * here.surfaces.noise(k, t1, z), k, middle):
+            if not scaled or not self._converges(
+                scaled, end, lambda k: 4 * here.surfaces.roundoff_bound(k, t1, z), k, middle
+            ):
                 return curves_along(run, here, t, h, x, z, piece)
             curves.append([Piece(zero, zero + 1, without_zeros([starts[k], *scaled[1:]]))])
         return curves

@@ -1,4 +1,4 @@
-/* Where polynomials change sign on [0, 1], with the Bernstein form as the certificate. See hsdsl/simulate/isolate.py.
+/* Where polynomials change sign on [0, 1], with the Bernstein form as the certificate. See hsdsl/simulate/root_isolation.py.
    A polynomial of degree n is c[0] + c[1] s + ... + c[n] s**n. */
 
 #define MOST_REFINEMENTS 300

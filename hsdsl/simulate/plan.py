@@ -17,38 +17,38 @@ from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.runtime import tables
 from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate.chunks import Sink
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
-from hsdsl.simulate.finer import finer_settings
+from hsdsl.simulate.input_segments import Timeline
+from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.recorder import OutOfRoom, Progress, Recorder, Room
+from hsdsl.simulate.refinement import finer_settings
 from hsdsl.simulate.result import about, from_recorder, written
-from hsdsl.simulate.run import Here, Run
+from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted, memory
-from hsdsl.simulate.timeline import Timeline
 
 
-def _relaxed(run: Run, here: Here | Stop) -> Stop:
+def _relaxed(run: Run, here: ModeState | Stop) -> Stop:
     """The loop, loaded when it is asked for: the compiled ones need nothing of it."""
     from hsdsl.simulate.relaxed import relaxed
 
     return relaxed(run, here)
 
 
-def _located(run: Run, here: Here | Stop) -> Stop:
+def _located(run: Run, here: ModeState | Stop) -> Stop:
     from hsdsl.simulate.located import located
 
     return located(run, here)
 
 
-def _paoli_schatzman(run: Run, here: Here | Stop) -> Stop:
+def _paoli_schatzman(run: Run, here: ModeState | Stop) -> Stop:
     from hsdsl.simulate.paoli_schatzman import paoli_schatzman
 
     return paoli_schatzman(run, here)
 
 
-SCHEMES: dict[str, Callable[[Run, Here | Stop], Stop]] = {
+SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "relaxed": _relaxed,
     "located": _located,
     "paoli-schatzman": _paoli_schatzman,
@@ -87,7 +87,7 @@ class Prepared:
         Returns why it stopped, how many transitions it made, and the last chunk.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self.plan, self.plan.desks.new(tables.Task()), self._fresh)
+        under_way = CompiledRun(self.plan, self.plan.workspaces.new(tables.Task()), self._fresh)
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)
@@ -137,14 +137,14 @@ class Prepared:
         return from_recorder(run, stop, spent, self.again)
 
     def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        under_way = CompiledRun(plan, plan.desks.take(), self._fresh)
+        under_way = CompiledRun(plan, plan.workspaces.take(), self._fresh)
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()
         stop, whole = under_way.follow()
         spent["simulate"] = time.perf_counter() - began
-        if watch is None:  # else someone may look at the desk for longer than the run lasts
-            plan.desks.leave(under_way.desk)
+        if watch is None:  # else someone may look at the workspace for longer than the run lasts
+            plan.workspaces.leave(under_way.workspace)
         return written(self._about, under_way, whole, stop, spent, self.again)
 
 

@@ -22,7 +22,7 @@ from hsdsl.simulate.verdict.place import Place
 
 
 @dataclass(frozen=True)
-class Looking:
+class RunView:
     """What a run recorded.
 
     Attributes
@@ -198,7 +198,7 @@ class Looking:
         columns = self.errors.columns
         sizes = tuple(float(self.errors.sizes[row, columns[name]]) for name in place.mode.states)
         surfaces = Surfaces(place.kernel, place.mode.edges, sizes, self.arithmetic)
-        return surfaces.noise(k, place.t, place.x, entry=True)
+        return surfaces.roundoff_bound(k, place.t, place.x, entry=True)
 
     def row_at(self, t: Number) -> int:
         """The last row before a time, or at it."""
@@ -214,7 +214,7 @@ class Looking:
         return self.run.tie(t)
 
 
-def visited(run: Looking) -> list[ModeProgram]:
+def visited(run: RunView) -> list[ModeProgram]:
     """The modes that a run flowed in."""
     names = {arc.mode for arc in run.flows}
     return [mode for mode in run.run.program.modes if mode.name in names]

@@ -1,4 +1,4 @@
-/* One accepted step of the located scheme, with what happens along it. See hsdsl/simulate/spans.py.
+/* One accepted step of the located scheme, with what happens along it. See hsdsl/simulate/dense_steps.py.
    run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
 
 #define BLUR 2
@@ -82,7 +82,7 @@ static int blur(hs_run *run, int n, double t1) {
 }
 
 /* Try a step of a table or of Radau IIA, or say what is in its way. */
-HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
+HS_INLINE hs_step_failure try_table(hs_run *run, const int n, double h, double t1) {
   hs_span *const span = &run->span;
   const hs_mode *mode = run->here.table;
   const double *p = run->here.p;
@@ -107,7 +107,7 @@ HS_INLINE hs_obstacle try_table(hs_run *run, const int n, double h, double t1) {
 }
 
 /* Make one step of a table or of Radau IIA: rejected by the error estimate, halved where something has no value. */
-HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
+HS_INLINE hs_step_failure next_table(hs_run *run, const int n, double limit) {
   hs_control *const control = &run->control;
   const double t = run->here.t;
   int halvings = 0;
@@ -121,7 +121,7 @@ HS_INLINE hs_obstacle next_table(hs_run *run, const int n, double limit) {
     else
       h = limit - t, t1 = limit;
     run->refused = 0;
-    const hs_obstacle tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
+    const hs_step_failure tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
       if (control->tolerance > 0 && chatters(run, n, t1)) return HS_JUMP;
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
@@ -183,7 +183,7 @@ static double longest(const hs_run *run, int n) {
 
 static int noise_at_end(hs_run *run, int k, double *allowed) {
   double noise;
-  if (noise_of(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
+  if (roundoff_bound(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
   *allowed = 4 * noise;
   return 0;
 }
@@ -244,7 +244,7 @@ static int series_curves(hs_run *run) {
 }
 
 /* Try a step of Taylor's method, or say what is in its way. */
-HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) {
+HS_INLINE hs_step_failure try_series(hs_run *run, const int n, double h, double t1) {
   const hs_mode *mode = run->here.table;
   const double *p = run->here.p, tolerance = run->control.tolerance;
   const hs_polynomial *piece = &run->span.piece;
@@ -262,7 +262,7 @@ HS_INLINE hs_obstacle try_series(hs_run *run, const int n, double h, double t1) 
 
 /* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
    equation. */
-HS_INLINE hs_obstacle next_series(hs_run *run, const int n, double limit) {
+HS_INLINE hs_step_failure next_series(hs_run *run, const int n, double limit) {
   const double t = run->here.t;
   if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
   double h = within_reach(run, longest(run, n)), t1;
@@ -281,6 +281,6 @@ HS_INLINE hs_obstacle next_series(hs_run *run, const int n, double limit) {
 }
 
 /* Make one step that the error allows, not beyond `limit`; or say what stands in the way. */
-HS_INLINE hs_obstacle next_span(hs_run *run, const int n, double limit) {
+HS_INLINE hs_step_failure next_span(hs_run *run, const int n, double limit) {
   return run->method->kind == HS_TAYLOR ? next_series(run, n, limit) : next_table(run, n, limit);
 }

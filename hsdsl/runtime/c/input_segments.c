@@ -1,4 +1,4 @@
-/* Sampled inputs over time. See hsdsl/simulate/timeline.py. */
+/* Sampled inputs over time. See hsdsl/simulate/input_segments.py. */
 
 /* The segment that time is in; at a boundary the later one. */
 static int64_t segment_at(const hs_timeline *timeline, double t) {

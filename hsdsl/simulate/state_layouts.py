@@ -10,7 +10,7 @@ from hsdsl.program import Program
 MOST_ARCS, MOST_KEPT = 256, 64
 
 
-class Layouts:
+class StateLayouts:
     """The kinds of arcs of all runs of a program that begin with the same states.
 
     Attributes

@@ -1,5 +1,5 @@
 /* Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
-   See hsdsl/simulate/tails.py. */
+   See hsdsl/simulate/zeno.py. */
 
 #define LEAST_FLIGHTS 3
 #define MOST_ROUNDS 60
@@ -34,7 +34,7 @@ static double accelerated(double a, double b, double c) {
 
 /* The point on the guard of edge k that repeated resets run to, to run->z: 1, or 0. */
 static int fixed_point(hs_run *run, int k, double t) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const hs_edge *edge = &here->table->edge[k];
   const int n = here->dimension;
   double *const x = run->z, *const one = run->after, *const two = run->at, r, noise;
@@ -45,20 +45,20 @@ static int fixed_point(hs_run *run, int k, double t) {
     if (edge->reset(here->p, t, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
   }
-  if (surface(run, k, t, x, &r) || noise_of(run, k, t, x, 1, &noise)) return RAISED;
+  if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 1, &noise)) return RAISED;
   return !(fabs(r) > noise);
 }
 
 /* Whether a surface other than k is passed on the way from x to a limit q: 1, 0 or RAISED. */
 static int meets_another(hs_run *run, double t, const double *x, double end, const double *q, int k) {
-  const hs_here *here = &run->here;
+  const hs_mode_state *here = &run->here;
   const int m = here->table->surfaces;
   if (here->table->values(here->p, t, x, run->ahead) || here->table->values(here->p, end, q, run->ends)) return RAISED;
   for (int j = 0; j < m; j++) {
     double noise, before;
-    if (noise_of(run, j, end, q, 0, &noise)) return RAISED;
+    if (roundoff_bound(run, j, end, q, 0, &noise)) return RAISED;
     if (!(run->ends[j] > noise)) continue;
-    if (noise_of(run, j, t, x, 0, &before)) return RAISED;
+    if (roundoff_bound(run, j, t, x, 0, &before)) return RAISED;
     if (j != k && !(run->ahead[j] > before)) return 1;
   }
   return 0;
@@ -66,7 +66,7 @@ static int meets_another(hs_run *run, double t, const double *x, double end, con
 
 /* Go to the limit of a tail of edge k that is nearly over; stop at one where more than the impacts goes on. */
 static int close_tail(hs_run *run, int k) {
-  hs_here *const here = &run->here;
+  hs_mode_state *const here = &run->here;
   double flight, ratio;
   if (!contraction(run, &flight, &ratio) || here->dimension != here->table->dimension || !here->dimension)
     return GOES_ON;
@@ -88,6 +88,6 @@ static int close_tail(hs_run *run, int k) {
   place(run, here->mode, here->dimension, end, 0);
   here->table->values(here->p, end, run->x, run->ahead);
   enter_surfaces(run, end, 0.0, 0, end);
-  if (!run->stood_on[k]) run->stood_on[k] = 1, here->standing++;
+  if (!run->active_surfaces[k]) run->active_surfaces[k] = 1, here->standing++;
   return GOES_ON;
 }

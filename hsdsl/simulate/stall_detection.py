@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.run import Here
-from hsdsl.simulate.surfaces import Obstacle
+from hsdsl.simulate.run import ModeState
+from hsdsl.simulate.surfaces import StepFailure
 
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
@@ -25,24 +25,32 @@ class Patience:
     creeping: int = 0
 
     def ends(
-        self, here: Here, halvings: int, full: Number, obstacle: Obstacle, t: Number, x: State, t1: Number, z: State
-    ) -> Obstacle | None:
-        """Count a step from (t, x) to (t1, z) that was halved because of ``obstacle``; say what ends the run, if so."""
+        self,
+        here: ModeState,
+        halvings: int,
+        full: Number,
+        failure: StepFailure,
+        t: Number,
+        x: State,
+        t1: Number,
+        z: State,
+    ) -> StepFailure | None:
+        """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
         if t != self.reached:
             self.idle = self.creeping = 0
         self.reached = t1
         small = t1 - t <= IDLE_UNITS * self.unit * max(t, full)
-        still = _still(here, obstacle, t, x, t1, z)
+        still = _still(here, failure, t, x, t1, z)
         self.idle = self.idle + 1 if small or still else 0
         self.creeping = self.creeping + 1 if halvings >= CREEPING else 0
         if self.idle > MOST_IDLE or (small and z == x):
-            return obstacle
-        return Obstacle("creeping", obstacle.surface) if self.creeping > MOST_CREEPING else None
+            return failure
+        return StepFailure("creeping", failure.surface) if self.creeping > MOST_CREEPING else None
 
 
-def _still(here: Here, obstacle: Obstacle, t: Number, x: State, t1: Number, z: State) -> bool:
+def _still(here: ModeState, failure: StepFailure, t: Number, x: State, t1: Number, z: State) -> bool:
     """Whether the surface in the way did not come nearer: its round-off is larger than what the step adds."""
-    k = obstacle.surface
+    k = failure.surface
     if k is None:
         return False
     return here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]

@@ -11,21 +11,21 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.along import interpolated, rises_along
 from hsdsl.simulate.control import LARGEST_SHARE
 from hsdsl.simulate.curves import curves_along
+from hsdsl.simulate.dense_steps import Span, sizes_along
 from hsdsl.simulate.interpolation import OVER_TIME
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE
 from hsdsl.simulate.rest import moves_alone, push, push_order, stays
-from hsdsl.simulate.run import Here, Run
-from hsdsl.simulate.spans import Span, sizes_along
-from hsdsl.simulate.surfaces import Obstacle
+from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.surface_polynomials import interpolated, rises_along
+from hsdsl.simulate.surfaces import StepFailure
 
 CORRECTIONS = 8  # of the root of a push
 LOOKS = 8  # in a step, at what may end a rest between one moment and the next
 
 
-def release(run: Run, here: Here, k: int) -> Number | None:
+def release(run: Run, here: ModeState, k: int) -> Number | None:
     """Return until when the guard of edge k holds the state, at most to the end of the inputs' segment.
 
     None where it is not held for any time, or something has no value later on: then transitions go on as they can.
@@ -50,7 +50,7 @@ def longest(run: Run) -> Number:
     return run.settings.until * LARGEST_SHARE
 
 
-def pushed_until(run: Run, here: Here, k: int, order: int, start: Number, end: Number) -> Number:
+def pushed_until(run: Run, here: ModeState, k: int, order: int, start: Number, end: Number) -> Number:
     """When the push falls through zero: isolated on an interpolant over time, then solved on the push itself."""
     width = end - start
 
@@ -68,7 +68,7 @@ def pushed_until(run: Run, here: Here, k: int, order: int, start: Number, end: N
     return start + s * width
 
 
-def kept_until(run: Run, here: Here, k: int, start: Number, end: Number) -> Number:
+def kept_until(run: Run, here: ModeState, k: int, start: Number, end: Number) -> Number:
     """When the edge or its reset no longer keeps the state in place, as where its `if` ends: by looks, then halving."""
 
     def keeps(t: Number) -> bool:
@@ -96,9 +96,9 @@ class RestSteps:
     """Steps over a state at rest."""
 
     run: Run
-    here: Here
+    here: ModeState
 
-    def next(self, t: Number, x: State, limit: Number) -> Span | Obstacle:
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step, shorter where surfaces vary too fast for one."""
         run, zero = self.run, self.run.arithmetic.zero
         piece, h = (tuple(zero for _ in x),), longest(run)
