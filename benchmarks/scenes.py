@@ -21,7 +21,7 @@ import numpy as np
 
 import hsdsl
 from hsdsl.chart import PEERS, Row, Scene, work_precision
-from hsdsl.chart.table import as_csv
+from hsdsl.chart.rows import as_csv
 
 MODELS = Path(__file__).parent.parent / "models"
 sys.path.insert(0, str(MODELS))

@@ -8,7 +8,7 @@ warm and in turns, and compares each result with the model's exact execution.
 `plan`          the runs: our own and those of peers
 `judge`         the error of a result, and whether it is the right execution
 `stopwatch`     warm times, in turns
-`table`         rows as text, as CSV, and as the panels of a picture
+`rows`          rows as text, as CSV, and as the panels of a picture
 `peers`         other tools, each run as its own documentation shows
 `translation`   a model's mathematics as functions for another tool
 `by_arcs`       the loop around a tool that stops at events
@@ -23,9 +23,9 @@ from hsdsl.chart.judge import Judgement, judge, rho
 from hsdsl.chart.peers import PEERS
 from hsdsl.chart.plan import ENGINES, SCHEMES, TOLERANCES, own_runs, peer_runs
 from hsdsl.chart.result import Attempt, Refused, Result
+from hsdsl.chart.rows import Row
 from hsdsl.chart.scene import Scene
 from hsdsl.chart.stopwatch import race
-from hsdsl.chart.table import Row
 
 __all__ = ["ENGINES", "PEERS", "SCHEMES", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
 

@@ -16,17 +16,7 @@ MOST_SECONDS = 60.0
 
 
 class ToolArc(NamedTuple):
-    """What a tool made of one mode.
-
-    Attributes
-    ----------
-    end, x : float, sequence of float
-        Where it stopped.
-    edge : int or None
-        The event that stopped it, None at the end of the run.
-    values : array, shape (samples in [start, end], states)
-        At those of the asked times that it got to.
-    """
+    """An arc by a tool: its end, the event that ended it (None: the end of the run), and values at the samples."""
 
     end: float
     x: Sequence[float]
@@ -89,7 +79,7 @@ Choice = tuple[int, Callable[..., tuple[bool]]]
 
 
 def _alternatives(mode: PlainMode, guard: object) -> list[Choice]:
-    """The edges that have a guard in common, in the order of the file, and their conditions."""
+    """The edges with the same guard, in the order of the file, and their conditions."""
     edges = [i for i, edge in enumerate(mode.edges) if edge.guard == guard]
     return [(i, as_function(mode, (mode.edges[i].condition,))) for i in edges]
 

@@ -18,24 +18,24 @@ from hsdsl.model import Model
 from hsdsl.names import did_you_mean
 
 Array = npt.NDArray[Any]
-DIGITS = 8  # of a reference computed by refinement, where none is known: each takes longer than the one before
+DIGITS = 8  # of a refined reference: each takes longer than the one before
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is charted.
+    """A model at given numbers, and its exact execution at sample times.
 
     Attributes
     ----------
     grid : array, shape (samples,)
         Equally spaced times from 0 to the exact execution's end.
     clear : array of bool, shape (samples,)
-        Whether a sample is so far from every jump of the exact execution that a slightly late jump changes nothing.
+        Whether a sample is so far from every exact jump that a slightly late jump changes nothing.
     exact_values, exact_modes : array
         The exact execution at the samples, as in `Result`.
     countable : (float, float)
-        The fewest and the most transitions that a right answer has: those so near the end that they may be missed make
-        the difference, and past a Zeno point no number means anything.
+        The fewest and the most transitions of a right result: those near the end may be missed, and past a Zeno point
+        any number counts.
     """
 
     name: str
@@ -63,31 +63,27 @@ class Scene:
         parameters: Mapping[str, Any] | None = None,
         initial: Mapping[str, Any] | None = None,
     ) -> Scene:
-        """Look a model up.
+        """Make the scene of a model with `hsdsl.exact.reference`, or `hsdsl.exact.precise` where there is none.
 
         Parameters
         ----------
-        model : Model
-            The model; its exact execution is `hsdsl.exact.reference`, or `hsdsl.exact.precise` where none is known.
         block : int
-            Which block of its ``reference:`` section (and so which initial values).
+            Index in the model's ``reference:`` section (other initial values).
         states : sequence of str
             The states whose error is taken; all unless given.
         samples : int
-            How many sample times.
+            The number of sample times.
         clearance : float
-            Samples nearer than this to a jump of the exact execution are left out of the error, in the unit of time.
+            Samples nearer than this to an exact jump are left out of the error, in the unit of time.
         digits : int
-            Of the reference where none is known, 4 to 14; errors below its last digit say nothing.
+            Of a refined reference, 4 to 14; errors below its last digit mean nothing.
         exact : Execution, optional
-            What to compare with instead.
-        parameters, initial : mapping, optional
-            The overrides that ``exact`` was run with.
+            Replaces the reference; ``parameters`` and ``initial`` are its overrides.
 
         Raises
         ------
         UsageError
-            An unknown state, fewer than two samples, or no exact execution can be had.
+            An unknown state, fewer than two samples, or no reference.
         """
         if samples < 2:
             raise UsageError(f"a chart takes at least 2 samples, not {samples}")
@@ -131,9 +127,9 @@ def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[A
             values[inside, states.index(name)] = at.state_columns[:, i]
 
     def modes() -> Array:
-        found = np.full(len(grid), "", dtype=object)
-        found[inside] = at.mode
-        return found
+        names = np.full(len(grid), "", dtype=object)
+        names[inside] = at.mode
+        return names
 
     return values, modes
 

@@ -91,7 +91,7 @@ def _scene(text: str, taken: dict[str, Any], watch: Callable[[str], None]) -> An
 
 
 def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
-    from hsdsl.chart.table import as_csv, as_text, panels, record
+    from hsdsl.chart.rows import as_csv, as_text, panels, record
     from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
+from hsdsl.errors import STEP_AND_TOLERANCE, Diagnostic, ModelError, UsageError
 from hsdsl.names import visible, visible_lines
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
@@ -74,7 +74,12 @@ def errors_reported(json: bool) -> Generator[None]:
     try:
         yield
     except ModelError as error:
-        report_errors(error, json)
+        if json:
+            from hsdsl.diagnose import as_json
+
+            print_json(as_json(error.diagnostics))
+        else:
+            print_errors(error.diagnostics)
         contradiction = all(d.code == STEP_AND_TOLERANCE for d in error.diagnostics)
         raise Exit(WRONG_USAGE if contradiction else MODEL_ERRORS) from None
     except UsageError as error:
@@ -82,15 +87,12 @@ def errors_reported(json: bool) -> Generator[None]:
         raise Exit(WRONG_USAGE) from None
 
 
-def report_errors(error: ModelError, json: bool) -> None:
-    """Print the errors of a model."""
-    from hsdsl.diagnose import as_json, render
+def print_errors(errors: Sequence[Diagnostic]) -> None:
+    """Print the errors of models as text."""
+    from hsdsl.diagnose import render
 
-    if json:
-        print_json(as_json(error.diagnostics))
-    else:
-        say_lines("\n\n".join(render(d) for d in error.diagnostics))
-        say_lines(f"\n{counted(len(error.diagnostics), 'error')}")
+    say_lines("\n\n".join(map(render, errors)))
+    say_lines(f"\n{counted(len(errors), 'error')}")
 
 
 def report_usage(error: UsageError, json: bool) -> None:

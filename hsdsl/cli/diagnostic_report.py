@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from hsdsl import __version__
-from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, counted, print_json, report_usage, say_lines
+from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, counted, print_errors, print_json, report_usage
 from hsdsl.cli.options import Format
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
@@ -60,8 +60,7 @@ class DiagnosticReport:
 
     def _text(self) -> None:
         if self.errors:
-            say_lines("\n\n".join(map(render, self.errors)))
-            say_lines(f"\n{counted(len(self.errors), 'error')}")
+            print_errors(self.errors)
         shown = [finding for finding in self.findings if self.notes or finding.severity == "warning"]
         if shown:
             print("\n\n".join(map(render, shown)))

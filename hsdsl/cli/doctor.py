@@ -46,14 +46,14 @@ def _installation() -> dict[str, Any]:
 
 
 def _engines() -> dict[str, Any]:
-    """Try what a compiled run needs: a compiler that compiles, and a folder to keep what it makes."""
+    """Try the parts of a compiled run: a compiler that compiles, and a private cache folder."""
     from hsdsl import cache
     from hsdsl.runtime.compiler import NoCompiler, find_compiler
     from hsdsl.runtime.kernel import runtime
 
-    folder = cache.folder()
+    compiler = failure = None
     try:
-        compiler, failure = " ".join(find_compiler().command), None
+        compiler = " ".join(find_compiler().command)
         runtime()
     except NoCompiler as error:
         compiler, failure = None, str(error)
@@ -61,8 +61,8 @@ def _engines() -> dict[str, Any]:
         "engines": ["c", "python"] if compiler else ["python"],
         "compiler": compiler,
         "compiler_failure": failure,
-        "cache": str(folder),
-        "cache_refused": cache.private(folder),
+        "cache": str(cache.folder()),
+        "cache_refused": cache.private(cache.folder()),
     }
 
 
@@ -73,20 +73,16 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _text(found: dict[str, Any]) -> str:
+def _text(installation: dict[str, Any]) -> str:
+    absent = "not installed, needed for {}: pip install 'hsdsl[table]'"
     lines = [
-        f"hsdsl {found['hsdsl']}, Python {found['python']} on {found['platform']}",
-        *(f"  {name} {value or 'MISSING'}" for name, value in found["packages"].items()),
-        *(
-            f"  {name} {value}"
-            if value
-            else f"  {name}: not installed, needed for {OPTIONAL[name]}: pip install 'hsdsl[table]'"
-            for name, value in found["optional"].items()
-        ),
-        f"engines: {', '.join(found['engines'])}",
-        f"compiler: {found['compiler'] or found['compiler_failure']}",
-        f"compiled code: {found['cache_refused'] or found['cache']}",
-        f"schemes: {', '.join(found['schemes'])}",
-        f"methods: {', '.join(found['methods'])}",
+        f"hsdsl {installation['hsdsl']}, Python {installation['python']} on {installation['platform']}",
+        *(f"  {name} {value or 'MISSING'}" for name, value in installation["packages"].items()),
+        *(f"  {name}: {value or absent.format(OPTIONAL[name])}" for name, value in installation["optional"].items()),
+        f"engines: {', '.join(installation['engines'])}",
+        f"compiler: {installation['compiler'] or installation['compiler_failure']}",
+        f"compiled code: {installation['cache_refused'] or installation['cache']}",
+        f"schemes: {', '.join(installation['schemes'])}",
+        f"methods: {', '.join(installation['methods'])}",
     ]
     return "\n".join(lines)

@@ -16,8 +16,8 @@ from hsdsl.chart import PEERS, Refused, Scene, work_precision
 from hsdsl.chart.judge import judge
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.result import Attempt, Result
+from hsdsl.chart.rows import COLUMNS, as_csv
 from hsdsl.chart.stopwatch import race
-from hsdsl.chart.table import COLUMNS, as_csv
 
 MODELS = Path(hsdsl.__file__).parent.parent / "models"
 PACKAGES = {"sksundae": "sksundae", "casadi": "casadi", "heyoka": "heyoka", "diffrax": "diffrax", "scipy": "scipy"}

@@ -177,7 +177,7 @@ def test_a_chart_removes_the_sidecar_of_what_it_writes_over(tmp_path, monkeypatc
     from hsdsl.cli import chart
 
     RUNS[0].save(tmp_path / "run.csv")
-    monkeypatch.setattr("hsdsl.chart.table.as_csv", lambda rows: "name\n")
+    monkeypatch.setattr("hsdsl.chart.rows.as_csv", lambda rows: "name\n")
     chart._report([], tmp_path / "run.csv", None, False, True)
     assert [p.name for p in tmp_path.iterdir()] == ["run.csv"]
     with pytest.raises(UsageError, match="No such file"):
