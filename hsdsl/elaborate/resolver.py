@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from hsdsl.errors import Findings
-from hsdsl.expression import ExpressionError, Wanted, numeric, parse, symbolic
+from hsdsl.expression import Expected, ExpressionError, numeric, parse, symbolic
 from hsdsl.expression.inequality import Inequality, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import Call, Tree
@@ -38,9 +38,9 @@ def resolved_expression(text: str, scope: Scope) -> Value:
 
 def all_of(parts: Iterable[T | None]) -> list[T] | None:
     """The parts, or None where one of them is broken and reported."""
-    found = list(parts)
-    whole = [part for part in found if part is not None]
-    return whole if len(whole) == len(found) else None
+    every = list(parts)
+    whole = [part for part in every if part is not None]
+    return whole if len(whole) == len(every) else None
 
 
 @dataclass
@@ -60,12 +60,7 @@ class ExpressionResolver:
 
     def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
         """The value of an expression; with ``finite_now`` it must have one with the file's own parameters."""
-        try:
-            tree = self._resolved(scalar, scope, "number")
-            value = symbolic.number(tree, scope, scalar.value) if tree else None
-        except ExpressionError as error:
-            self._report(scalar, error)
-            return None
+        value = self._built(scalar, scope, "number", lambda tree: symbolic.number(tree, scope, scalar.value))
         if value and finite_now and value.number is not None and not numeric.finite(value.number):
             message = f"`{shown(scalar.value, 40)}` has no finite real value with the parameters of this file"
             self.report(scalar.place, "HS118", message)
@@ -74,23 +69,25 @@ class ExpressionResolver:
 
     def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
         """The SymPy Boolean of a condition."""
-        try:
-            tree = self._resolved(scalar, scope, "condition")
-            return symbolic.condition(tree, scope, scalar.value) if tree else None
-        except ExpressionError as error:
-            self._report(scalar, error)
-            return None
+        return self._built(scalar, scope, "condition", lambda tree: symbolic.condition(tree, scope, scalar.value))
 
     def inequality(self, scalar: Scalar, scope: Scope, key: str) -> Inequality | None:
         """The two sides of one inequality."""
+        text = scalar.value
+        return self._built(scalar, scope, "inequality", lambda tree: inequality(tree, scope, text, key), key)
+
+    def _built(
+        self, scalar: Scalar, scope: Scope, expected: Expected, build: Callable[[Tree], T], key: str = ""
+    ) -> T | None:
+        """What is built of an expression; None where it has faults, which are reported."""
         try:
-            tree = self._resolved(scalar, scope, "inequality", key)
-            return inequality(tree, scope, scalar.value, key) if tree else None
+            tree = self._resolved(scalar, scope, expected, key)
+            return build(tree) if tree else None
         except ExpressionError as error:
             self._report(scalar, error)
             return None
 
-    def _resolved(self, scalar: Scalar, scope: Scope, wanted: Wanted, key: str = "") -> Tree | None:
+    def _resolved(self, scalar: Scalar, scope: Scope, expected: Expected, key: str) -> Tree | None:
         """The tree of an expression all of whose names can be used; None where one's definition is broken."""
         if scalar.value == ABSENT:
             return None
@@ -98,11 +95,11 @@ class ExpressionResolver:
         if self.box:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
-        tree = _tree(text, wanted, scope)
+        tree = _tree(text, expected, scope)
         faults = scope.faults(tree)
         for fault in faults:
             self._report(scalar, fault)
-        if wanted == "inequality" and not (faults and isinstance(tree, Call)):
+        if expected == "inequality" and not (faults and isinstance(tree, Call)):
             the_comparison(tree, key, text)
         return None if faults or scope.broken(tree) else tree
 
@@ -114,13 +111,12 @@ class ExpressionResolver:
         self.findings.add(scalar.place.text.diagnostic(error.code, error.message, span, hint))
 
 
-def _tree(text: str, wanted: Wanted, scope: Scope) -> Tree:
+def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
     word = text.strip().lower()
     if word in _NOT_FINITE and word.lstrip("+-") not in scope.values:
-        raise ExpressionError(
-            "HS118", f"`{text.strip()}` is not a finite number", 0, len(text), "every number is finite here"
-        )
-    return parse(text, wanted)
+        message, hint = f"`{text.strip()}` is not a finite number", "every number is finite here"
+        raise ExpressionError("HS118", message, 0, len(text), hint)
+    return parse(text, expected)
 
 
 def _cut_by_comment(place: SourceRange) -> bool:

@@ -1,6 +1,6 @@
 """Expressions: text to a small tree, and the tree to SymPy by whitelist. Nothing is ever evaluated as a program."""
 
 from hsdsl.expression.parse import parse
-from hsdsl.expression.syntax import ExpressionError, Wanted
+from hsdsl.expression.syntax import Expected, ExpressionError
 
-__all__ = ["ExpressionError", "Wanted", "parse"]
+__all__ = ["Expected", "ExpressionError", "parse"]

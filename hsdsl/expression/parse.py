@@ -11,6 +11,7 @@ from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import (
     Call,
     Comparison,
+    Expected,
     ExpressionError,
     Logic,
     Name,
@@ -22,7 +23,6 @@ from hsdsl.expression.syntax import (
     Sum,
     Tree,
     Truth,
-    Wanted,
 )
 from hsdsl.expression.tokens import Token, tokenize
 from hsdsl.functions import FUNCTIONS
@@ -36,14 +36,14 @@ _BINDING.update(dict.fromkeys(_COMPARISONS, _COMPARE))
 _FOREIGN_WORDS = ("if", "else", "for", "in", "is", "lambda", "then", "AND", "OR", "NOT")
 
 
-def parse(text: str, wanted: Wanted = "number") -> Tree:
+def parse(text: str, expected: Expected = "number") -> Tree:
     """The tree of an expression.
 
     Parameters
     ----------
     text : str
         At most 10,000 characters, nested at most 200 deep.
-    wanted : {"number", "condition", "inequality"}
+    expected : {"number", "condition", "inequality"}
         What the expression is for; it words the hints.
 
     Raises
@@ -51,17 +51,17 @@ def parse(text: str, wanted: Wanted = "number") -> Tree:
     ExpressionError
         At the first fault.
     """
-    tokens = tokenize(text, wanted)
+    tokens = tokenize(text, expected)
     if tokens[0].kind == "end":
         raise ExpressionError("HS121", "an expression is missing", 0, 1, "write a number or an expression")
     with deep_stack():
-        return _Parser(text, tokens, wanted).whole()
+        return _Parser(text, tokens, expected).whole()
 
 
 class _Parser:
-    def __init__(self, text: str, tokens: list[Token], wanted: Wanted) -> None:
+    def __init__(self, text: str, tokens: list[Token], expected: Expected) -> None:
         self.text = text
-        self.wanted = wanted
+        self.expected = expected
         self.tokens = tokens
         self.at = 0
         self.depth = 0
@@ -177,7 +177,7 @@ class _Parser:
         self.depth -= 1
 
     def missing(self, token: Token) -> ExpressionError:
-        """No operand where one is wanted."""
+        """The error for a missing operand."""
         before = self.tokens[self.at - 1] if self.at else None
         if before is None:
             if token.text == ")":
@@ -201,7 +201,7 @@ class _Parser:
             decimal = before.kind == after.kind == "number"
             hint = "parentheses hold one expression" if self.depth else "write one expression here"
             hint = _decimal(before.text, after.text) if decimal else hint
-            if self.wanted == "inequality" and not self.depth:
+            if self.expected == "inequality" and not self.depth:
                 hint = "write one inequality here: the rest of a `when` under `if`, of a `domain` as further items"
             return ExpressionError(
                 "HS102", "a comma stands only between the arguments of a function", token.start, token.end, hint

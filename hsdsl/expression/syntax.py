@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-Wanted = Literal["number", "condition", "inequality"]
+Expected = Literal["number", "condition", "inequality"]
 
 
 class ExpressionError(Exception):

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Literal
 
 from hsdsl.expression.expression_hints import SIGNS, better
-from hsdsl.expression.syntax import ExpressionError, Wanted
+from hsdsl.expression.syntax import Expected, ExpressionError
 from hsdsl.names import LOOKALIKES, normalised, shown
 
 LONGEST = 10_000  # characters
@@ -30,7 +30,7 @@ class Token:
     value: Fraction = Fraction(0)
 
 
-def tokenize(text: str, wanted: Wanted) -> list[Token]:
+def tokenize(text: str, expected: Expected) -> list[Token]:
     """The tokens of an expression, the last one being the end.
 
     Raises
@@ -47,7 +47,7 @@ def tokenize(text: str, wanted: Wanted) -> list[Token]:
         if text[at].isspace():
             at += 1
             continue
-        token = _number(text, at) or _name(text, at) or _operator(text, at, wanted)
+        token = _number(text, at) or _name(text, at) or _operator(text, at, expected)
         found.append(token)
         at = token.end
     found.append(Token("end", "", len(text), len(text)))
@@ -101,19 +101,19 @@ def _name(text: str, at: int) -> Token | None:
     return Token("name", normalised(text[at:end]), at, end)
 
 
-def _operator(text: str, at: int, wanted: Wanted) -> Token:
+def _operator(text: str, at: int, expected: Expected) -> Token:
     match = _OPERATOR.match(text, at)
     if match:
         return Token("operator", match.group(), at, match.end())
     if text[at] == "=":
-        raise _equals(text, at, wanted)
+        raise _equals(text, at, expected)
     for sign, code, message, hint in SIGNS:
         if text.startswith(sign, at):
             raise ExpressionError(code, message, at, at + len(sign), better(sign, text, at) or hint)
     raise ExpressionError("HS101", f"the character `{text[at]}` has no meaning in an expression", at, at + 1)
 
 
-def _equals(text: str, at: int, wanted: Wanted) -> ExpressionError:
+def _equals(text: str, at: int, expected: Expected) -> ExpressionError:
     for wrong, right in (("=>", ">="), ("=<", "<=")):
         if text.startswith(wrong, at):
             return ExpressionError("HS107", f"`{wrong}` is not an inequality", at, at + 2, f"write `{right}`")
@@ -121,5 +121,5 @@ def _equals(text: str, at: int, wanted: Wanted) -> ExpressionError:
         "number": "write the right-hand side alone",
         "condition": "write `==` to compare",
         "inequality": "write `>=` or `<=`",
-    }[wanted]
+    }[expected]
     return ExpressionError("HS107", "`=` has no meaning in an expression", at, at + 1, hint)

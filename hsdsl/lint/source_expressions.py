@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from hsdsl.errors import Span
-from hsdsl.expression import Wanted, parse
+from hsdsl.expression import Expected, parse
 from hsdsl.expression.syntax import Name, Tree, walk
 from hsdsl.schema import InputFile, InputSamples, ModeDocument, ModelDocument, ParameterEntry, ReferenceDocument
 from hsdsl.source import Scalar
@@ -28,7 +28,7 @@ Role = Literal[
     "experiment",  # the setting `name`
     "reference",  # a number in `reference`
 ]
-_WANTED: dict[Role, Wanted] = {"domain": "inequality", "when": "inequality", "if": "condition"}
+_WANTED: dict[Role, Expected] = {"domain": "inequality", "when": "inequality", "if": "condition"}
 
 
 @dataclass(frozen=True)

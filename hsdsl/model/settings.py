@@ -60,20 +60,19 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
 
 def setting_columns(options: Options, columns: Columns) -> list[dict[str, Any]]:
     """The numbers of the settings of every instance, by their names in `Settings`."""
-    names = ["until", "max_transitions", "relaxation", options.size]
-    names += [name for name in options.values if name.startswith(SCALE)]
-    table = {name: _column(options, columns, name) for name in names}
-    by_default = options.values["relaxation"].origin == DEFAULT
-    rows: list[dict[str, Any]] = []
-    for i, numbers in enumerate(zip(*table.values(), strict=True)):
-        row: dict[str, Any] = dict(zip(table, numbers, strict=True))
-        if why := _refusal(row, options.size) if i not in columns.refused else None:
+    scales = [name for name in options.values if name.startswith(SCALE)]
+    names = ("until", "max_transitions", "relaxation", options.size, *scales)
+    numbers = zip(*(_column(options, columns, name) for name in names), strict=True)
+    rows: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in numbers]
+    by_default, refused = options.values["relaxation"].origin == DEFAULT, columns.refused
+    for i, row in enumerate(rows):
+        if i not in refused and (why := _refusal(row)):
             columns.refuse(i, why)
-        if i not in columns.refused:
+        if i not in refused:
             row["max_transitions"] = int(row["max_transitions"])
-            row["relaxation"] = least_relaxation(row["relaxation"], row["until"]) if by_default else row["relaxation"]
-        row["scale"] = {name.removeprefix(SCALE): row.pop(name) for name in names[4:]}
-        rows.append(row)
+            if by_default:
+                row["relaxation"] = least_relaxation(row["relaxation"], row["until"])
+        row["scale"] = {name.removeprefix(SCALE): row.pop(name) for name in scales}
     return rows
 
 
@@ -88,14 +87,16 @@ def _column(options: Options, columns: Columns, name: str) -> Sequence[Number]:
     return [row[place] for row in columns.constant("scale" if state != name else name, name)]
 
 
-def _refusal(row: Mapping[str, Any], size: str) -> str | None:
-    if row["until"] < 0:
-        return f"until must not be negative, not {row['until']}"
+def _refusal(row: Mapping[str, Any]) -> str | None:
     most = row["max_transitions"]
     if most < 0 or most != int(most):
         return f"max_transitions must be a whole number, not {most}"
-    positive = (name for name in row if name in (size, "relaxation") or name.startswith(SCALE))
-    return next((f"{name} must be positive, not {row[name]}" for name in positive if not row[name] > 0), None)
+    for name, number in row.items():
+        if name == "until" and number < 0:
+            return f"until must not be negative, not {number}"
+        if not number > 0 and name not in ("until", "max_transitions"):
+            return f"{name} must be positive, not {number}"
+    return None
 
 
 def following_digits(settings: Settings, options: Options, arithmetic: Arithmetic) -> Settings:

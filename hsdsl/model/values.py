@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _NUMBER = re.compile(r"-?[0-9]{1,30}(\.[0-9]{0,30})?([eE][+-]?[0-9]{1,2})?")  # needs no parsing
 Row = tuple[Number, ...]
-Routine = Callable[..., Sequence[Number]]
+Routine = Callable[..., Row]
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Columns:
     def of(self, routine: Routine, what: str) -> list[Row]:
         """The values of a routine of the parameters, of every instance."""
         try:
-            rows = [tuple(routine(*row)) for row in self.rows]
+            rows = [routine(*row) for row in self.rows]
         except DOMAIN_ERRORS:
             attempts = [_attempt(routine, row) for row in self.rows]
             width = max(map(len, attempts))
@@ -132,7 +132,8 @@ class Columns:
 
     def constant(self, name: str, what: str) -> list[Row]:
         """One of the program's constants, of every instance."""
-        return self.of(lambda *row: self.values.kernel.constant(name, row), what)
+        constant = self.values.kernel.constant
+        return self.of(lambda *row: constant(name, row), what)
 
     def expression(self, value: Any, what: str) -> list[Number]:
         """A number or an expression of all parameters, of every instance."""
@@ -149,7 +150,7 @@ class Columns:
 
 def _attempt(routine: Routine, row: Row) -> Row:
     try:
-        return tuple(routine(*row))
+        return routine(*row)
     except DOMAIN_ERRORS:
         return ()
 

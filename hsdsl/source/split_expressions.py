@@ -34,7 +34,7 @@ def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> li
             if not _nothing(rest):
                 break
             pieces.append(name)
-        if _nothing(value):  # a call where a name is wanted, such as `reinit(v, -c*v)`
+        if _nothing(value):  # a call in place of a name, such as `reinit(v, -c*v)`
             run = _run([key, *pieces[1:]])
             joined.append((_joined(run), value))
         else:
