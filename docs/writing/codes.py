@@ -17,7 +17,7 @@ Examples may leave out the keys that every model has.
 
 LINT_RULES = """# Lint rules
 
-`hsdsl lint` looks for what is legal in a model and still probably not meant (warnings), or worth knowing (notes).
+`hsdsl lint` finds probable mistakes in legal models (warnings), and makes remarks (notes).
 `hsdsl explain CODE` prints the page of a rule. How to choose rules and ignore findings is on
 [a page of its own](../how-to/lint.md).
 

@@ -1,4 +1,4 @@
-"""Lint: what is legal in a model and still probably not meant, or worth knowing before it is trusted.
+"""Findings in legal models: probable mistakes (warnings), and remarks (notes).
 
 `lint` reads a model, lets every selected rule of `hsdsl.lint.rules` look at it, and sorts out what comments in the
 file ask to ignore.
@@ -70,7 +70,7 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
 
 
 def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:
-    """What one rule finds in some processor time; where it cannot be decided, that is said instead of nothing."""
+    """What one rule finds in some processor time, and a note where it does not finish."""
     check = RULES[code].check
     found: dict[Finding, None] = {}
     problem = None
@@ -80,7 +80,7 @@ def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:
                 found[finding] = None
     except OutOfTime:
         problem = "takes too long"
-    except Exception as error:  # whatever SymPy raises for something unheard of: the other rules go on
+    except Exception as error:  # SymPy may raise anything on a rare expression: the other rules go on
         problem = f"came to {type(error).__name__}"
     diagnostics = [_diagnostic(subject, code, finding) for finding in found]
     if problem:

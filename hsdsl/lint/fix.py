@@ -20,7 +20,7 @@ _MARK = b"\xef\xbb\xbf"
 def fix(path: str | os.PathLike[str], selection: Selection | None = None) -> tuple[Report, int]:
     """Remedy what rules know to remedy, and look again.
 
-    The file is written beside and renamed, once, and only if something has changed. Edits after which the model would
+    A new file replaces the old one, once, and only if something has changed. Edits after which the model would
     have errors or another meaning are not made.
 
     Returns

@@ -20,7 +20,7 @@ _COMMENT = re.compile(r"#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?(?=[ \t]{0,9
 
 @dataclass(frozen=True)
 class Ignored:
-    """A finding that a comment asks to ignore, and the reason given there."""
+    """A finding that a comment ignores, and the reason given there."""
 
     diagnostic: Diagnostic
     reason: str | None

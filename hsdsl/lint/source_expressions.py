@@ -57,7 +57,7 @@ class SourceExpression:
 
     @cached_property
     def tree(self) -> Tree:
-        """The expression, every node of it with the characters it stands for."""
+        """The expression, every node of it with its range of characters."""
         text = self.scalar.value.lower() if self.scalar.kind == "boolean" else self.scalar.value
         return parse(text, _WANTED.get(self.role, "number"))
 

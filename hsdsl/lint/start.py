@@ -29,7 +29,7 @@ def side(surface: Surface, point: Point) -> int | None:
 
 
 def leaves(mode: Mode, surface: Surface, point: Point) -> bool | None:
-    """Whether the flow carries a point of a surface beyond it; None where low derivatives do not tell.
+    """Whether the flow carries a point of a surface beyond it; None where low derivatives do not decide it.
 
     The sign is that of the first of L_f r, L_f^2 r, ... that is not 0 within round-off. Sampled inputs
     count as constant.

@@ -1,5 +1,5 @@
 # pyright: basic
-"""What a rule sees: a model as mathematics, beside the places its parts have in the file."""
+"""Input of a rule: a model as mathematics, with the places of its parts in the file."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Subject:
     system : HybridSystem
         The mathematics; parameters are symbols, `let` and expression inputs are substituted.
     document : Model
-        Keys and scalars as they stand in the file, each with its place.
+        Keys and scalars of the file, each with its place.
     root : Node
         The nodes of the file.
     """
@@ -150,7 +150,7 @@ class Subject:
 
     @property
     def relaxed(self) -> bool:
-        """Whether runs of this file take the relaxed scheme, where nobody asks for another."""
+        """Whether runs of this file take the relaxed scheme by default."""
         return (self.system.experiment.scheme or DEFAULTS["scheme"]) == "relaxed"
 
     @property
@@ -160,7 +160,7 @@ class Subject:
         return least_relaxation(rational(DEFAULTS["relaxation"]), self.setting("until")) if given is None else given
 
     def read(self, scalar: Scalar) -> Number:
-        """The number that an expression of parameters stands for in this file."""
+        """The value of an expression of parameters in this file."""
         value = symbolic.number(parse(scalar.value), self.reading.top, scalar.value)
         return evaluate(value.expr, self.numbers)
 

@@ -72,7 +72,7 @@ def test_many_names_are_said_in_base_units():
     ],
 )
 def test_a_size_is_said_where_it_is_all_that_differs(one, other, said):
-    assert read(one).beside(read(other)) == said
+    assert read(one).compared_with(read(other)) == said
 
 
 def test_size_counts():

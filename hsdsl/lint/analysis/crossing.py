@@ -21,7 +21,7 @@ from hsdsl.errors import Decided
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import Proof, closed, strict
-from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, positive, zero
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, negative, positive, zero
 from hsdsl.lint.analysis.singularities import breaks, discontinuities
 from hsdsl.lint.analysis.smooth_pieces import SmoothPiece, pieces
 from hsdsl.system import Edge
@@ -109,21 +109,32 @@ def fires(dynamics: Dynamics, edge: Edge, *more: Constraint) -> Answer:
 
 
 def passes_by(dynamics: Dynamics, edge: Edge) -> Answer:
-    """A point of an edge's surface that the flow goes through where no edge of that surface has an `if` that holds."""
+    """A point of an edge's surface that the flow goes through where no edge of the mode fires."""
     residual = dynamics.residual(edge.surface)
     alternatives: list[Clause] = [()]
+    elsewhere: list[Any] = []
     for other in dynamics.modes[edge.source].edges:
         if dynamics.residual(other.surface) == residual:
             refused = dynamics.condition(other, holds=False)
             if refused is None:
                 return UNKNOWN
             alternatives = [(*before, *clause) for before in alternatives for clause in refused]
-    return _passed(dynamics, edge, alternatives, ())
+        elif other.condition is not None:
+            elsewhere.append(dynamics.residual(other.surface))
+    answer = _passed(dynamics, edge, alternatives, (), elsewhere)
+    if answer.somewhere or not elsewhere:
+        return answer
+    return _passed(dynamics, edge, alternatives, tuple(map(negative, elsewhere)), elsewhere)
 
 
 def _passed(
-    dynamics: Dynamics, edge: Edge, conditions: Sequence[Clause] | None, more: tuple[Constraint, ...]
+    dynamics: Dynamics,
+    edge: Edge,
+    conditions: Sequence[Clause] | None,
+    more: tuple[Constraint, ...],
+    off: Sequence[Any] = (),
 ) -> Answer:
+    """A point of an edge's surface with some conditions, ``off`` other surfaces, through which the flow goes."""
     mode, residual = dynamics.modes[edge.source], dynamics.residual(edge.surface)
     rate = dynamics.rate(mode, residual)
     domain = dynamics.domain(mode, without=edge)
@@ -134,16 +145,17 @@ def _passed(
         for speed in dict.fromkeys((out, ())):
             clauses = [(zero(residual), *inside, *speed, *clause) for clause in conditions]
             answer = dynamics.ask_any(mode, clauses, *more)
-            if answer.somewhere and _goes_out(ModePoint(dynamics, mode, answer.point), edge):
+            if answer.somewhere and _goes_out(ModePoint(dynamics, mode, answer.point), edge, off):
                 return answer
     return UNKNOWN
 
 
-def _goes_out(here: ModePoint, edge: Edge) -> bool:
+def _goes_out(here: ModePoint, edge: Edge, off: Sequence[Any]) -> bool:
     """Whether the flow goes out of the surface of an edge, and into all else that the point lies on."""
     domain = here.dynamics.domain(here.mode, without=edge)
     try:
         inside = all(here.sign(c.expr) < 0 or here.first(c.expr)[1] < 0 for c in domain)
-        return inside and here.first(here.dynamics.residual(edge.surface))[1] > 0
+        clear = all(here.sign(residual) != 0 for residual in off)
+        return inside and clear and here.first(here.dynamics.residual(edge.surface))[1] > 0
     except Unsure:
         return False

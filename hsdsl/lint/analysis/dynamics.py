@@ -1,10 +1,9 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""A model as questions are asked about it: parameters have their values, and surfaces, rates, domains and guards are at
-hand.
+"""Surfaces, rates, domains and guards of a model with the values of its parameters, and questions about them.
 
 Sampled inputs are names that take any value between their least and their largest, at any time. Parameters have the
-values of the file; `--set` is not looked at.
+values of the file; `--set` has no effect.
 """
 
 from __future__ import annotations

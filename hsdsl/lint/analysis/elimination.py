@@ -26,7 +26,7 @@ class Reduced:
     Attributes
     ----------
     rows : list of (polynomial, relation)
-        What is still asked.
+        The constraints that are left.
     solved : list of (symbol, polynomial)
         Names and what they are, in the order of elimination: each in the names that were left then.
     bounds : dict

@@ -111,17 +111,17 @@ class NewtonSearch:
     def _moved(self, points: Array) -> Array:
         values = self.program.at(points)
         slopes = self._slopes(points, values)
-        wanted = np.zeros_like(values)
+        goal = np.zeros_like(values)
         for k, relation in enumerate(self.relations):
             if relation == "= 0":
-                wanted[k] = values[k]
+                goal[k] = values[k]
             else:
                 room = 0.1 * np.abs(slopes[k] * np.maximum(np.abs(points), 1e-1)).sum(axis=-1)
-                wanted[k] = np.where(values[k] > (-_ROOM * room if relation == "< 0" else 0.0), values[k] + room, 0.0)
-        active = wanted != 0
+                goal[k] = np.where(values[k] > (-_ROOM * room if relation == "< 0" else 0.0), values[k] + room, 0.0)
+        active = goal != 0
         matrix = np.where(active[..., None], slopes, 0.0).transpose(1, 0, 2)
-        usable: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=0)
-        matrix, right = np.where(usable[:, None, None], matrix, 0.0), np.where(usable[:, None], wanted.T, 0.0)
+        usable: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(goal).all(axis=0)
+        matrix, right = np.where(usable[:, None, None], matrix, 0.0), np.where(usable[:, None], goal.T, 0.0)
         try:
             step = (np.linalg.pinv(matrix, rcond=1e-9) @ right[..., None])[..., 0]
         except np.linalg.LinAlgError:

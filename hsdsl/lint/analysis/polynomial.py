@@ -111,7 +111,7 @@ def alone(atom: Atom) -> Polynomial:
 
 
 def linear_in(p: Polynomial, symbol: Any) -> Fraction | None:
-    """The coefficient of a name that stands in one term alone, with a number."""
+    """The coefficient of a name that occurs in one term only, times a number."""
     found: Fraction | None = None
     for monomial, coefficient in p.terms.items():
         for atom, exponent in monomial:

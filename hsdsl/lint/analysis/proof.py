@@ -21,7 +21,7 @@ class Proof:
     dynamics : Dynamics
         The model.
     mode : Mode
-        Whose states are meant.
+        The mode of the states.
     found : list of Answer
         The answers that the proof rests on.
     timed : bool

@@ -1,5 +1,5 @@
 # pyright: basic
-"""What is asked about a model, and what is answered: is there a point where some expressions have given signs?"""
+"""Questions and answers: is there a point where some expressions have given signs?"""
 
 from __future__ import annotations
 

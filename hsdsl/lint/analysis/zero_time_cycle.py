@@ -46,7 +46,7 @@ def cycle(here: ModePoint, edge: Edge) -> tuple[str, ...] | None:
 
 
 def same(one: ModePoint, other: ModePoint) -> bool:
-    """Whether two points are one, as far as can be told."""
+    """Whether two points agree within the accuracy of a search."""
     if one.mode is not other.mode:
         return False
     pairs = [(one.point[symbol(s)], other.point[symbol(s)], one.size(symbol(s))) for s in one.mode.states]

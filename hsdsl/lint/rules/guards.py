@@ -84,7 +84,7 @@ def guard_inside_domain(subject: Subject) -> Iterator[Finding]:
         about = [residual, dynamics.placed(edge.edge.condition), dynamics.rate(part.mode, residual), *inside]
         passes = f"{at(dynamics, part.mode, answer, about)} the flow passes its surface, and nothing fires"
         message = f"the guard of '{edge.edge.name}' lies inside its domain: {passes}"
-        hint = "add a transition for the rest of the surface, unless passing is meant"
+        hint = "add a transition for the rest of the surface, unless passing is intended"
         yield Finding(edge.document.condition.place.span, message, hint, answer.decided)
 
 

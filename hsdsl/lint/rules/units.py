@@ -64,6 +64,6 @@ def _differing(subject: Subject, roles: dict[str, str], factor: Unit) -> Iterato
             continue
         expected = own.times(factor)
         if not expected.same(checked.measure):
-            unit = checked.measure.beside(expected)
+            unit = checked.measure.compared_with(expected)
             message = f"{roles[written.role]} '{written.name}' is in {unit}, and should be in {expected}"
             yield Finding(written.span(), message)

@@ -73,8 +73,8 @@ class Unit:
             return whole
         return size + whole[1:] if whole.startswith("1") else f"{size} {whole}"
 
-    def beside(self, other: Unit) -> str:
-        """As text, with its size where only that tells it from the other: ``V (1000 mV)``."""
+    def compared_with(self, other: Unit) -> str:
+        """As text, with its size where the dimensions are equal: ``V (1000 mV)``."""
         if self.powers != other.powers or not other.factor:
             return str(self)
         return f"{self} ({self.factor / other.factor:.6g}{'' if other == ONE else f' {other}'})"

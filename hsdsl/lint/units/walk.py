@@ -1,7 +1,7 @@
 """The unit of an expression, from those of its names, and what does not fit on the way.
 
-A number that stands by itself takes the unit that is wanted of it: `x >= 14` is right in metres. In a product it is a
-plain factor: `2*x` is in metres too. What has no unit given is unknown, and whatever it enters is.
+A number by itself takes the expected unit: `x >= 14` is right in metres. In a product it is a plain factor: `2*x` is in
+metres too. A name without a unit has an unknown one, and so has every expression with it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from hsdsl.expression.syntax import (
 from hsdsl.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
 from hsdsl.lint.units.unit import ONE, Unit, exponent_of
 
-Any_ = Literal["any", "unknown"]  # a number that takes what is wanted; what nobody knows
+Any_ = Literal["any", "unknown"]  # a number that takes the expected unit; an unknown unit
 Measure = Unit | Any_
 Kind = Literal["sum", "argument"]
 _ALIKE = ("min", "max", "atan2")
@@ -93,7 +93,7 @@ class Walk:
                 if known is None:
                     known = found
                 elif not known.same(found):
-                    message = f"`{self.said(part)}`, in {found.beside(known)}, is {how} something in {known}"
+                    message = f"`{self.quoted(part)}`, in {found.compared_with(known)}, is {how} something in {known}"
                     self.misfits.append(Misfit("sum", part, message))
                     return "unknown"
         return known if known is not None else "unknown" if unsure else "any"
@@ -123,7 +123,7 @@ class Walk:
         if exponent is not None:
             return base.to(exponent)
         if not base.pure:
-            message = f"`{self.said(tree.base)}`, in {base}, is raised to a power that is no plain number"
+            message = f"`{self.quoted(tree.base)}`, in {base}, is raised to a power that is no plain number"
             self.misfits.append(Misfit("argument", tree.base, message))
             return "unknown"
         return base
@@ -147,10 +147,10 @@ class Walk:
     def _pure(self, tree: Tree, what: str) -> None:
         found = self.measure(tree)
         if isinstance(found, Unit) and not found.pure:
-            message = f"`{self.said(tree)}`, {what}, is in {found.beside(ONE)} and not a plain number"
+            message = f"`{self.quoted(tree)}`, {what}, is in {found.compared_with(ONE)} and not a plain number"
             self.misfits.append(Misfit("argument", tree, message))
 
-    def said(self, tree: Tree) -> str:
+    def quoted(self, tree: Tree) -> str:
         """The text of a part, cut to what a sentence carries."""
         text = self.text[tree.start : tree.end]
         return text if len(text) <= 40 else text[:37] + "..."
