@@ -38,12 +38,12 @@ def own_runs(
             size = "tolerance" if adaptive else "step"
             values = sorted(tolerances if adaptive else steps or (length * share for share in SHARES), reverse=True)
             for engine in engines:
-                asked = {"scheme": scheme, "method": method, "engine": engine}
-                if refusal := _refusal(scene, asked, size, values[0]):
+                options = {"scheme": scheme, "method": method, "engine": engine}
+                if refusal := _refusal(scene, options, size, values[0]):
                     remarks.append(f"{scheme} {method} {engine}: {refusal}")
                     continue
                 for value in values:
-                    yield _attempt(scene, asked, size, value)
+                    yield _attempt(scene, options, size, value)
 
 
 def peer_runs(scene: Scene, name: str, tolerances: Sequence[float], remarks: list[str]) -> list[Attempt]:
@@ -56,11 +56,11 @@ def peer_runs(scene: Scene, name: str, tolerances: Sequence[float], remarks: lis
     return [Attempt(name, "", "", "tolerance", value, partial(run, value)) for value in tolerances]
 
 
-def _attempt(scene: Scene, asked: dict[str, Any], size: str, value: float) -> Attempt:
-    if asked["scheme"] == "relaxed":
-        asked = asked | {"relaxation": relaxation(asked["method"], value)}
-    run = partial(_run, scene, asked | {size: value})
-    return Attempt(f"hsdsl {asked['engine']}", asked["scheme"], asked["method"], size, value, run)
+def _attempt(scene: Scene, options: dict[str, Any], size: str, value: float) -> Attempt:
+    if options["scheme"] == "relaxed":
+        options = options | {"relaxation": relaxation(options["method"], value)}
+    run = partial(_run, scene, options | {size: value})
+    return Attempt(f"hsdsl {options['engine']}", options["scheme"], options["method"], size, value, run)
 
 
 def relaxation(method: str, value: float) -> float:
@@ -70,20 +70,20 @@ def relaxation(method: str, value: float) -> float:
     return max(LEAST_RELAXATION, 0.01 * value**order)
 
 
-def _refusal(scene: Scene, asked: dict[str, Any], size: str, value: float) -> str:
+def _refusal(scene: Scene, options: dict[str, Any], size: str, value: float) -> str:
     try:
-        _simulate(scene, 0, asked | {size: value})
+        _simulate(scene, 0, options | {size: value})
     except UsageError as error:
         return str(error)
     return ""
 
 
-def _simulate(scene: Scene, until: float, asked: dict[str, Any]) -> Execution:
-    return scene.model.simulate(until, **asked, parameters=scene.parameters or None, initial=scene.initial or None)
+def _simulate(scene: Scene, until: float, options: dict[str, Any]) -> Execution:
+    return scene.model.simulate(until, **options, parameters=scene.parameters or None, initial=scene.initial or None)
 
 
-def _run(scene: Scene, asked: dict[str, Any]) -> Result:
-    execution = _simulate(scene, float(scene.grid[-1]), asked)
+def _run(scene: Scene, options: dict[str, Any]) -> Result:
+    execution = _simulate(scene, float(scene.grid[-1]), options)
     values, modes = sampled(execution, scene.grid, scene.states)
     problem = None if execution.stop.complete else execution.stop.message
     return Result(values, modes, lambda: execution.made, problem, execution)

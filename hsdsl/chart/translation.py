@@ -1,6 +1,6 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""A model's mathematics as functions for another tool: parameters put in, names of the file left behind."""
+"""A model's mathematics as functions for another tool, with numbers for parameters and symbols for states."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.arithmetic import FLOAT64
 from hsdsl.chart.result import Refused
 from hsdsl.chart.scene import Scene
+from hsdsl.model.values import with_parameters
 from hsdsl.system import TIME, Edge, Mode
 
 
@@ -69,15 +71,14 @@ def translate(scene: Scene) -> PlainModel:
     Raises
     ------
     Refused
-        The model has something that only a hybrid language says.
+        The model has sampled inputs.
     """
     system = scene.model.system
     if any(hasattr(signal, "times") for signal in system.inputs):
         raise Refused("sampled inputs are not translated")
-    numbers: dict[sp.Symbol, Any] = {}
-    for parameter in system.parameters:
-        value = scene.parameters.get(parameter.name, parameter.value)
-        numbers[sp.Symbol(parameter.name, real=True)] = sp.Float(sp.N(sp.sympify(value).xreplace(numbers), 17))
+    values = with_parameters(scene.model.pipeline.values(FLOAT64), scene.parameters).parameters
+    named = zip(system.parameters, values, strict=True)
+    numbers = {sp.Symbol(parameter.name, real=True): sp.Float(value, 17) for parameter, value in named}
     index = {mode.name: k for k, mode in enumerate(system.modes)}
     modes = tuple(_mode(mode, index, numbers) for mode in system.modes)
     start = scene.model.simulate(0, parameters=scene.parameters, initial=scene.initial)

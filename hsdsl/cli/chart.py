@@ -30,7 +30,7 @@ def chart(
     steps: Annotated[str | None, option("A,B", "For fixed-step methods.")] = None,
     against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
     states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
-    samples: Annotated[int, option("N", "How many samples the error is taken at.")] = 2000,
+    samples: Annotated[int, option("N", "How many samples the error is sampling at.")] = 2000,
     clearance: Annotated[float, option("DT", "Samples nearer than this to an exact jump do not count.")] = 1e-4,
     digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
     rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
@@ -50,7 +50,7 @@ def chart(
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot", (".png", ".svg"))
-        asked: dict[str, Any] = {
+        options: dict[str, Any] = {
             "schemes": _names(schemes, SCHEMES, "--schemes") or SCHEMES,
             "methods": _names(methods, tuple(METHODS), "--methods"),
             "engines": _names(engines, ENGINES, "--engines") or ENGINES,
@@ -61,25 +61,25 @@ def chart(
             "patience": patience,
             "with_rho": rho,
         }
-        found: list[tuple[str, list[Row]]] = []
+        charted: list[tuple[str, list[Row]]] = []
         with progress(quiet or json) as show:
 
             def watch(text: str) -> None:
                 if show:
                     show(lambda: text)
 
-            taken = {"states": names_of(states), "samples": samples, "clearance": clearance, "digits": digits}
-            for scene in [_scene(text, taken, watch) for text in models]:
+            sampling = {"states": names_of(states), "samples": samples, "clearance": clearance, "digits": digits}
+            for scene in [_scene(text, sampling, watch) for text in models]:
                 rows, remarks = work_precision(
-                    scene, **asked, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
+                    scene, **options, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
                 )
-                found.append((scene.name, rows))
+                charted.append((scene.name, rows))
                 for remark in remarks if not quiet else ():
                     say(f"left out: {remark}")
-        _report(found, out, plot, json, quiet)
+        _report(charted, out, plot, json, quiet)
 
 
-def _scene(text: str, taken: dict[str, Any], watch: Callable[[str], None]) -> Any:
+def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) -> Any:
     from hsdsl.chart import Scene
     from hsdsl.model import load
 
@@ -87,15 +87,15 @@ def _scene(text: str, taken: dict[str, Any], watch: Callable[[str], None]) -> An
     path, colon, block = text.rpartition(":")
     if not (colon and block.isdecimal()):
         path, block = text, "0"
-    return Scene.of(load(path), block=int(block), **taken)
+    return Scene.of(load(path), block=int(block), **sampling)
 
 
-def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
+def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
     from hsdsl.chart.rows import as_csv, as_text, panels, record
     from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
 
-    rows = [row for _, group in found for row in group]
+    rows = [row for _, group in charted for row in group]
     if out is not None:
         with replacing(out) as file:
             file.write(as_csv(rows).encode())
@@ -104,12 +104,12 @@ def _report(found: list[tuple[str, list[Row]]], out: Path | None, plot: Path | N
     if plot is not None:
         from hsdsl.plot.work_precision import plot_work_precision
 
-        plot_work_precision(plot, [panels(name, group) for name, group in found])
+        plot_work_precision(plot, [panels(name, group) for name, group in charted])
         say(f"wrote {plot}")
     if json:
         print_json({"rows": [record(row) for row in rows]})
     elif not quiet:
-        print("\n\n".join(f"{name}\n{as_text(group)}" for name, group in found))
+        print("\n\n".join(f"{name}\n{as_text(group)}" for name, group in charted))
 
 
 def _names(text: str | None, known: tuple[str, ...], name: str) -> tuple[str, ...]:

@@ -33,19 +33,10 @@ class GuardLine:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """The points of a run.
+    """The points of a run, in float64.
 
-    Attributes
-    ----------
-    samples : Samples
-        The n points, in float64.
-    begins : array of bool, shape (n,)
-        Whether the point is the first of its arc.
-    jumps : array of int
-        The points that a transition led to; the one before each is what it came from.
-    bands : list of (mode, begin, end)
-        When which mode was occupied, without times too short to see; :data:`SEVERAL` where they are too many to tell
-        apart.
+    ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
+    the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many.
     """
 
     samples: Samples
@@ -139,15 +130,7 @@ def _merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, flo
 
 
 def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, float]) -> tuple[Array, Array]:
-    """Make a line to draw: not-a-number where it jumps, and no two points in a row that look like one.
-
-    Parameters
-    ----------
-    begins : array of bool
-        Where an arc begins; there the line is broken if the point differs from the one before.
-    limits : x0, x1, y0, y1
-        Of the picture.
-    """
+    """Make a line to draw: not-a-number where an arc begins elsewhere, and no two points in a row in one cell."""
     x0, x1, y0, y1 = limits
     with np.errstate(invalid="ignore", over="ignore"):
         cells = np.stack([(x - x0) / (x1 - x0) * CELLS, (y - y0) / (y1 - y0) * CELLS])
@@ -163,8 +146,8 @@ def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, f
 def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
     """Choose the lower and upper end of an axis.
 
-    A range of round-off (relative to 1 + |x|, as local errors are) is shown as constant. Where the run ended badly
-    its last values may be anything, and the last thirtieth of the time is not looked at.
+    A range of round-off (relative to 1 + |x|, as local errors are) is shown as constant. Where the run ended badly its
+    last values are arbitrary, and the last thirtieth of the time does not count.
     """
     if ends_badly and len(time) > 1:
         before = time <= time[0] + 0.97 * (time[-1] - time[0])

@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false
 # (matplotlib's stubs leave the keyword arguments untyped)
-"""The figure: how many panels, how large, what stands above them."""
+"""The figure of a run: its panels, their sizes and headings."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def draw(execution: Execution, *, guards: Sequence[GuardLine], units: Mapping[st
     height = MARGIN + down * HEIGHTS.get(down, LOWEST)
     phase = has_phase(execution)
     width = {1: 9.0, 2: 13.0, 3: 16.0}[across]
-    beside = min(max(height - MARGIN, 3.6), 5.2) if phase else 0.0
-    figure = Figure(figsize=(width + beside, max(height, beside + MARGIN)), layout="constrained")
-    outer = figure.add_gridspec(1, 2 if phase else 1, width_ratios=[width, beside] if phase else [1])
+    phase_width = min(max(height - MARGIN, 3.6), 5.2) if phase else 0.0
+    figure = Figure(figsize=(width + phase_width, max(height, phase_width + MARGIN)), layout="constrained")
+    outer = figure.add_gridspec(1, 2 if phase else 1, width_ratios=[width, phase_width] if phase else [1])
     inner = GridSpecFromSubplotSpec(down, across, subplot_spec=outer[0, 0])
     axes = _panels(figure, inner, names, across)
     visited = {arc.mode for arc in execution.arcs}

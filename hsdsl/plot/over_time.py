@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false
 # (matplotlib's stubs leave the keyword arguments untyped)
-"""A picture of a distance over time: its lower and upper bound, on a logarithmic scale."""
+"""A picture of distances over time: lower and upper bounds, on a logarithmic scale."""
 
 from __future__ import annotations
 
@@ -23,23 +23,9 @@ DECADES = 12  # below the largest value: smaller ones are drawn there
 def plot_over_time(
     path: str | os.PathLike[str], times: Array, bounds: dict[str, tuple[Array, Array]], title: str
 ) -> None:
-    """Draw bands of lower and upper bounds against time.
+    """Draw bands of lower and upper bounds against time, by their names in the legend; the first is in front.
 
-    Parameters
-    ----------
-    path : path
-        ``.png`` or ``.svg``.
-    times : array, shape (n,)
-        Not decreasing; two equal ones at a jump.
-    bounds : mapping of str to (lower, upper)
-        Each of shape (n,), by the name to stand in the legend; the first is drawn in front.
-    title : str
-        What stands above.
-
-    Raises
-    ------
-    UsageError
-        For an unknown suffix, or a file that cannot be written.
+    ``times`` do not decrease; two equal ones mark a jump.
     """
 
     def draw() -> Figure:

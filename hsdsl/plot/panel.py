@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -59,7 +59,7 @@ def draw_bands(axis: Axes, data: Curves) -> None:
 
 
 def name_bands(axis: Axes, data: Curves, width: float) -> bool:
-    """Write each mode's name above its first wide band, if every name fits somewhere; say whether it did."""
+    """Write each mode's name above its first wide band, if every name fits somewhere; return whether it did."""
     start, end = data.span
     places: dict[str, tuple[float, float]] = {}
     for mode, begin, stop in data.bands:
@@ -82,9 +82,8 @@ def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array) -> None:
     few = len(jumps) <= BOTH_SIDES
     size = 4.0 if len(jumps) <= 20 else 3.0 if few else 1.8
     if few:
-        axis.plot(
-            x[jumps - 1], y[jumps - 1], "o", color=INK, markersize=size, markerfacecolor="white", markeredgewidth=0.9
-        )
+        hollow: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 0.9}
+        axis.plot(x[jumps - 1], y[jumps - 1], "o", color=INK, markersize=size, **hollow)
     axis.plot(x[jumps], y[jumps], "o", color=INK, markersize=size, markeredgewidth=0.0)
 
 

@@ -20,23 +20,12 @@ from hsdsl.plot.style import ALARM, FAINT, INK, save
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GRID = 160  # points of a panel's side at which domains and curved guards are looked at
+GRID = 160  # points of a panel's side at which domains and curved guards are evaluated
 MARGIN = 0.25  # of a path's extent, around it
 
 
 def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece], title: str) -> None:
-    """Draw domains, guards, their images and a path.
-
-    Parameters
-    ----------
-    path : path
-        ``.png`` or ``.svg``.
-    space : Space
-        Where the path lies.
-    pieces : sequence of Piece
-        The path, as a distance's answer has it.
-    title : str
-        What stands above.
+    """Draw domains, guards, their images and the pieces of a path.
 
     Raises
     ------
@@ -69,10 +58,8 @@ def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:
     for mode in modes:
         names = space.domains[mode].coordinates
         if len(names) != 2:
-            raise UsageError(
-                f"a path is drawn in modes of two coordinates, and mode {space.modes[mode]} has {len(names)}: "
-                f"{', '.join(names) or 'none'}"
-            )
+            has = f"mode {space.modes[mode]} has {len(names)}: {', '.join(names) or 'none'}"
+            raise UsageError(f"a path is drawn in modes of two coordinates, and {has}")
     return modes
 
 
@@ -105,9 +92,13 @@ def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[Piece]) -> None:
         axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
+def _grid(x: Array, y: Array) -> Array:
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
 def _beyond(domain: Domain, x: Array, y: Array) -> Array:
     """How far each point of a grid is beyond the domain: positive outside."""
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = _grid(x, y)
     worst = np.max(points @ domain.normals.T - domain.levels, axis=1, initial=-1.0)
     for formula in domain.curved:
         worst = np.maximum(worst, [formula(point) for point in points])
@@ -128,7 +119,7 @@ def _line(axis: Any, gate: Gate, base: Array, frame: Array, extent: float, own: 
 
 
 def _curve(axis: Any, x: Array, y: Array, surface: Formula, conditions: Formula | None) -> None:
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = _grid(x, y)
     values = np.array([surface(point) for point in points])
     if conditions is not None:
         allowed = np.array([np.all(conditions.value(point) <= 1e-2 * np.ptp(x)) for point in points])

@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false
 # (matplotlib's stubs leave the keyword arguments untyped)
-"""Time against error, log-log: one column a scene, a line a tool and method, crosses where the answer is wrong."""
+"""Time against error, log-log: a column for each scene, a line for each method; crosses mark wrong results."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hsdsl.plot.style import FAINT, PALETTE, save
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 MARKERS = "osD^vP*hXp<>"
 LEAST_ERROR = 1e-16
-WORST = 30  # times the largest error of a right answer: where wrong ones are drawn that are farther off
+WORST = 30  # times the largest error of a right result: larger errors are drawn there
 ABREAST = 2  # single panels in a row
 
 
@@ -50,20 +52,7 @@ class Panel:
 
 
 def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence[Panel]]) -> None:
-    """Draw panels, ``columns[i]`` from top to bottom.
-
-    Parameters
-    ----------
-    path : path
-        ``.png`` or ``.svg``.
-    columns : sequence of sequence of Panel
-        A column a scene.
-
-    Raises
-    ------
-    UsageError
-        For an unknown suffix, or a file that cannot be written.
-    """
+    """Draw panels, a column for each scene."""
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
     places, down, across = _places(columns)
@@ -73,12 +62,11 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
 
         figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
         axes = figure.subplots(down, across, squeeze=False)
-        for k in range(down):
-            for i in range(across):
-                if (k, i) in places:
-                    _draw(axes[k][i], places[k, i], labels, groups, ylabel=i == 0)
-                else:
-                    axes[k][i].axis("off")
+        for place, axis in np.ndenumerate(axes):
+            if place in places:
+                _draw(axis, places[place], labels, groups, ylabel=place[1] == 0)
+            else:
+                axis.axis("off")
         _legend(figure, labels, groups)
         return figure
 
@@ -86,7 +74,7 @@ def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence
 
 
 def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:
-    """Where panels stand, by row and column, and how many rows and columns there are; single ones two in a row."""
+    """Panels by row and column, and the numbers of rows and columns; single panels go two in a row."""
     if len(columns) > ABREAST and all(len(column) == 1 for column in columns):
         flat = [column[0] for column in columns]
         return {divmod(n, ABREAST): panel for n, panel in enumerate(flat)}, -(-len(flat) // ABREAST), ABREAST
@@ -106,8 +94,8 @@ def _look(label: str, labels: Sequence[str], groups: dict[str, str]) -> dict[str
 
 
 def _draw(axis: Axes, panel: Panel, labels: Sequence[str], groups: dict[str, str], ylabel: bool) -> None:
-    found = [m.error for line in panel.lines for m in line.marks if m.verdict == "right" and isfinite(m.error)]
-    largest = WORST * max([LEAST_ERROR, *found]) if found else inf  # what is worse says no more by how much
+    right_errors = [m.error for line in panel.lines for m in line.marks if m.verdict == "right" and isfinite(m.error)]
+    largest = WORST * max([LEAST_ERROR, *right_errors]) if right_errors else inf
     for line in panel.lines:
         look = _look(line.label, labels, groups)
         known = [m for m in line.marks if isfinite(m.error)]

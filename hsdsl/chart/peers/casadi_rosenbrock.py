@@ -48,11 +48,11 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
 
     def run(tolerance: float) -> Result:
         if tolerance not in kept:
-            asked = {"transition": transition, "reltol": tolerance, "abstol": tolerance, "max_events": most}
-            asked |= {"control_group_size": [len(grid)], "max_num_steps": 1_000_000}
-            kept[tolerance] = ca.integrator("run", "rosenbrock", dae, float(grid[0]), grid, asked)
-        found: Array = np.asarray(kept[tolerance](x0=start)["xf"]).T
-        return Result(found[:, columns], lambda: _modes(found[:, n], model), lambda: None)
+            options = {"transition": transition, "reltol": tolerance, "abstol": tolerance, "max_events": most}
+            options |= {"control_group_size": [len(grid)], "max_num_steps": 1_000_000}
+            kept[tolerance] = ca.integrator("run", "rosenbrock", dae, float(grid[0]), grid, options)
+        result: Array = np.asarray(kept[tolerance](x0=start)["xf"]).T
+        return Result(result[:, columns], lambda: _modes(result[:, n], model), lambda: None)
 
     return run
 

@@ -27,12 +27,12 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
         if (k, tolerance) not in kept:
             kept[k, tolerance] = _solver(model, k, tolerance)
-        asked = np.concatenate(([t], times[times > t]))
-        if asked[-1] < until:
-            asked = np.append(asked, until)
-        if len(asked) < 2:
+        instants = np.concatenate(([t], times[times > t]))
+        if instants[-1] < until:
+            instants = np.append(instants, until)
+        if len(instants) < 2:
             return ToolArc(until, x, None, np.empty((0, len(x))))
-        solution = kept[k, tolerance].solve(asked, np.array(x, dtype=float))
+        solution = kept[k, tolerance].solve(instants, np.array(x, dtype=float))
         if not solution.success:
             raise Refused(solution.message)
         skipped = 1 if not len(times) or times[0] > t else 0
