@@ -6,7 +6,7 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-LOOKALIKES = "·²³"  # Unicode lets some of them stand in names; in mathematics they are operators
+LOOKALIKES = "·²³"  # Unicode allows some of them in names; in mathematics they are operators
 # controls, line ends that are none in YAML, marks of direction, and what has no width
 INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u00ad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"

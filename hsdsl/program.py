@@ -4,7 +4,7 @@ This is all that `simulate` knows of a model. Names of the file appear only as s
 states as ``x0, x1, ...``, parameters as ``p0, p1, ...`` and a sampled input i as the line
 ``a_i + b_i (t - c_i)`` of the segment that time is in, and the number ``k_i`` of a switch, which is constant on it.
 
-A routine's text is a Python function body in which every constant that is not an integer exponent stands as a name
+A routine's text is a Python function body in which every constant that is not an integer exponent is a name
 ``q_N_D`` (the exact fraction N/D, ``q_mN_D`` when negative), so that each number type can put its own value there.
 """
 
@@ -95,7 +95,7 @@ class SampledInput:
 class Switch:
     """A function of time that changes its branch at times no state decides: the floor or the sign of something.
 
-    Where it ``jumps`` so does what it stands in; elsewhere that bends.
+    Where it ``jumps`` its expression jumps; else it bends.
     """
 
     kind: Literal["floor", "sign"]
@@ -123,7 +123,7 @@ class EdgeProgram:
 class Jacobian:
     """Derivatives of a mode's flow by its states: of n * n, row by row, those that are not zero everywhere.
 
-    ``routines`` has one routine, ``jacobian``, called like those of a mode; its values stand at ``places``, in order.
+    ``routines`` has one routine, ``jacobian``, called like those of a mode, for the values at ``places``.
     """
 
     routines: Routines
@@ -150,7 +150,7 @@ class ModeProgram:
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
-    ``jacobian`` gives the derivatives of the flow by the states; it stands apart, as only implicit methods need it.
+    ``jacobian`` gives the derivatives of the flow by the states; only implicit methods need it.
 
     ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
     everywhere.
@@ -195,7 +195,7 @@ class Program:
     of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
     of its slope. A switch depends on earlier ones only.
 
-    ``left_out`` names the states of the file that are not here, since nothing that was asked for depends on them.
+    ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
     """
 
     path: str

@@ -32,7 +32,7 @@ def elaborate_initial(symbols: SymbolTable) -> Initial:
 def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> None:
     document = symbols.document.modes[mode]  # pyright: ignore[reportArgumentType]
     if document.flow is None:
-        return  # entered with whatever is given, or reported
+        return  # entered with the given values, or reported
     lacking = [s for s in symbols.states[mode] if s not in given]
     for key in given:
         if key not in symbols.states[mode]:

@@ -17,7 +17,7 @@ from hsdsl.system import SampledInput
 
 def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
     """The sampled inputs; what the name of every input means goes to ``symbols.values``."""
-    feedback = "what depends on states stands under `let`, or in `flow` itself"
+    feedback = "write expressions of states under `let`, or in `flow` itself"
     inputs, hint = symbols.document.inputs, "combine them under `let`"
     refusals: Values = {
         str(name): Refusal("HS117", f"'{name}' is an input; an input cannot use another input", hint) for name in inputs

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Outputs: what is recorded beside the states. A mode has those whose names all mean something in it.
+"""Outputs: expressions that are recorded with the states. A mode has those whose names all mean something in it.
 
 An output of the whole model is read in each mode with that mode's own `let`. One that a mode defines itself goes before
 it, and has no value in the other modes.
@@ -18,7 +18,7 @@ from hsdsl.source import Key
 def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
     """What each output of the whole model is; None where its expression is broken.
 
-    A `let` name that some mode defines stands for itself, like a state, until the mode is known.
+    A `let` name that some mode defines means itself, like a state, until the mode is known.
     """
     scope = symbols.scope(
         ("time", "parameters", "inputs", "states", "let"), "", {name: state(name) for name in symbols.inner_lets}

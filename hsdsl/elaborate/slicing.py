@@ -1,7 +1,7 @@
 # pyright: basic, reportAttributeAccessIssue=false
 """Slices of a system: the states that some names depend on, and no others.
 
-A state of a mode is needed where it is asked for, where an asked output, a guard, a condition or a domain uses it,
+A state of a mode is needed where its name is given, where a given output, a guard, a condition or a domain uses it,
 where the flow of a needed state of that mode uses it, or where the reset of a needed state of the next mode does.
 The rest is not part of the answer: no transition and no needed value can depend on it.
 """
@@ -19,9 +19,9 @@ from hsdsl.system import Edge, HybridSystem, Mode
 Node = tuple[str, str]  # a mode and one of its states
 
 
-def only(system: HybridSystem, asked: Iterable[str]) -> HybridSystem:
-    """The system with the asked states and outputs and what they need; all transitions stay."""
-    names = frozenset(asked)
+def only(system: HybridSystem, given: Iterable[str]) -> HybridSystem:
+    """The system with the given states and outputs and what they need; all transitions stay."""
+    names = frozenset(given)
     needed = _needed(system, names)
     if all((mode.name, state) in needed for mode in system.modes for state in mode.states):
         return system

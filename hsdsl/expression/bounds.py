@@ -1,5 +1,5 @@
 # pyright: basic
-"""What SymPy must not be asked to compute: exact numbers of millions of digits, and expressions without end.
+"""Bounds on the work of SymPy: exact numbers of millions of digits, and expressions without end.
 
 SymPy folds numbers wherever they meet, also inside symbolic powers, so every operation is measured before it is done.
 """
@@ -22,7 +22,7 @@ LARGEST_NUMBER = 2**1024  # no float is as large
 
 
 def bits(expr: Any) -> int:
-    """How long the exact numbers are that stand as factors of an expression."""
+    """The length of the exact numbers that are factors of an expression."""
     if expr.is_Rational:
         return max(int(expr.p).bit_length(), int(expr.q).bit_length())
     if expr.is_Mul:

@@ -123,18 +123,18 @@ _INDEX = re.compile(r"\[\s*([0-9]{1,4})\s*\]")
 
 
 def better(sign: str, text: str, at: int) -> str | None:
-    """The right form of what stands around a sign, where that is known."""
+    """The right form of the text around a sign, where that is known."""
     word = _WORD_BEFORE.search(text, max(0, at - _FAR), at)
     name = word.group(1) if word else ""
     if sign == "'" and name:
         return f"write {name}: a reset sees the values before the jump, and derivatives are what `flow` gives"
     quantity = _QUANTITY.fullmatch(text[:at]) if sign == "^" and at < _FAR else None
     if quantity and quantity.group(3).lower() in _UNITS:
-        return f"write {quantity.group(1)} alone: units stand under `units`"
+        return f"write {quantity.group(1)} alone: units belong under `units`"
     if sign == "%" and not text[at + 1 :].strip() and (number := _NUMBER_BEFORE.search(text, max(0, at - _FAR), at)):
         return f"write {number.group(1)}/100"
     if sign == "°" and text[at + 1 : at + 2] in ("C", "F"):
-        return "leave the unit out: units stand under `units`"
+        return "leave the unit out: units belong under `units`"
     if sign in ("^", ".^") and name == "e":
         return "write exp(x) for a power of e"
     if sign in ("^", ".^") and name in FUNCTIONS:
@@ -167,7 +167,7 @@ def timed(function: str, time: str | None) -> str | None:
 
 def unit(name: str) -> str | None:
     """The hint for a name that is a unit's, and nothing else here."""
-    return "leave the unit out: units stand under `units`" if len(name) > 1 and name.lower() in _UNITS else None
+    return "leave the unit out: units belong under `units`" if len(name) > 1 and name.lower() in _UNITS else None
 
 
 def side_by_side(number: str, name: str) -> str | None:
@@ -177,9 +177,9 @@ def side_by_side(number: str, name: str) -> str | None:
     if re.fullmatch("[dD][0-9]{1,4}", name):
         return f"write {number}e{name[1:]}"
     if name.lower() in _UNITS and len(name) == 1:
-        return f"write {number}*{name} for a product; units stand under `units`"
+        return f"write {number}*{name} for a product; units belong under `units`"
     if name.lower() in _UNITS:
-        return f"write {number} alone, for units stand under `units`; or {number}*{name} for a product"
+        return f"write {number} alone, for units belong under `units`; or {number}*{name} for a product"
     return None
 
 

@@ -122,7 +122,7 @@ class _Parser:
         return [token.text for token in self.tokens[begin : self.at]]
 
     def operand(self) -> Tree:
-        """A number, a name, a call, or what stands in parentheses."""
+        """A number, a name, a call, or an expression in parentheses."""
         token = self.tokens[self.at]
         if token.kind == "number":
             self.at += 1
@@ -204,7 +204,7 @@ class _Parser:
             if self.expected == "inequality" and not self.depth:
                 hint = "write one inequality here: the rest of a `when` under `if`, of a `domain` as further items"
             return ExpressionError(
-                "HS102", "a comma stands only between the arguments of a function", token.start, token.end, hint
+                "HS102", "a comma separates only arguments of a function", token.start, token.end, hint
             )
         return self.no_operator(before, token)
 

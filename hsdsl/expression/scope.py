@@ -1,5 +1,5 @@
 # pyright: basic
-"""What names mean where an expression stands."""
+"""Scopes: the meaning of names in an expression."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
 
 @dataclass(frozen=True)
 class Value:
-    """What an expression stands for.
+    """The meaning of an expression.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Scope:
     Attributes
     ----------
     values : mapping
-        What each name stands for: a value, a refusal, or None where its own definition is broken.
+        The meaning of each name: a value, a refusal, or None where its own definition is broken.
     states : collection of str or None
         The states of the mode the expression belongs to; None where every state may be used.
     place : str
@@ -138,9 +138,9 @@ class Scope:
         given = len(node.arguments)
         if given >= fewest and (most is None or given <= most):
             return None
-        wanted = f"{fewest}" if most == fewest else f"at least {fewest}"
+        number = f"{fewest}" if most == fewest else f"at least {fewest}"
         noun = "argument" if fewest == 1 else "arguments"
-        message = f"`{node.function}` takes {wanted} {noun}, not {given}"
+        message = f"`{node.function}` takes {number} {noun}, not {given}"
         arguments = "x" if most == fewest == 1 else "x, y"
         return ExpressionError("HS113", message, node.start, node.end, f"write {node.function}({arguments})")
 

@@ -1,4 +1,4 @@
-"""The tree of an expression. Every node knows which characters of the expression it stands for."""
+"""The tree of an expression. Every node has the range of its characters."""
 
 from __future__ import annotations
 

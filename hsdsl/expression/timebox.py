@@ -1,4 +1,4 @@
-"""A box in time around symbolic work, which SymPy cannot be asked to leave by itself.
+"""A bound on the time of symbolic work, which SymPy cannot be made to leave by itself.
 
 A second thread watches the processor time of the process and raises :class:`OutOfTime` in the one that works, at its
 next Python instruction. Unlike a signal that does not need the main thread.

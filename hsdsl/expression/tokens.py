@@ -89,7 +89,7 @@ def _scaled(mantissa: Fraction, power: int, start: int, end: int) -> Fraction:
             return value
     if power > 0:
         raise ExpressionError("HS118", "the number is too large to have a finite value", start, end)
-    raise ExpressionError("HS105", "the number is too small to be told from 0", start, end, "write 0")
+    raise ExpressionError("HS105", "the number is below the smallest float", start, end, "write 0")
 
 
 def _name(text: str, at: int) -> Token | None:

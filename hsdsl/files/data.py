@@ -56,7 +56,7 @@ class ModelFiles:
 
     @property
     def folder(self) -> Path:
-        """Where the data files lie: beside the model, or in the current folder where it comes through a pipe."""
+        """The folder of the data files: that of the model, or the current one where the model comes through a pipe."""
         return Path() if is_piped(self.path) else Path(self.path).parent
 
     def with_data(self, data: Mapping[str, bytes]) -> ModelFiles:

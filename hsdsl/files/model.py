@@ -62,7 +62,7 @@ def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
     mode = os.stat(path).st_mode
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # to open some devices is to do something
         raise refusal
-    stream = open(os.open(path, READ | flags), "rb")  # noqa: SIM115 - whoever asked closes it
+    stream = open(os.open(path, READ | flags), "rb")  # noqa: SIM115 - the caller closes it
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         return stream
     stream.close()  # exchanged meanwhile
@@ -93,7 +93,7 @@ def _standard_input(most: int) -> bytes:
     stream = sys.stdin.buffer
     try:
         mode = os.fstat(stream.fileno()).st_mode
-    except io.UnsupportedOperation:  # something in memory stands in its place
+    except io.UnsupportedOperation:  # something in memory replaces it
         mode = 0
     if not stream.isatty():
         _refuse_device(mode)

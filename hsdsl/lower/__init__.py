@@ -2,7 +2,7 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
 
-The pipeline is in :func:`lower`. What each routine returns stands in `hsdsl.program.ModeProgram`.
+The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NAN = symbol("nan")
 
 @dataclass(frozen=True)
 class Names:
-    """The numbered symbols that stand for the file's names in generated code.
+    """The numbered symbols for the file's names in generated code.
 
     ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs and switches.
     """

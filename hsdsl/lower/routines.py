@@ -20,9 +20,9 @@ from hsdsl.program import Routines
 class Definition:
     """A routine before printing: its name, arguments and tuple of results.
 
-    ``statements`` are the names that the results use besides the arguments, and what they stand for. With ``places``
+    ``statements`` are the names that the results use besides the arguments, and their expressions. With ``places``
     only the arguments that are used have a name in the text: of many small routines with many arguments each, the
-    heads would be all there is. ``places`` says where each argument stands.
+    heads would be all there is. ``places`` has the index of each argument.
     """
 
     name: str

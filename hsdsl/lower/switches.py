@@ -35,7 +35,7 @@ class Switches:
     arguments : dict
         What each switch is the floor or the sign of: expressions over the file's names and the symbols of switches.
     jumping : set of sympy.Symbol
-        The switches whose change is a jump of what they stand in; at the others it bends.
+        The switches at which their expression jumps; at the others it bends.
     """
 
     moving: frozenset[sp.Symbol]  # time, and inputs that move between their samples
@@ -46,7 +46,7 @@ class Switches:
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
-        """What stands for the numbers in expressions."""
+        """The symbols of the numbers in expressions."""
         return tuple(self.arguments.values())
 
     def out_of(self, expr: Any) -> Any:

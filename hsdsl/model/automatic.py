@@ -46,7 +46,7 @@ MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longe
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Where a decay is fast beside what happens: its time, and for how long the curve is straight to a hundredth."""
+    """A decay that is fast in comparison: its time, and for how long the curve is straight to a hundredth."""
 
     mode: str
     decay: float

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from hsdsl.model import Model
     from hsdsl.model.values import Values
 
-SECONDS = 60.0  # that a search may take, unless said otherwise
+SECONDS = 60.0  # that a search may take, by default
 
 
-def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interval:
+def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> Interval:
     """Return how far apart two runs are, or two points of a model.
 
     Parameters
@@ -56,10 +56,10 @@ def distance(first: Any, second: Any, third: Any = None, **asked: Any) -> Interv
     from hsdsl.model import Model, load
 
     if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
-        return distance_of_runs(first, second, **asked).interval
+        return distance_of_runs(first, second, **arguments).interval
     model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
     if isinstance(model, Model) and isinstance(second, (str, Place)) and isinstance(third, (str, Place)):
-        return model.distance(second, third, **asked).interval
+        return model.distance(second, third, **arguments).interval
     raise UsageError(
         "distance takes two runs, or a model and two of its points",
         'for example distance(run, other) or distance(model, "free x=13 v=5", "free x=13 v=-4")',

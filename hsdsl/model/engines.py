@@ -53,7 +53,7 @@ def choose(
     Raises
     ------
     UsageError
-        ``c`` is asked for and cannot serve.
+        ``c`` is given and cannot serve.
     """
     if engine == "python":
         return None
@@ -74,7 +74,7 @@ def choose(
 
 def _refusal(settings: Settings, precision: int | None) -> str | None:
     if precision is not None:
-        return "it computes with float64 only, and a precision is asked for"
+        return "it computes with float64 only, and a precision is given"
     if settings.scheme not in SCHEMES:
         return f"scheme '{settings.scheme}' has no compiled loop"
     if not isinstance(settings.method, SCHEMES[settings.scheme]):

@@ -182,14 +182,16 @@ class Model:
         return ready.simulate(watch, self.pipeline.seconds)
 
     def _reduced_run(
-        self, outputs: Sequence[str], asked: dict[str, Any], watch: Callable[[Progress], None] | None
+        self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
     ) -> Execution:
         """Run the model reduced to some outputs; initial values and scales of states that are left out do not count."""
         smaller = self.only(outputs)
         gone = set(self.columns) - {"mode", *smaller.columns}
         for group in ("initial", "scale"):
-            asked[group] = {name: value for name, value in overrides_of(asked, group).items() if name not in gone}
-        return smaller.simulate(**asked, watch=watch)
+            arguments[group] = {
+                name: value for name, value in overrides_of(arguments, group).items() if name not in gone
+            }
+        return smaller.simulate(**arguments, watch=watch)
 
     def stream(
         self,
@@ -198,7 +200,7 @@ class Model:
         every: int = 1,
         columns: Sequence[str] | None = None,
         watch: Callable[[Progress], None] | None = None,
-        **asked: Any,
+        **arguments: Any,
     ) -> Streamed:
         """Run the model with its rows going to a CSV file while it runs, in constant memory.
 
@@ -215,7 +217,7 @@ class Model:
             Which states and outputs; left out, all of them.
         watch : callable, optional
             As for :meth:`simulate`.
-        **asked
+        **arguments
             Further arguments of :meth:`simulate`, but ``precision`` and ``samples``.
 
         Raises
@@ -225,8 +227,8 @@ class Model:
         """
         from hsdsl.model.stream import check, stream
 
-        target = check(path, every, columns, asked, self)
-        return stream(self.pipeline.prepare(asked | {"engine": "c"}), target, every, columns, watch)
+        target = check(path, every, columns, arguments, self)
+        return stream(self.pipeline.prepare(arguments | {"engine": "c"}), target, every, columns, watch)
 
     def ensemble(
         self,
@@ -237,7 +239,7 @@ class Model:
         transition_times: int = 0,
         threads: int | None = None,
         progress: Callable[[int, int], None] | None = None,
-        **asked: Any,
+        **arguments: Any,
     ) -> Ensemble:
         """Run many instances of the model, on all cores where there is a compiler.
 
@@ -256,7 +258,7 @@ class Model:
             How many; left out, as many as there are cores for this process.
         progress : callable, optional
             Called now and then with how many instances are done and how many there are.
-        **asked
+        **arguments
             Further arguments of :meth:`simulate` for every instance, but ``precision`` and ``outputs``.
 
         Raises
@@ -266,16 +268,16 @@ class Model:
         """
         from hsdsl.model.ensemble import run_ensemble
 
-        call = asked | {"parameters": parameters or {}, "initial": initial or {}}
+        call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
         return run_ensemble(self, call, samples, transition_times, threads, progress)
 
-    def only(self, asked: Sequence[str]) -> Model:
+    def only(self, outputs: Sequence[str]) -> Model:
         """Return the model with these states and outputs and those they, or any transition, depend on.
 
         It runs as a model written without the rest: adaptive steps follow the remaining states alone, and a state that
         is left out can neither stop a run nor keep one from coming to rest.
         """
-        names = tuple(sorted(set(asked)))
+        names = tuple(sorted(set(outputs)))
         for name in names:
             if name not in self.columns:
                 raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))

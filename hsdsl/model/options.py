@@ -63,9 +63,9 @@ def check_arguments(given: Iterable[str], what: str, without: Collection[str]) -
             raise UsageError(f"{what} has no argument '{name}'", did_you_mean(name, known))
 
 
-def overrides_of(asked: Mapping[str, Any], group: str) -> dict[str, Any]:
+def overrides_of(arguments: Mapping[str, Any], group: str) -> dict[str, Any]:
     """The overrides of a group, ``parameters``, ``initial`` or ``scale``, among the arguments of a run."""
-    given: Mapping[str, Any] | None = asked.get(group)
+    given: Mapping[str, Any] | None = arguments.get(group)
     return dict(given or {})
 
 

@@ -1,4 +1,4 @@
-"""``--set NAME=VALUE``: what an override reaches, and how a run records what it was asked."""
+"""``--set NAME=VALUE``: reading of overrides, and their record in a run."""
 
 from __future__ import annotations
 

@@ -154,11 +154,11 @@ class Pipeline:
             raise self._compiled
         return self._compiled
 
-    def prepare(self, asked: Mapping[str, Any]) -> Prepared:
+    def prepare(self, arguments: Mapping[str, Any]) -> Prepared:
         """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
-        parameters, initial = overrides_of(asked, "parameters"), overrides_of(asked, "initial")
-        engine, precision = asked.get("engine", "auto"), asked.get("precision")
-        options = self.resolve(asked.get("settings"), {key: asked.get(key) for key in KEYS})
+        parameters, initial = overrides_of(arguments, "parameters"), overrides_of(arguments, "initial")
+        engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
+        options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
         engines.check(engine)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):

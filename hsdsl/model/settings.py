@@ -37,7 +37,7 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
     numbers = {"step": None, "tolerance": None} | numbers
     until, step, tolerance = numbers["until"], numbers["step"], numbers["tolerance"]
     if step is not None and until > 0 and until + step == until:
-        raise UsageError(f"a step of {step} is lost in round-off beside until = {until}", "take a larger step")
+        raise UsageError(f"a step of {step} is lost in the round-off of until = {until}", "take a larger step")
     check_method(options.method, values.program, arithmetic)
     if tolerance is not None and tolerance < 2 * arithmetic.unit:
         kind = f"{arithmetic.digits} digits" if arithmetic.digits else "float64"

@@ -115,11 +115,11 @@ class Rows:
 
 
 def check(
-    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, asked: Mapping[str, Any], model: Model
+    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, arguments: Mapping[str, Any], model: Model
 ) -> Path:
     """Refuse arguments that a streamed run does not take, and return the path of its rows."""
-    check_arguments(asked, "a streamed run", without=("samples", "precision"))
-    if asked.get("engine") == "python":
+    check_arguments(arguments, "a streamed run", without=("samples", "precision"))
+    if arguments.get("engine") == "python":
         raise UsageError("only the compiled engine streams", "leave out the engine, or what is to be streamed")
     target = Path(path)
     if target.suffix.lower() != ".csv":

@@ -102,7 +102,7 @@ class TransitionDocument(Document):
         "their value.",
         {"v": "-c*v"},
     )
-    name: OptionalLabel = optional("What to call the transition; `SRC->DST` where nothing is said.", "impact")
+    name: OptionalLabel = optional("What to call the transition; left out, it is `SRC->DST`.", "impact")
     priority: Whole = optional(
         "Of transitions reached together, the one with the largest priority goes first.", 1, default=0
     )
@@ -144,7 +144,7 @@ Samples = Annotated[AsExpression | Annotated[Items[Expression], Tag("<list>")], 
 
 
 class ExperimentDocument(Document):
-    """How to run the model unless told otherwise. Numbers are expressions of parameters."""
+    """How to run the model by default. Numbers are expressions of parameters."""
 
     until: Expression = required("The time at which a run ends; it starts at 0.", "40*pi")
     scheme: Scheme = optional("How transitions are made.", "relaxed")
@@ -228,7 +228,7 @@ class ModelDocument(Document):
     let: Table[Expression] = mapping("Named subexpressions, each of earlier ones.", {"energy": "v**2/2"})
     modes: ModeTable[ModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
     outputs: Table[Expression] = mapping(
-        "Name: expression, recorded beside the states. Each mode reads it with its own `let`; it has no value in a "
+        "Name: expression, recorded with the states. Each mode reads it with its own `let`; it has no value in a "
         "mode that lacks one of its names.",
         {"energy": "m*g*h + m*v**2/2"},
     )
@@ -236,7 +236,7 @@ class ModelDocument(Document):
     initial: InitialDocument = required(
         "Where a run starts: `mode`, and a value for each of its states.", {"mode": "fall", "h": 10, "v": 0}
     )
-    experiment: ExperimentDocument = required("How to run the model unless told otherwise.", {"until": 12})
+    experiment: ExperimentDocument = required("How to run the model by default.", {"until": 12})
     reference: Annotated[list[ReferenceDocument], BeforeValidator(_one_or_many)] = items(
         "What is known exactly: one mapping, or a list of them.", {"trust": "1e-12", "transitions": ["1.428"]}
     )
@@ -259,5 +259,5 @@ SHAPES: dict[tuple[str, ...], type[Document]] = {
 
 
 def keys_of(*pattern: str) -> list[str]:
-    """The keys of a kind of mapping, as they stand in a file."""
+    """The keys of a kind of mapping, as they are written in a file."""
     return [field.alias or name for name, field in SHAPES[pattern].model_fields.items()]

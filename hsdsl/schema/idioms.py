@@ -48,7 +48,7 @@ def _nested_values(initial: Mapping, states: list[str], findings: Findings) -> N
         key, _ = initial.entries.pop(name)
         entries = list(value) if isinstance(value, Mapping) else _paired(states, value)
         text = ", ".join(f"{state}: {v.value if isinstance(v, Scalar) else '...'}" for state, v in entries)
-        hint = f"write the values beside `mode`: {shown(text or 'x: 0')}"
+        hint = f"write the values at the level of `mode`: {shown(text or 'x: 0')}"
         findings.add(key.place.diagnostic("HS201", f"unknown key '{name}' in `initial`", hint))
         for state, part in entries:
             initial.entries.setdefault(str(state), (state, part))
@@ -69,7 +69,7 @@ def _dotted_names(flow: Mapping, known: set[str], reset: set[str], findings: Fin
             continue
         if name in known and name not in flow.entries and name != "mode" and is_identifier(name):
             message = f"the flow says '{shown(key)}', and `initial` says '{shown(name)}'"
-            hint = f"write {shown(name)}: what stands under a state's name is its derivative"
+            hint = f"write {shown(name)}: its value is the derivative of the state"
             findings.add(key.place.diagnostic("HS205", message, hint))
             flow.rename(str(key), name)
 

@@ -56,7 +56,7 @@ def _below_empty(parent: Mapping, fields: frozenset[str], findings: Findings) ->
     for section, strays in below.items():
         inner = Mapping({}, parent.entries[section][0].place)
         parent.entries[section] = (parent.entries[section][0], inner)
-        message = f"`{shown(strays[0])}` stands beside `{section}`, and nothing stands under `{section}`"
+        message = f"`{shown(strays[0])}` is at the level of `{section}`, which is empty"
         _move(parent, strays, inner, message, f"under `{section}`", findings)
 
 
@@ -81,7 +81,7 @@ def _among_modes(modes: Mapping, findings: Findings) -> None:
             mode = Mapping({}, key.place)
             modes.entries[name] = (key, mode)
         if isinstance(mode, Mapping) and not any(key in mode.entries for key in moved):
-            message = f"`{moved[0]}` stands among the modes, as if it were one"
+            message = f"`{moved[0]}` is among the modes, as if it were one"
             _move(modes, moved, mode, message, f"in the mode '{shown(name)}'", findings)
 
 
@@ -92,14 +92,14 @@ def _behind(parent: Mapping, section: str, last: Node, fields: frozenset[str], w
     if not strays or strays != after[: len(strays)] or not isinstance(last, Mapping):
         return
     if not any(key in last.entries for key in strays):
-        _move(parent, strays, last, f"`{strays[0]}` stands beside `{section}`", where, findings)
+        _move(parent, strays, last, f"`{strays[0]}` is at the level of `{section}`", where, findings)
 
 
 def _move(
     parent: Mapping, strays: Iterable[Key], target: Mapping, message: str, where: str, findings: Findings
 ) -> None:
     first, *more = strays
-    hint = f"indent {'it' if not more else 'these lines'}, to stand {where}"
+    hint = f"indent {'it' if not more else 'these lines'}, so that {'they are' if more else 'it is'} {where}"
     findings.add(first.place.diagnostic("HS201", message, hint))
     for key in (first, *more):
         target.entries[str(key)] = parent.entries.pop(str(key))

@@ -25,7 +25,7 @@ def json_schema() -> dict[str, Any]:
     Returns
     -------
     dict
-        A draft-7 schema: shared parts stand under ``definitions``, and nothing stands beside a ``$ref``.
+        A draft-7 schema: shared parts are under ``definitions``, and a ``$ref`` has no siblings.
     """
     made = ModelDocument.model_json_schema(
         by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
@@ -48,7 +48,7 @@ def _short(name: str) -> str:
 
 
 def _draft_7(part: Any) -> Any:
-    """A part with what may be left empty allowed to be null, and siblings of ``$ref`` moved beside an ``allOf``."""
+    """A part with what may be left empty allowed to be null, and siblings of ``$ref`` moved next to an ``allOf``."""
     if isinstance(part, list):
         return [_draft_7(item) for item in part]  # pyright: ignore[reportUnknownVariableType]
     if not isinstance(part, dict):

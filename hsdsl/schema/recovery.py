@@ -74,7 +74,7 @@ def _split_equation(parent: Node | None, key: str) -> bool:
 
 
 def _after_equals(place: SourceRange, key: str, text: str) -> Scalar:
-    """The last part of a key, as a value with its place, where the key stands in the file as it is read."""
+    """The last part of a key, as a value with its place, where the file has the key in just this form."""
     first, line, column = place.start
     at = key.rfind(text)
     begin, end = first + at, first + at + len(text)

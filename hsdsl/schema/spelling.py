@@ -17,7 +17,7 @@ _OF_STATES = ("modes", "initial", "experiment", "outputs", "units", "reference",
 
 
 def correct_spelling(root: Node, findings: Findings) -> None:
-    """Rename states that stand nowhere but in one flow, where the rest of the model has another name for them."""
+    """Rename states that occur in one flow alone, where the rest of the model has another name for them."""
     modes = child(root, "modes")
     if not isinstance(root, Mapping) or not isinstance(modes, Mapping):
         return

@@ -38,7 +38,7 @@ for _key, _others in _OF_OTHERS.items():
 _NOT_NEEDED = {
     "states": "the states are the keys of `flow`, and `initial` gives their values",
     "variables": "the states are the keys of `flow`, and `initial` gives their values",
-    "from": "leave it out: a transition stands in the mode that it leaves",
+    "from": "leave it out: a transition is in the mode that it leaves",
     "<<": "mappings are not merged in YAML 1.2",
     "terminal": "leave it out, and let `to` name a mode with final: true",
 }
@@ -90,9 +90,9 @@ def unknown_key_hint(key: str, meant: str | None, fields: Iterable[str], value: 
     if key in _NOT_NEEDED:
         return _NOT_NEEDED[key]
     if _is_a_mode(value):
-        return f"a mode stands under `modes`: indent '{key}' like the others"
+        return f"a mode belongs under `modes`: indent '{key}' like the others"
     where = dict(_HOMES).get(_home(key) or ("none",))
-    return f"`{key}` stands {where}" if where else "keys here: " + ", ".join(fields)
+    return f"`{key}` belongs {where}" if where else "keys here: " + ", ".join(fields)
 
 
 def _home(key: str) -> tuple[str, ...] | None:

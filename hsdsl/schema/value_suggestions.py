@@ -42,7 +42,7 @@ def as_name(key: str) -> str:
     if state and _SECOND.fullmatch(key):
         return f"write two states: {state}: d{state}, and d{state}: with the second derivative"
     if state:
-        return f"write {state}: what stands under a state's name is its derivative"
+        return f"write {state}: its value is the derivative of the state"
     if ":" in key:
         return "write a space after the colon"
     words = re.sub(r"[-. ]", "_", key)
@@ -56,9 +56,9 @@ def _entry(name: str, value: str) -> str:
 def as_mapping(value: Any) -> str:
     """The hint for what should have been names with values."""
     match value:
-        case Scalar(value=text) if found := assigned(text):
-            name, said = found
-            return _entry(name, said) if _on_its_own_line(value) else f"write {{{name}: {shown(said)}}}"
+        case Scalar(value=text) if equation := assigned(text):
+            name, text = equation
+            return _entry(name, text) if _on_its_own_line(value) else f"write {{{name}: {shown(text)}}}"
         case Scalar(value=text) if ":" in text:
             return "a key is followed by a colon and a space"
         case [{"name": Scalar(value=name)}, *_]:
@@ -103,28 +103,28 @@ def in_brackets(value: Any) -> str | None:
 
 def _intervals(entries: dict[str, Any]) -> str | None:
     """``{x: [0, 1]}`` as inequalities."""
-    said: list[str] = []
+    texts: list[str] = []
     for name, bounds in entries.items():
         match bounds:
             case [Scalar(value=low), Scalar(value=high)]:
-                said.append(f"{shown(name)} >= {shown(low)}, {shown(name)} <= {shown(high)}")
+                texts.append(f"{shown(name)} >= {shown(low)}, {shown(name)} <= {shown(high)}")
             case _:
                 return None
-    return ", ".join(said)
+    return ", ".join(texts)
 
 
 def _braces(items: list[Any]) -> str | None:
     """The items of a list in brackets, each ``v: 1`` or ``v = 1``, as one mapping in braces."""
-    said: list[str] = []
+    texts: list[str] = []
     for item in items:
         match item:
             case {**entries} if all(isinstance(inner, Scalar) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
-                said += [f"{key}: {inner.value}" for key, inner in cast(dict[str, Scalar], entries).items()]
+                texts += [f"{key}: {inner.value}" for key, inner in cast(dict[str, Scalar], entries).items()]
             case Scalar(value=text) if found := assigned(text):
-                said.append(": ".join(found))
+                texts.append(": ".join(found))
             case _:
                 return None
-    return f"write {{{shown(', '.join(said))}}}"
+    return f"write {{{shown(', '.join(texts))}}}"
 
 
 def _on_its_own_line(scalar: Scalar) -> bool:
@@ -132,7 +132,7 @@ def _on_its_own_line(scalar: Scalar) -> bool:
 
 
 def _after_a_dash(item: Any) -> bool:
-    """Whether an item of a list stands behind a dash, and not in brackets."""
+    """Whether an item of a list follows a dash, and is not in brackets."""
     first = next(iter(cast(dict[Any, Any], item)), None) if isinstance(item, dict) else item
     return not isinstance(first, (Scalar, Key)) or _before(first).rstrip().endswith("-")
 

@@ -102,7 +102,7 @@ class _Composer:
             return absent(self._place(event))
         hidden = INVISIBLE.search(event.value)
         if hidden:
-            message = f"the escape here stands for the invisible character U+{ord(hidden.group()):04X}"
+            message = f"this escape is the invisible character U+{ord(hidden.group()):04X}"
             self.findings.add(self._place(event).diagnostic("HS002", message, "remove it"))
             return Scalar(INVISIBLE.sub("", event.value), False, self._place(event))
         return Scalar(event.value, event.style is None or event.style == "", self._place(event))
@@ -155,13 +155,13 @@ class _Composer:
         name = event.anchor
         place = self._place(event)
         if name not in self.anchors:
-            message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` stands before it"
+            message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` is before it"
             _, line, column = place.start
             self._stop(place.diagnostic("HS007", message, quote(self.text.lines[line], column)))
         node, nodes, height = self.anchors[name]
         self.unused.pop(name, None)
         if node is None:
-            self._stop(place.diagnostic("HS012", f"`*{name}` stands inside the value that it repeats"))
+            self._stop(place.diagnostic("HS012", f"`*{name}` is inside the value that it repeats"))
             raise AssertionError
         self._grow(event, nodes, height)
         return node, nodes, height

@@ -24,7 +24,7 @@ _NUMBER = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class SourceRange:
-    """Where a node stands in its text: 0-based index, line and column of its first character and behind its last."""
+    """The range of a node in its text: 0-based index, line and column of its first character and behind its last."""
 
     text: Text = field(repr=False)
     start: tuple[int, int, int]

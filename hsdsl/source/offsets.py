@@ -1,4 +1,4 @@
-"""Where each character of a YAML scalar's value stands in the text it was read from."""
+"""Offsets of the characters of a YAML scalar's value in the text that it was read from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _ESCAPE_LENGTHS = {"x": 2, "u": 4, "U": 8}
 def positions(raw: str, length: int, value: str) -> list[int]:
     """The offset in ``raw`` of each character of ``value``, and of the end of the value.
 
-    Exact for scalars on one line. In those that YAML folds, blanks stand at the character before them.
+    Exact for scalars on one line. In those that YAML folds, a blank has the place of the character before it.
     """
     if raw == value:
         return list(range(length + 1))

@@ -1,6 +1,6 @@
 """What YAML cuts apart: in ``{v: min(v, 0)}`` the comma ends the value, and ``0)`` becomes a key without a value.
 
-The pieces are put together again, so that the rest of the model is still read, and the quotes are asked for.
+The pieces are put together again, so that the rest of the model is still read, and a hint names the quotes.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _one(run: list[Scalar] | list[Node], findings: Findings) -> Node:
 
 
 def _joined(run: list[Scalar] | list[Node]) -> Node:
-    """The pieces as one, with what stands between them."""
+    """The pieces as one, with the text between them."""
     first, last = run[0], run[-1]
     if first is last:
         return first

@@ -117,7 +117,7 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
         return _indentation(text, line, column)
     if "mapping values" in problem:
         if _KEY_AND_VALUE.match(before):
-            message = "a colon followed by a space cannot stand inside a value"
+            message = "a value cannot contain a colon followed by a space"
             return text.fault("HS007", message, line, column, _two_colons(content, column))
         return _without_colon(text, line) or _indentation(text, line, _indent(content) + 1)
     return _misread(text, line, column)
@@ -167,7 +167,7 @@ def _indentation(text: Text, line: int, column: int) -> Diagnostic:
         hint = f"write - {shown(dash.group(2))}"
         return text.fault("HS004", message, line - 1, len(dash.group(1)) + 1, hint, _WHOLE_LINE)
     item = content.lstrip().startswith("- ")
-    message = "a list item cannot stand here" if item else "the indentation of this line fits no line above it"
+    message = "a list item is not possible here" if item else "the indentation of this line fits no line above it"
     hint = "entries of one mapping or list begin in the same column; a key that has a value has no lines under it"
     return text.fault("HS006", message, line, column, hint, _WHOLE_LINE)
 
