@@ -24,10 +24,7 @@ _NOT_FINITE = (".inf", "+.inf", "-.inf", ".nan", "inf", "+inf", "-inf", "infinit
 def resolved_expression(text: str, scope: Scope) -> Value:
     """The value of an expression that is in no file.
 
-    Raises
-    ------
-    ExpressionError
-        At its first fault.
+    Raises ExpressionError: at its first fault.
     """
     tree = _tree(text, "number", scope)
     faults = scope.faults(tree)

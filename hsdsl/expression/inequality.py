@@ -23,10 +23,7 @@ class Inequality:
 def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
     """The two sides of an inequality whose names the scope has.
 
-    Raises
-    ------
-    ExpressionError
-        As `symbolic.number`, and where there is no inequality or more than one.
+    Raises ExpressionError: as `symbolic.number`, and where there is no inequality or more than one.
     """
     comparison = the_comparison(tree, key, text)
     left, right = (symbolic.number(side, scope, text) for side in comparison.operands)
@@ -36,25 +33,22 @@ def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
 def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
     """The tree, if it is exactly one inequality.
 
-    Raises
-    ------
-    ExpressionError
-        Otherwise, with what to write under ``key``.
+    Raises ExpressionError: otherwise, with what to write under ``key``.
     """
     if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
         message = f"`{key}` takes one inequality"
-        raise ExpressionError("HS116", message, tree.start, tree.end, _apart(tree, key, text))
+        raise ExpressionError.at(tree, "HS116", message, _apart(tree, key, text))
     if not isinstance(tree, Comparison):
         message = f"`{key}` takes an inequality, and this is not one"
         hint = "write it as left >= right" + ("" if isinstance(tree, Truth) else f": {_said(tree, text)} >= 0")
-        raise ExpressionError("HS116", message, tree.start, tree.end, hint)
+        raise ExpressionError.at(tree, "HS116", message, hint)
     operator = tree.operators[0]
     if operator in ("==", "!="):
         message = f"`{key}` takes an inequality, not `{operator}`"
         left, right = (_said(side, text) for side in tree.operands)
         hint = f"write {left} >= {right} or {left} <= {right}, whichever is true where the mode "
         hint += "ends" if key == "when" else "may be"
-        raise ExpressionError("HS107", message, tree.start, tree.end, hint)
+        raise ExpressionError.at(tree, "HS107", message, hint)
     return tree
 
 

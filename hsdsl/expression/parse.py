@@ -6,24 +6,10 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Literal
 
+from hsdsl.expression import syntax
 from hsdsl.expression.expression_hints import CASES, compared, power_of, side_by_side, timed
 from hsdsl.expression.stack import deep_stack
-from hsdsl.expression.syntax import (
-    Call,
-    Comparison,
-    Expected,
-    ExpressionError,
-    Logic,
-    Name,
-    Negative,
-    Not,
-    Number,
-    Power,
-    Product,
-    Sum,
-    Tree,
-    Truth,
-)
+from hsdsl.expression.syntax import Expected, ExpressionError, Tree
 from hsdsl.expression.tokens import Token, tokenize
 from hsdsl.functions import FUNCTIONS
 from hsdsl.names import shown
@@ -46,10 +32,7 @@ def parse(text: str, expected: Expected = "number") -> Tree:
     expected : {"number", "condition", "inequality"}
         What the expression is for; it words the hints.
 
-    Raises
-    ------
-    ExpressionError
-        At the first fault.
+    Raises ExpressionError: at the first fault.
     """
     tokens = tokenize(text, expected)
     if tokens[0].kind == "end":
@@ -91,7 +74,7 @@ class _Parser:
             self.at += 1
             with self.deeper():
                 exponent = self.expression(_POWER)
-            return Power(left, exponent, begin, self.tokens[self.at - 1].end)
+            return syntax.Power(left, exponent, begin, self.tokens[self.at - 1].end)
         operators: list[str] = []
         operands = [left]
         while _BINDING.get(self.tokens[self.at].text, 0) == binding:
@@ -106,12 +89,12 @@ class _Parser:
         if first.text in ("-", "+"):
             negative = self.skipped(("-", "+")).count("-") % 2 == 1
             operand = self.expression(_POWER)
-            return Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
+            return syntax.Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
         if first.text == "not":
             denied = len(self.skipped(("not",))) % 2 == 1
             operand = self.expression(_COMPARE)
-            inner = Not(operand, first.start, self.tokens[self.at - 1].end)
-            return inner if denied else Not(inner, inner.start, inner.end)
+            inner = syntax.Not(operand, first.start, self.tokens[self.at - 1].end)
+            return inner if denied else syntax.Not(inner, inner.start, inner.end)
         return self.operand()
 
     def skipped(self, texts: tuple[str, ...]) -> list[str]:
@@ -126,13 +109,15 @@ class _Parser:
         token = self.tokens[self.at]
         if token.kind == "number":
             self.at += 1
-            return Number(token.value, token.start, token.end)
+            return syntax.Number(token.value, token.start, token.end)
         if token.kind == "name" and token.text in ("true", "false"):
             self.at += 1
-            return Truth(token.text == "true", token.start, token.end)
+            return syntax.Truth(token.text == "true", token.start, token.end)
         if token.kind == "name" and token.text not in ("and", "or"):
             self.at += 1
-            return self.call(token) if self.tokens[self.at].text == "(" else Name(token.text, token.start, token.end)
+            if self.tokens[self.at].text == "(":
+                return self.call(token)
+            return syntax.Name(token.text, token.start, token.end)
         if token.text == "(":
             self.at += 1
             with self.deeper():
@@ -153,7 +138,7 @@ class _Parser:
                     break
                 self.at += 1
         end = self.close(opened)
-        return Call(function.text, tuple(arguments), function.start, end)
+        return syntax.Call(function.text, tuple(arguments), function.start, end)
 
     def close(self, opened: Token) -> int:
         """Take the closing parenthesis of ``opened``."""
@@ -162,7 +147,7 @@ class _Parser:
             self.at += 1
             return token.end
         if token.kind == "end":
-            raise ExpressionError("HS103", "this parenthesis is never closed", opened.start, opened.end, "add `)`")
+            raise ExpressionError.at(opened, "HS103", "this parenthesis is never closed", "add `)`")
         raise self.unexpected(token)
 
     @contextmanager
@@ -172,7 +157,7 @@ class _Parser:
         if self.depth > DEEPEST:
             token = self.tokens[self.at - 1]
             message = f"the expression is nested more than {DEEPEST} deep"
-            raise ExpressionError("HS123", message, token.start, token.end, "name its parts under `let`")
+            raise ExpressionError.at(token, "HS123", message, "name its parts under `let`")
         yield
         self.depth -= 1
 
@@ -181,21 +166,21 @@ class _Parser:
         before = self.tokens[self.at - 1] if self.at else None
         if before is None:
             if token.text == ")":
-                return ExpressionError("HS103", "this parenthesis closes nothing", token.start, token.end, "remove it")
-            return ExpressionError("HS102", f"an operand is missing before `{token.text}`", token.start, token.end)
+                return ExpressionError.at(token, "HS103", "this parenthesis closes nothing", "remove it")
+            return ExpressionError.at(token, "HS102", f"an operand is missing before `{token.text}`")
         if before.text == "(" and token.text == ")":
             return ExpressionError("HS102", "there is nothing between the parentheses", before.start, token.end)
         hint = "write `**` for a power" if before.text == "**" and token.text == "*" else None
         if before.text == "/" and token.text == "/":
             hint = "write floor(x/y) for a whole quotient, and `#` before a comment"
         hint = hint or f"write what follows `{before.text}`, or remove it"
-        return ExpressionError("HS102", f"an operand is missing after `{before.text}`", before.start, before.end, hint)
+        return ExpressionError.at(before, "HS102", f"an operand is missing after `{before.text}`", hint)
 
     def unexpected(self, token: Token) -> ExpressionError:
         """Something after an operand that is no operator."""
         before = self.tokens[self.at - 1]
         if token.text == ")":
-            return ExpressionError("HS103", "this parenthesis closes nothing", token.start, token.end, "remove it")
+            return ExpressionError.at(token, "HS103", "this parenthesis closes nothing", "remove it")
         if token.text == ",":
             after = self.tokens[self.at + 1]
             decimal = before.kind == after.kind == "number"
@@ -203,9 +188,7 @@ class _Parser:
             hint = _decimal(before.text, after.text) if decimal else hint
             if self.expected == "inequality" and not self.depth:
                 hint = "write one inequality here: the rest of a `when` under `if`, of a `domain` as further items"
-            return ExpressionError(
-                "HS102", "a comma separates only arguments of a function", token.start, token.end, hint
-            )
+            return ExpressionError.at(token, "HS102", "a comma separates only arguments of a function", hint)
         return self.no_operator(before, token)
 
     def no_operator(self, before: Token, token: Token) -> ExpressionError:
@@ -214,11 +197,11 @@ class _Parser:
         if token.text in _FOREIGN_WORDS or before.text in _FOREIGN_WORDS:
             word = token if token.text in _FOREIGN_WORDS else before
             hint = f"write `{word.text.lower()}`" if word.text.isupper() else CASES
-            return ExpressionError("HS109", f"`{word.text}` is not a word of the language", word.start, word.end, hint)
+            return ExpressionError.at(word, "HS109", f"`{word.text}` is not a word of the language", hint)
         if before.text in FUNCTIONS:
             message = f"`{before.text}` is a function and needs parentheses"
             hint = f"write {before.text}({right})"
-            return ExpressionError("HS112", message, before.start, before.end, hint)
+            return ExpressionError.at(before, "HS112", message, hint)
         if token.text == "(" and self.power_of_function():
             message = f"`{self.tokens[self.at - 3].text}` is a function and needs parentheses"
             hint = power_of(self.tokens[self.at - 3].text)
@@ -252,9 +235,9 @@ def _decimal(left: str, right: str) -> str:
 def _chain(binding: int, operators: list[str], operands: list[Tree], start: int, end: int) -> Tree:
     if binding in (_OR, _AND):
         word: Literal["and", "or"] = "or" if binding == _OR else "and"
-        return Logic(word, tuple(operands), start, end)
+        return syntax.Logic(word, tuple(operands), start, end)
     if binding == _COMPARE:
-        return Comparison(tuple(operands), tuple(operators), start, end)
+        return syntax.Comparison(tuple(operands), tuple(operators), start, end)
     inverted = [False, *(operator in ("-", "/") for operator in operators)]
     pairs = tuple(zip(inverted, operands, strict=True))
-    return Sum(pairs, start, end) if binding == _ADD else Product(pairs, start, end)
+    return syntax.Sum(pairs, start, end) if binding == _ADD else syntax.Product(pairs, start, end)

@@ -101,13 +101,13 @@ class Scope:
             return None
         if node.name in FUNCTIONS:
             message = f"`{node.name}` is a function and needs its arguments"
-            return ExpressionError("HS112", message, node.start, node.end, f"write {node.name}(...)")
+            return ExpressionError.at(node, "HS112", message, f"write {node.name}(...)")
         if node.name not in self.values:
             message = f"nothing here is called '{shown(node.name)}'"
-            return ExpressionError("HS111", message, node.start, node.end, self._hint(node.name))
+            return ExpressionError.at(node, "HS111", message, self._hint(node.name))
         value = self.values[node.name]
         if isinstance(value, Refusal):
-            return ExpressionError(value.code, value.message, node.start, node.end, value.hint)
+            return ExpressionError.at(node, value.code, value.message, value.hint)
         if value is None or self.states is None or value.uses <= self.states:
             return None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
@@ -116,7 +116,7 @@ class Scope:
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
             hint = did_you_mean(node.name, sorted(self.states))
-        return ExpressionError("HS117", message, node.start, node.end, hint)
+        return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:
         if node.function not in FUNCTIONS:
@@ -142,7 +142,7 @@ class Scope:
         noun = "argument" if fewest == 1 else "arguments"
         message = f"`{node.function}` takes {number} {noun}, not {given}"
         arguments = "x" if most == fewest == 1 else "x, y"
-        return ExpressionError("HS113", message, node.start, node.end, f"write {node.function}({arguments})")
+        return ExpressionError.at(node, "HS113", message, f"write {node.function}({arguments})")
 
     def _hint(self, name: str) -> str | None:
         known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]

@@ -8,26 +8,10 @@ from typing import Any
 import sympy as sp
 
 from hsdsl import functions
-from hsdsl.expression import bounds, numeric
+from hsdsl.expression import bounds, numeric, syntax
 from hsdsl.expression.expression_hints import CASES
 from hsdsl.expression.scope import Scope, Value
-from hsdsl.expression.syntax import (
-    CONDITIONS,
-    Call,
-    Comparison,
-    ExpressionError,
-    Logic,
-    Name,
-    Negative,
-    Not,
-    Number,
-    Power,
-    Product,
-    Sum,
-    Tree,
-    Truth,
-    children,
-)
+from hsdsl.expression.syntax import CONDITIONS, ExpressionError, Tree, children
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import shown
 
@@ -52,10 +36,8 @@ _FOREIGN: dict[Any, Any] = {
 def number(tree: Tree, scope: Scope, text: str) -> Value:
     """The value of an expression whose names the scope has.
 
-    Raises
-    ------
-    ExpressionError
-        A condition in place of a number, a constant without a finite real value, or an expression that is too large.
+    Raises ExpressionError: a condition in place of a number, a constant without a finite real value, or an expression
+    that is too large.
     """
     builder = _Builder(scope, text)
     builder.refuse_deep(tree)
@@ -79,7 +61,7 @@ class _Builder:
         waiting = [(tree, 0)]
         while waiting:
             node, depth = waiting.pop()
-            depth += isinstance(node, (Call, Power))
+            depth += isinstance(node, (syntax.Call, syntax.Power))
             if depth > bounds.MOST_LEVELS:
                 raise self.too_deep(tree)
             waiting.extend((child, depth) for child in children(node))
@@ -87,28 +69,30 @@ class _Builder:
     def number(self, tree: Tree) -> Value:
         """The value of a node that must be a number."""
         if isinstance(tree, CONDITIONS):
-            hint = f"write {int(tree.value)}" if isinstance(tree, Truth) else CASES
-            raise self.error("HS114", tree, f"expected a number, got the condition `{self.text_of(tree)}`", hint)
+            hint = f"write {int(tree.value)}" if isinstance(tree, syntax.Truth) else CASES
+            raise ExpressionError.at(
+                tree, "HS114", f"expected a number, got the condition `{self.text_of(tree)}`", hint
+            )
         match tree:
-            case Number():
+            case syntax.Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
                 return Value(expr, numeric.of_rational(expr), True, bits=bounds.bits(expr))
-            case Name():
+            case syntax.Name():
                 return self.name(tree)
-            case Negative():
+            case syntax.Negative():
                 inner = self.number(tree.operand)
                 return self.value(tree, -inner.expr, numeric.product([inner.number, -1]), [inner])
-            case Sum():
+            case syntax.Sum():
                 return self.sum(tree)
-            case Product():
+            case syntax.Product():
                 return self.product(tree)
-            case Power():
+            case syntax.Power():
                 return self.power(tree)
-            case Call():
+            case syntax.Call():
                 return self.call(tree)
         raise AssertionError(tree)
 
-    def name(self, tree: Name) -> Value:
+    def name(self, tree: syntax.Name) -> Value:
         """A constant, or what the scope has."""
         if tree.name in CONSTANTS:
             return Value(CONSTANTS[tree.name], numeric.PI, True)
@@ -116,7 +100,7 @@ class _Builder:
         assert isinstance(found, Value)
         return found
 
-    def sum(self, tree: Sum) -> Value:
+    def sum(self, tree: syntax.Sum) -> Value:
         """Terms added; the common denominator is measured first."""
         values = [self.number(term) for _, term in tree.terms]
         terms = [-v.expr if minus else v.expr for v, (minus, _) in zip(values, tree.terms, strict=True)]
@@ -126,14 +110,14 @@ class _Builder:
         numbers = [v.number if v.number is None or not minus else -v.number for v, (minus, _) in signed]
         return self.value(tree, self.made(tree, sp.Add, *terms), numeric.total(numbers), values)
 
-    def product(self, tree: Product) -> Value:
+    def product(self, tree: syntax.Product) -> Value:
         """Factors multiplied; the length of their exact numbers is measured first."""
         values = [self.number(factor) for _, factor in tree.factors]
         for value, (divided, factor) in zip(values, tree.factors, strict=True):
             if divided and value.expr.is_zero and value.expr.is_number:
                 text = self.text_of(factor)
                 message = "nothing can be divided by 0" + (f", and `{text}` is 0" if text != "0" else "")
-                raise self.error("HS118", factor, message)
+                raise ExpressionError.at(factor, "HS118", message)
         divided = [d for d, _ in tree.factors]
         numbers = [numeric.inverse(v.number) if d else v.number for v, d in zip(values, divided, strict=True)]
         number = numeric.product(numbers)
@@ -144,13 +128,13 @@ class _Builder:
         factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
         return self.value(tree, self.made(tree, sp.Mul, *factors), number, values)
 
-    def power(self, tree: Power) -> Value:
+    def power(self, tree: syntax.Power) -> Value:
         """A power; what it would make SymPy compute is measured first."""
         base, exponent = self.number(tree.base), self.number(tree.exponent)
         if bounds.large_exponent(exponent.expr):
             text = self.text_of(tree.exponent)
             message = f"the exponent `{text}` is above {bounds.LARGEST_EXPONENT:,} in magnitude"
-            raise self.error("HS119", tree.exponent, message)
+            raise ExpressionError.at(tree.exponent, "HS119", message)
         number = numeric.power(base.number, exponent.number)
         if base.constant and exponent.constant:
             self.refuse_unless_finite(tree, number)
@@ -158,7 +142,7 @@ class _Builder:
             raise self.too_long(tree)
         return self.value(tree, self.made(tree, functions.power, base.expr, exponent.expr), number, [base, exponent])
 
-    def call(self, tree: Call) -> Value:
+    def call(self, tree: syntax.Call) -> Value:
         """A function of the language. min and max of many are taken in pairs."""
         values = [self.number(argument) for argument in tree.arguments]
         number = numeric.apply(tree.function, [v.number for v in values])
@@ -167,7 +151,7 @@ class _Builder:
         exprs = [v.expr for v in values]
         if tree.function == "exp" and bounds.large_exponent(exprs[0]):
             sentence = f"is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
-            raise self.error("HS119", tree, f"`{self.text_of(tree)}` {sentence}")
+            raise ExpressionError.at(tree, "HS119", f"`{self.text_of(tree)}` {sentence}")
         function: Any = FUNCTIONS[tree.function][0]
         pairwise = tree.function in ("min", "max")
         expr = self.made(tree, _pairwise, function, exprs) if pairwise else self.made(tree, function, *exprs)
@@ -179,7 +163,7 @@ class _Builder:
             return function(*arguments)
         except (TypeError, AttributeError, ValueError, NotImplementedError, ArithmeticError, RecursionError):
             message = f"`{self.text_of(tree)}` cannot be worked out exactly"
-            raise self.error("HS120", tree, message, _DECIMAL) from None
+            raise ExpressionError.at(tree, "HS120", message, _DECIMAL) from None
 
     def value(self, tree: Tree, expr: Any, number: Any, parts: list[Value]) -> Value:
         """A value made of parts, checked."""
@@ -197,14 +181,14 @@ class _Builder:
         size, depth = 1 + sum(p.size for p in parts), _levels(tree, expr, parts)
         if size > bounds.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
-            raise self.error("HS120", tree, message, _SIMPLIFY)
+            raise ExpressionError.at(tree, "HS120", message, _SIMPLIFY)
         if constant and not expr.is_Rational:
             self.refuse_large_constant(tree, size, depth)
         within = _bits_within(tree, parts)
-        most = bounds.MOST_BITS_WITHIN_A_POWER if isinstance(tree, Power) else bounds.MOST_BITS_WITHIN
+        most = bounds.MOST_BITS_WITHIN_A_POWER if isinstance(tree, syntax.Power) else bounds.MOST_BITS_WITHIN
         if within > most:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
-            raise self.error("HS120", tree, message, _SIMPLIFY)
+            raise ExpressionError.at(tree, "HS120", message, _SIMPLIFY)
         if depth > bounds.MOST_LEVELS:
             raise self.too_deep(tree)
         return Value(expr, number, constant, uses, size, depth, within)
@@ -217,49 +201,45 @@ class _Builder:
         elif depth > bounds.MOST_LEVELS_OF_A_CONSTANT:
             sentence = f"is a constant whose functions are nested more than {bounds.MOST_LEVELS_OF_A_CONSTANT} deep"
         if sentence:
-            raise self.error("HS120", tree, f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
+            raise ExpressionError.at(tree, "HS120", f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
         if number is not None and not numeric.finite(number):
             raise self.not_finite(tree)
 
-    def error(self, code: str, tree: Tree, message: str, hint: str | None = None) -> ExpressionError:
-        """An error at a node."""
-        return ExpressionError(code, message, tree.start, tree.end, hint)
-
     def too_deep(self, tree: Tree) -> ExpressionError:
         """The error for a nest that SymPy would need too long for."""
         message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
-        return self.error("HS120", tree, message, "this counts what is written under `let`")
+        return ExpressionError.at(tree, "HS120", message, "this counts what is written under `let`")
 
     def not_finite(self, tree: Tree) -> ExpressionError:
         """The error for something like 1/0 or sqrt(-1)."""
-        return self.error("HS118", tree, f"`{self.text_of(tree)}` has no finite real value")
+        return ExpressionError.at(tree, "HS118", f"`{self.text_of(tree)}` has no finite real value")
 
     def too_long(self, tree: Tree) -> ExpressionError:
         """The error for an exact number that would fill the memory."""
         message = f"`{self.text_of(tree)}` contains an exact number of more than {bounds.MOST_BITS:,} bits"
-        return self.error("HS120", tree, message, "write it as a decimal")
+        return ExpressionError.at(tree, "HS120", message, "write it as a decimal")
 
     def condition(self, tree: Tree) -> Any:
         """The Boolean of a node that must be a condition."""
         match tree:
-            case Truth():
+            case syntax.Truth():
                 return sp.true if tree.value else sp.false
-            case Not():
+            case syntax.Not():
                 return sp.Not(self.condition(tree.operand))
-            case Logic():
+            case syntax.Logic():
                 parts = [self.condition(operand) for operand in tree.operands]
                 return sp.And(*parts) if tree.operator == "and" else sp.Or(*parts)
-            case Comparison():
+            case syntax.Comparison():
                 values = [self.number(operand).expr for operand in tree.operands]
                 pairs = zip(tree.operators, values, values[1:], strict=False)
                 return sp.And(*(_RELATIONS[operator](a, b, evaluate=False) for operator, a, b in pairs))
         hint = f"compare it with something: {self.text_of(tree)} > 0"
-        if isinstance(tree, Number) and tree.value in (0, 1):
+        if isinstance(tree, syntax.Number) and tree.value in (0, 1):
             hint = f"write {'true' if tree.value else 'false'}"
-        raise self.error("HS115", tree, f"expected a condition, got the number `{self.text_of(tree)}`", hint)
+        raise ExpressionError.at(tree, "HS115", f"expected a condition, got the number `{self.text_of(tree)}`", hint)
 
     def text_of(self, tree: Tree) -> str:
         """The text of a node, cut for a sentence."""
@@ -276,17 +256,17 @@ def _pairwise(function: Any, exprs: list[Any]) -> Any:
 
 def _levels(tree: Tree, expr: Any, parts: list[Value]) -> int:
     """How deep the parentheses are nested when a node is written out."""
-    if isinstance(tree, (Call, Power)):
+    if isinstance(tree, (syntax.Call, syntax.Power)):
         return 1 + max(part.depth for part in parts)
-    if isinstance(tree, Product) and not expr.is_Add:
+    if isinstance(tree, syntax.Product) and not expr.is_Add:
         return max(part.depth + part.expr.is_Add for part in parts)
     return max(part.depth for part in parts)
 
 
 def _bits_within(tree: Tree, parts: list[Value]) -> int:
-    if isinstance(tree, Call) and tree.function != "sqrt":
+    if isinstance(tree, syntax.Call) and tree.function != "sqrt":
         return 0
-    if isinstance(tree, Power):
+    if isinstance(tree, syntax.Power):
         exponent = parts[1].expr
         return parts[0].bits * max(1, abs(int(exponent))) if exponent.is_Rational else 0
     return sum(part.bits for part in parts)

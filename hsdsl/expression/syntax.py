@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Protocol
 
 Expected = Literal["number", "condition", "inequality"]
+
+
+class Ranged(Protocol):
+    """A token or a node: it has a range of characters."""
+
+    @property
+    def start(self) -> int: ...
+    @property
+    def end(self) -> int: ...
 
 
 class ExpressionError(Exception):
@@ -20,6 +29,11 @@ class ExpressionError(Exception):
         self.start = start
         self.end = end
         self.hint = hint
+
+    @classmethod
+    def at(cls, node: Ranged, code: str, message: str, hint: str | None = None) -> ExpressionError:
+        """A fault at a token or a node."""
+        return cls(code, message, node.start, node.end, hint)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,10 +35,7 @@ class Box:
     def restart(self) -> None:
         """Begin the next part.
 
-        Raises
-        ------
-        OutOfTime
-            The time for the whole is spent.
+        Raises OutOfTime: the time for the whole is spent.
         """
         now = time.process_time()
         if now >= self._end:
@@ -61,10 +58,7 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
     parts : int
         Between two calls of ``restart`` there is time for one of so many parts.
 
-    Raises
-    ------
-    OutOfTime
-        In the block, once the time is spent.
+    Raises OutOfTime: in the block, once the time is spent.
     """
     box = Box(seconds, parts)
     done, sent = threading.Event(), threading.Event()

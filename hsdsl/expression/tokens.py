@@ -33,10 +33,7 @@ class Token:
 def tokenize(text: str, expected: Expected) -> list[Token]:
     """The tokens of an expression, the last one being the end.
 
-    Raises
-    ------
-    ExpressionError
-        At the first character that begins none.
+    Raises ExpressionError: at the first character that begins none.
     """
     if len(text) > LONGEST:
         message = f"the expression has {len(text):,} characters; the most is {LONGEST:,}"

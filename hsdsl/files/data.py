@@ -41,10 +41,7 @@ class ModelFiles:
     def read(cls, path: str | os.PathLike[str], limits_: Limits | None = None, text: bytes | None = None) -> ModelFiles:
         """Read a model file, unless its bytes are given.
 
-        Raises
-        ------
-        UsageError
-            It cannot be read.
+        Raises UsageError: it cannot be read.
         """
         with applied(limits_):
             return cls(os.fspath(path), read_bytes(path) if text is None else text, limits.current())

@@ -26,10 +26,7 @@ _MOST_ENTRIES = 1000  # of a folder, looked through for a hint
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a model, as many as it may have and one more; `-` is standard input.
 
-    Raises
-    ------
-    UsageError
-        When there is nothing to read, or something without an end.
+    Raises UsageError: when there is nothing to read, or something without an end.
     """
     most = limits.current().bytes + 1
     try:
@@ -53,10 +50,7 @@ def _is_text(path: str | os.PathLike[str]) -> bool:
 def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
     """Open a regular file to read; anything else is refused before it could keep us waiting.
 
-    Raises
-    ------
-    OSError
-        It cannot be opened, or is none.
+    Raises OSError: it cannot be opened, or is none.
     """
     refusal = OSError(errno.EINVAL, "this is not a regular file")
     mode = os.stat(path).st_mode

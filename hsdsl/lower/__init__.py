@@ -42,10 +42,7 @@ class Names:
 def lower(system: HybridSystem) -> lowered.Program:
     """Lower a system; the result needs no SymPy to run.
 
-    Raises
-    ------
-    ModelError
-        The symbolic work takes longer than the limits allow.
+    Raises ModelError: the symbolic work takes longer than the limits allow.
     """
     try:
         with deep_stack(), timebox(limits.current().seconds):

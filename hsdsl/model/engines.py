@@ -50,10 +50,7 @@ def choose(
 ) -> CompiledModel | None:
     """The compiled model that a run is for, None where the Python loop is to run it.
 
-    Raises
-    ------
-    UsageError
-        ``c`` is given and cannot serve.
+    Raises UsageError: ``c`` is given and cannot serve.
     """
     if engine == "python":
         return None

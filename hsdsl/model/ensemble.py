@@ -46,11 +46,8 @@ class EnsembleRequest:
     def of(call: dict[str, Any], samples: Any, transition_times: int) -> EnsembleRequest:
         """Sort the arguments.
 
-        Raises
-        ------
-        UsageError
-            An argument that a run does not take, a value that is no number, no expression and no array of numbers,
-            arrays without a common shape, or samples that are neither a number of them nor times.
+        Raises UsageError: an argument that a run does not take, a value that is no number, no expression and no array
+        of numbers, arrays without a common shape, or samples that are neither a number of them nor times.
         """
         check_arguments(call, "an ensemble", without=("samples", "precision"))
         whole(transition_times, "transition_times", least=0)
@@ -230,10 +227,7 @@ class PreparedEnsemble:
 def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
     """Compute the numbers of every instance.
 
-    Raises
-    ------
-    UsageError
-        None of them can be run.
+    Raises UsageError: none of them can be run.
     """
     pipeline, call = model.pipeline, request.call
     values = pipeline.values(FLOAT64)

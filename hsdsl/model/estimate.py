@@ -64,10 +64,7 @@ class Estimate:
 def estimate(run: Execution) -> Estimate:
     """Compare a run with the same run made finer.
 
-    Raises
-    ------
-    UsageError
-        The run was read from a file, so that it cannot be run again.
+    Raises UsageError: the run was read from a file, so that it cannot be run again.
     """
     finer = run.finer
     if finer is None:

@@ -23,10 +23,7 @@ HINT = "use scheme 'relaxed'"
 def one_stop(values: Values, x: tuple[Number, ...]) -> OneStop:
     """Recognise x' = v, v' = f(t) - 2 a v - k x with one stop on x and v -> -c v there; a run starts from ``x``.
 
-    Raises
-    ------
-    UsageError
-        The model is not of that form, or starts beyond its stop; the message says why.
+    Raises UsageError: the model is not of that form, or starts beyond its stop; the message says why.
     """
     with deep_stack():
         position, expressions = _structure(values.system)

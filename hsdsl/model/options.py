@@ -72,10 +72,7 @@ def overrides_of(arguments: Mapping[str, Any], group: str) -> dict[str, Any]:
 def resolve(sources: Mapping[str, Mapping[str, Any]]) -> Options:
     """Resolve options: for each origin, the weakest first, its values by the names of :data:`KEYS`, None for no value.
 
-    Raises
-    ------
-    UsageError
-        Step and tolerance of one origin, an unknown name, or a method that cannot serve.
+    Raises UsageError: step and tolerance of one origin, an unknown name, or a method that cannot serve.
     """
     values = {key: Option(value, DEFAULT) for key, value in DEFAULTS.items()}
     for origin, source in sources.items():

@@ -14,10 +14,7 @@ from hsdsl.names import did_you_mean
 def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
     """Sort ``NAME=VALUE`` texts into parameters, initial values and settings; of a repeated name the last counts.
 
-    Raises
-    ------
-    UsageError
-        A text is not of that form.
+    Raises UsageError: a text is not of that form.
     """
     groups: dict[str, dict[str, str]] = {"": {}, "initial": {}, "experiment": {}}
     for pair in pairs:

@@ -63,10 +63,7 @@ def distance_of_points(
 def read_point(values: Values, space: Space, text: str) -> Place:
     """Read ``MODE STATE=VALUE ...``; values are expressions of parameters.
 
-    Raises
-    ------
-    UsageError
-        It is not of that form, names no mode, or does not give every state once.
+    Raises UsageError: it is not of that form, names no mode, or does not give every state once.
     """
     mode, _, rest = text.strip().partition(" ")
     if mode not in space.modes:

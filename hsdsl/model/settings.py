@@ -26,10 +26,7 @@ LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) -> Settings:
     """The settings of a single run; ``overrides`` are recorded in them.
 
-    Raises
-    ------
-    UsageError
-        A number that is out of its range, or a method that cannot serve this model.
+    Raises UsageError: a number that is out of its range, or a method that cannot serve this model.
     """
     arithmetic = values.kernel.arithmetic
     numbers: dict[str, Any]
@@ -149,10 +146,7 @@ def check_method(method: Method | None, program: Program, arithmetic: Arithmetic
 def whole(value: Any, name: str, least: int) -> int:
     """An argument that must be a whole number.
 
-    Raises
-    ------
-    UsageError
-        It is none, or below ``least``.
+    Raises UsageError: it is none, or below ``least``.
     """
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):
         raise UsageError(f"{name} must be a whole number, not {value!r}")

@@ -133,10 +133,7 @@ def check(
 def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:
     """Run to the end, rows going to a CSV file.
 
-    Raises
-    ------
-    UsageError
-        The file cannot be written, or not on to its end (a full disk); what was written stays.
+    Raises UsageError: the file cannot be written, or not on to its end (a full disk); what was written stays.
     """
     plan, settings = prepared.plan, prepared.settings
     assert plan is not None and settings.method is not None

@@ -44,10 +44,7 @@ class Values:
     def number(self, value: Any, where: str) -> Number:
         """The finite number of a number or of an expression of parameters.
 
-        Raises
-        ------
-        UsageError
-            It is neither, or has no finite value.
+        Raises UsageError: it is neither, or has no finite value.
         """
         arithmetic = self.kernel.arithmetic
         try:
@@ -206,10 +203,7 @@ def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tu
 def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
     """The initial mode's index and its states, which must all have a value.
 
-    Raises
-    ------
-    UsageError
-        The mode does not exist, lacks one of the states, or has one without a value.
+    Raises UsageError: the mode does not exist, lacks one of the states, or has one without a value.
     """
     program = values.program
     names = [mode.name for mode in program.modes]

@@ -42,10 +42,7 @@ def read(root: Node, findings: Findings) -> ModelDocument:
     Faults go to ``findings``. The rest of the file is still read: a misspelt key is taken for the one meant, a wrong
     value for one that nothing more is reported of.
 
-    Raises
-    ------
-    ModelError
-        When too little is left to be called a model.
+    Raises ModelError: when too little is left to be called a model.
     """
     correct_indentation(root, findings)
     translate_idioms(root, findings)

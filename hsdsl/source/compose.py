@@ -28,10 +28,7 @@ def compose(text: Text, findings: Findings) -> Node:
 
     Faults that leave the document readable go to ``findings``.
 
-    Raises
-    ------
-    ModelError
-        When the text is not YAML, breaks a cap, or is empty.
+    Raises ModelError: when the text is not YAML, breaks a cap, or is empty.
     """
     parser = _Parser(text.content)
     try:

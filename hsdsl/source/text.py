@@ -48,10 +48,7 @@ class Text:
 def decode(path: str, data: bytes) -> Text:
     """The text of a model.
 
-    Raises
-    ------
-    ModelError
-        When it is too large, not UTF-8, or has characters that no model may have.
+    Raises ModelError: when it is too large, not UTF-8, or has characters that no model may have.
     """
     most = limits.current().bytes
     if len(data) > most:
