@@ -17,7 +17,7 @@ from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
 from hsdsl.kernel import Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
 from hsdsl.runtime.library import is_kept, load
 
@@ -104,22 +104,26 @@ class CompiledModel:
             self._library = load(content, SYMBOL, lambda: _source(program), _model_effort(content))
         except TooSlow as error:
             raise NoCompiler(f"{error}; {_longest(program)}") from None
-        self.table = tables.Model.in_dll(self._library, SYMBOL)
+        self.table = structures.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
 
-    def workspace(self, method: tables.Method, scheme: str) -> int:
+    def workspace(self, method: Any, scheme: str) -> int:
         """How many numbers a run needs for itself."""
-        number = tables.SCHEMES.index(scheme)
+        number = structures.SCHEMES.index(scheme)
         return runtime_of(method, scheme).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
+
+    def mode(self, number: int) -> Any:
+        """The ``hs_mode`` of a mode."""
+        return structures.array_at(structures.Mode, self.table.mode, self.table.modes)[number]
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
 
 
-def runtime_of(method: tables.Method, scheme: str) -> ctypes.CDLL:
+def runtime_of(method: Any, scheme: str) -> ctypes.CDLL:
     """The runtime that has a method and a scheme; what runs there leaves the interpreter free meanwhile."""
-    return runtime(scheme, tables.METHOD_KINDS[int(method.kind)])
+    return runtime(scheme, structures.METHOD_KINDS[int(method.kind)])
 
 
 def _model_effort(content: str) -> Effort:
@@ -181,20 +185,21 @@ class CompiledKernel:
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
         tape = self._program.modes[mode].tape
-        return None if tape is None else _taylor(self._compiled.table.mode[mode], tape, data)
+        return None if tape is None else _taylor(self._compiled.mode(mode), tape, data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states, row by row."""
-        table = self._compiled.table.mode[mode]
+        table = self._compiled.mode(mode)
         n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
         return _routine(table.jacobian, numbers, n, n * n)
 
     def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
         """Bind a mode to parameter values and input segments."""
-        table, outputs = self._compiled.table.mode[mode], len(self._program.outputs)
+        table, outputs = self._compiled.mode(mode), len(self._program.outputs)
         n, m = table.dimension, table.surfaces
         numbers = (Double * max(1, len(data)))(*data)
-        edges = [table.edge[k] for k in range(table.edges)]
+        edges = structures.array_at(structures.Edge, table.edge, table.edges)
+        gradients, rates = (structures.addresses(start, m) for start in (table.gradients, table.rates))
 
         def bound(address: Address, results: int, arguments: int = n) -> Routine:
             return _routine(address, numbers, arguments, results)
@@ -204,15 +209,17 @@ class CompiledKernel:
             surfaces=bound(table.values, m),
             magnitudes=bound(table.magnitudes, m),
             outputs=bound(table.outputs, outputs),
-            gradients=tuple(bound(table.gradients[k], n + 1) for k in range(m)),
-            rates=tuple(bound(table.rates[k], 1) for k in range(m)),
-            conditions=tuple(conjunction([bound(e.condition[i], 1) for i in range(e.parts)]) for e in edges),
+            gradients=tuple(bound(gradient, n + 1) for gradient in gradients),
+            rates=tuple(bound(rate, 1) for rate in rates),
+            conditions=tuple(
+                conjunction([bound(part, 1) for part in structures.addresses(e.condition, e.parts)]) for e in edges
+            ),
             resets=tuple(bound(e.reset, e.target_dimension) for e in edges),
             spreads=tuple(bound(e.spread, e.target_dimension, 2 * n) for e in edges),
         )
 
 
-def _taylor(table: tables.Mode, tape: Tape, data: Sequence[Number]) -> Taylor:
+def _taylor(table: Any, tape: Tape, data: Sequence[Number]) -> Taylor:
     numbers = (Double * max(1, len(data)))(*data)
     own = 1 + table.dimension + tape.needed
     every = 1 + table.dimension + len(tape.operations)

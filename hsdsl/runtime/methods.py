@@ -11,32 +11,34 @@ from typing import Any
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.integrators import ButcherTableau, Method, RadauMethod
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
+from hsdsl.runtime.structures import address
 
 
 def interpolation_table(
     nodes: Sequence[float], tests: Sequence[float], matrix: Sequence[Sequence[float]], share: float
-) -> tables.Interpolation:
+) -> Any:
     """Write an interpolation as the runtime takes it."""
     columns = (nodes, tests, [number for line in matrix for number in line])
-    return tables.Interpolation(len(nodes) - 1, *((c_double * len(column))(*column) for column in columns), share)
+    numbers = (address((c_double * len(column))(*column)) for column in columns)
+    return structures.Interpolation(len(nodes) - 1, *numbers, share)
 
 
 @cache
-def method_table(method: Method) -> tables.Method:
+def method_table(method: Method) -> Any:
     """Write a method as the runtime takes it."""
     if isinstance(method, ButcherTableau):
         return _butcher_table(method)
-    return tables.Method(
-        kind=tables.METHOD_KINDS.index(method.name),
+    return structures.Method(
+        kind=structures.METHOD_KINDS.index(method.name),
         order=method.error_order,
-        interpolant=tables.INTERPOLANTS.index("dense"),
+        interpolant=structures.INTERPOLANTS.index("dense"),
         degree=method.degree,
-        collocation=ctypes.pointer(_collocation()) if isinstance(method, RadauMethod) else None,
+        collocation=address(ctypes.pointer(_collocation())) if isinstance(method, RadauMethod) else None,
     )
 
 
-def _collocation() -> tables.Collocation:
+def _collocation() -> Any:
     """Write the coefficients of Radau IIA."""
     from hsdsl.integrators.collocation import coefficients  # most runs need none
 
@@ -45,7 +47,7 @@ def _collocation() -> tables.Collocation:
     def square(rows: Sequence[Sequence[float]]) -> Any:
         return (c_double * 3 * 3)(*((c_double * 3)(*row) for row in rows))
 
-    return tables.Collocation(
+    return structures.Collocation(
         (c_double * 3)(*known.nodes),
         square(known.powers),
         known.gamma,
@@ -60,25 +62,25 @@ def _collocation() -> tables.Collocation:
     )
 
 
-def _butcher_table(table: ButcherTableau) -> tables.Method:
+def _butcher_table(table: ButcherTableau) -> Any:
     """Write a tableau: numbers instead of fractions, rows without their zeros."""
     stages = table.stages - table.last_is_next
     end: tuple[Fraction, ...] = ()
     rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
     dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
-    return tables.Method(
-        kind=tables.METHOD_KINDS.index("table"),
+    return structures.Method(
+        kind=structures.METHOD_KINDS.index("table"),
         stages=stages,
         extra=len(table.extra),
         order=table.order,
-        interpolant=tables.INTERPOLANTS.index(table.interpolant),
+        interpolant=structures.INTERPOLANTS.index(table.interpolant),
         degree=table.degree,
-        c=(c_double * len(rows))(*(_node(table, row) for row in rows)),
-        a=(tables.Row * len(rows))(*map(_row, rows)),
+        c=address((c_double * len(rows))(*(_node(table, row) for row in rows))),
+        a=address((structures.Row * len(rows))(*map(_row, rows))),
         b=_row(table.b),
         error=_row(_difference(table.b, table.embedded)),
         coarse=_row(_difference(table.b, table.coarse)),
-        dense=(tables.Row * max(1, len(dense)))(*map(_row, dense)),
+        dense=address((structures.Row * max(1, len(dense)))(*map(_row, dense))),
         gain=float(sum(map(abs, table.b))),
     )
 
@@ -93,7 +95,8 @@ def _difference(b: Sequence[Fraction], other: Sequence[Fraction] | None) -> Sequ
     return () if other is None else [v - w for v, w in zip(b, other, strict=True)]
 
 
-def _row(weights: Sequence[Fraction]) -> tables.Row:
+def _row(weights: Sequence[Fraction]) -> Any:
     terms = [(i, FLOAT64.constant(w)) for i, w in enumerate(weights) if w]
     count = max(1, len(terms))
-    return tables.Row(len(terms), (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms)))
+    stages, numbers = (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms))
+    return structures.Row(len(terms), address(stages), address(numbers))

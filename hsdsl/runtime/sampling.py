@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hsdsl.execution import Array, Evaluated
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 
 BLOCK = 16  # HS_BLOCK
@@ -32,7 +32,7 @@ class Sampled:
     """
 
     def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
-        self.table = tables.Sampling(model=ctypes.pointer(compiled.table), timeline=timeline)
+        self.table = structures.Sampling(model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline)
         self.run = library.hs_sample
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
@@ -96,14 +96,14 @@ class Sampler:
         self, sampled: Sampled, columns: Placed, kinds: tuple[tuple[str, ...], ...], layout: Array | None
     ) -> None:
         self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
-        self._own: tables.Sampling | None = None
+        self._own: Any = None
 
-    def _table(self) -> tables.Sampling:
+    def _table(self) -> Any:
         """What is the same for any times."""
-        table = tables.Sampling.from_buffer_copy(self._sampled.table)
+        table = structures.Sampling.from_buffer_copy(self._sampled.table)
         table.rows, table.arcs, table.width, table.degree, self._outputs, *places = self._columns.where
         table.times, table.values, table.recorded, table.pieces, table.arc = places
-        table.layout = None if self._layout is None else tables.address_of(self._layout)
+        table.layout = None if self._layout is None else structures.address_of(self._layout)
         return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
@@ -123,7 +123,7 @@ class Sampler:
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n] = times
-        table, start = tables.Sampling.from_buffer_copy(own), tables.address_of(memory)
+        table, start = structures.Sampling.from_buffer_copy(own), structures.address_of(memory)
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hsdsl.execution import Array
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 
 NUMBER = 8  # bytes
-RECORDS = {"arc": tables.ARC, "transition": tables.TRANSITION, "note": tables.NOTE}
+RECORDS = {"arc": structures.ARC, "transition": structures.TRANSITION, "note": structures.NOTE}
 ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
@@ -102,7 +102,7 @@ class Packed:
         self._memory = np.empty(
             rows * by_row + 3 * arcs + transitions * (4 + 2 * shape.width) + 5 * notes + (alternatives + 1) // 2
         )
-        self._start = tables.address_of(self._memory)
+        self._start = structures.address_of(self._memory)
         self._width = pack(self._start)
 
     @cached_property

@@ -19,7 +19,7 @@ from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.interrupts import Noted
 from hsdsl.program import Program
-from hsdsl.runtime import methods, tables
+from hsdsl.runtime import methods, structures
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
@@ -86,19 +86,19 @@ class CompiledPlan:
         task.mode, (task.dimension, task.x) = self._mode, self._start
 
 
-def task_settings(settings: Settings, states: tuple[str, ...]) -> tables.Settings:
+def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
     """Write settings as the runtime takes them; ``states`` are those of all modes."""
     control = make_control(settings, FLOAT64)
     scale = [settings.scale.get(name, 0.0) for name in states] if settings.scale else None
-    return tables.Settings(
+    return structures.Settings(
         control.h,
         control.tolerance or 0.0,
         control.largest,
         settings.relaxation,
         settings.until,
         min(settings.max_transitions, 2**62),
-        tables.SCHEMES.index(settings.scheme),
-        scale and (ctypes.c_double * len(scale))(*scale),
+        structures.SCHEMES.index(settings.scheme),
+        scale and structures.address((ctypes.c_double * len(scale))(*scale)),
     )
 
 
@@ -106,7 +106,7 @@ def _interpolations(settings: Settings) -> Any:
     """Surfaces along steps, and a push over time."""
     pair = [(interpolation(degree, FLOAT64), share) for degree, share in (along_steps(settings), OVER_TIME)]
     tables_of = [methods.interpolation_table(b.nodes, b.tests, b.matrix, share + b.rounding) for b, share in pair]
-    return (tables.Interpolation * 2)(*tables_of)
+    return structures.address((structures.Interpolation * 2)(*tables_of))
 
 
 class _Timeline:
@@ -120,7 +120,8 @@ class _Timeline:
             np.array([s.jump for s in segments], np.int32),
             np.array([s.data for s in segments], np.float64),
         )
-        self.pointer = ctypes.pointer(tables.Timeline(len(segments), *(c.ctypes.data for c in self._columns)))
+        table = structures.Timeline(len(segments), *(c.ctypes.data for c in self._columns))
+        self.pointer = structures.address(ctypes.pointer(table))
 
 
 @dataclass
@@ -195,11 +196,11 @@ class CompiledRun:
 
     def _stop(self) -> Stop:
         found = self.workspace.task.stop
-        reason = tables.REASONS[found.reason]
+        reason = structures.REASONS[int(found.reason)]
         if reason == "until":
             return stops.reached(found.time)
         if reason == "final":
-            return stops.entered_final(self.plan.program.modes[found.mode].name, found.time)
+            return stops.entered_final(self.plan.program.modes[int(found.mode)].name, found.time)
         if reason == "interrupted" and self.workspace.chunks.full:
             return stops.memory(self.plan.memory, self.now)
         if reason == "interrupted":

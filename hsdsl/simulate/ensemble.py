@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import REASONS, Array
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.runtime.sampling import BLOCK
 from hsdsl.simulate.compiled import CompiledPlan, task_settings
 from hsdsl.simulate.input_segments import Timeline
@@ -70,7 +70,7 @@ class CompiledEnsemble:
         self._plan, self._kept = plan, kept
         self._start = np.ascontiguousarray(instances.start, np.float64)
         self._time = np.ascontiguousarray(instances.time, np.float64)
-        self._settings = (tables.Settings * len(instances.settings))(
+        self._settings = (structures.Settings * len(instances.settings))(
             *(task_settings(settings, plan.program.all_states) for settings in instances.settings)
         )
         self._timelines, self._numbers = _timelines(instances.timelines)
@@ -96,14 +96,14 @@ class CompiledEnsemble:
             _row(self._start, first),
             _row(self._time, first),
         )
-        table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(tables.Settings)
+        table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(structures.Settings)
         table.stop = self._stop.ctypes.data
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
         place.workspace.run_ensemble(table)
         if place.workspace.failed:
             raise place.workspace.failed[0]
-        known = np.array([*(ENDED.get(reason, reason) for reason in tables.REASONS), "interrupted"], LONGEST)
+        known = np.array([*(ENDED.get(reason, reason) for reason in structures.REASONS), "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
 
     def place(self) -> Place:
@@ -121,7 +121,7 @@ class Place:
         layouts: StateLayouts,
         samples: int,
     ) -> None:
-        self.table = tables.Ensemble()
+        self.table = structures.Ensemble()
         self.workspace = plan.workspaces.new(self.table.task)
         plan.lay(self.workspace)
         model, chunk, room = plan.compiled.table, self.table.task.chunk, samples + BLOCK

@@ -6,7 +6,7 @@ Loaded when there is something to say: most runs end at `until` without any.
 from __future__ import annotations
 
 from hsdsl.execution import Stop
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.simulate import diagnostics, stops
 from hsdsl.simulate.diagnosis import not_finite
 from hsdsl.simulate.entry import LEFT, left_domain
@@ -20,7 +20,7 @@ from hsdsl.simulate.workspace import Workspace
 
 def told(run: Run, number: int, index: int, k: int, count: int, time: float, other: float) -> Stop | None:
     """Say what the loop has noted; returns a stop where that ends the run."""
-    recorder, mode, kind = run.recorder, run.program.modes[index], tables.NOTICES[number]
+    recorder, mode, kind = run.recorder, run.program.modes[index], structures.NOTICES[number]
     if kind == "unsettled":
         diagnostics.unsettled(recorder, mode.name, k, time)
     elif kind == "crowded":
@@ -40,11 +40,11 @@ def told(run: Run, number: int, index: int, k: int, count: int, time: float, oth
 def stop(run: Run, workspace: Workspace, reason: str, made: int) -> Stop:
     """Say why a run stopped, after so many transitions."""
     found = workspace.task.stop
-    t, mode = found.time, run.program.modes[found.mode]
+    t, mode = found.time, run.program.modes[int(found.mode)]
     if reason in ("until in strip", "until on guard"):
-        return stops.reached_in_strip(t, mode.edges[found.edge].name, reason == "until on guard")
+        return stops.reached_in_strip(t, mode.edges[int(found.edge)].name, reason == "until on guard")
     if reason == "reset not finite":
-        return stops.reset_not_finite(mode.edges[found.edge], t)
+        return stops.reset_not_finite(mode.edges[int(found.edge)], t)
     if reason == "zeno":
         return stops.endless(mode.name, t)
     if reason == "limit":
@@ -62,13 +62,13 @@ def stop(run: Run, workspace: Workspace, reason: str, made: int) -> Stop:
     assert reason == "stuck", reason
     run.control.h = found.h
     surface = None if found.surface < 0 else found.surface
-    return no_way_on(run, here, StepFailure(tables.FAILURES[found.failure], surface), slope)
+    return no_way_on(run, here, StepFailure(structures.FAILURES[int(found.failure)], surface), slope)
 
 
 def _here(run: Run, workspace: Workspace, made: int) -> ModeState:
     """Where the run stopped, as the Python loop would have it."""
     found = workspace.task.stop
-    mode, segment = run.program.modes[found.mode], run.timeline.segments[found.segment]
+    mode, segment = run.program.modes[int(found.mode)], run.timeline.segments[int(found.segment)]
     x, t = workspace.x(found.dimension), found.time
     kernel = run.kernel.bind(found.mode, segment.data)
     surfaces = Surfaces(kernel, mode.edges, tuple(0.0 for _ in x), run.arithmetic)

@@ -11,7 +11,7 @@ import numpy as np
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.limits import DEFAULT
 from hsdsl.program import Program
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.simulate.columns import Columns, Counts, Gathered, Packed, Shape
 from hsdsl.simulate.state_layouts import StateLayouts
 
@@ -30,7 +30,7 @@ class OutputBuffers:
     A small one that is enough for its run is copied from and used again.
     """
 
-    def __init__(self, table: tables.Chunk, shape: Shape) -> None:
+    def __init__(self, table: Any, shape: Shape) -> None:
         self.table, self._shape, self._row_bytes = table, shape, shape.row_bytes
         self._full: list[dict[str, Array]] = []
         self._rows = 0  # of the chunk that is there
@@ -85,12 +85,12 @@ class OutputBuffers:
             "outputs": np.empty((rows, shape.outputs)),
             "depth": np.empty(rows),
             "pieces": np.empty((rows + 1, shape.degree, shape.width)),
-            "arc": np.empty(arcs, tables.ARC),
-            "transition": np.empty(transitions, tables.TRANSITION),
+            "arc": np.empty(arcs, structures.ARC),
+            "transition": np.empty(transitions, structures.TRANSITION),
             "before": np.empty((transitions, shape.width)),
             "after": np.empty((transitions, shape.width)),
             "alternatives": np.empty(transitions * shape.edges, np.int32),
-            "note": np.empty(notes, tables.NOTE),
+            "note": np.empty(notes, structures.NOTE),
         }
         table, self._rows = self.table, rows
         table.row_room, table.arc_room, table.transition_room, table.note_room = rows, arcs, transitions, notes
@@ -143,7 +143,7 @@ def arcs_of(whole: Columns, program: Program, layouts: StateLayouts) -> Iterator
     found: list[int] = layouts.of_arcs(whole["arc"]["mode"]).tolist()
     for (first, jump, index, kind), last, number in zip(opened, ends, found, strict=True):
         if first <= last:
-            yield Arc(program.modes[index].name, layouts.kinds[number], tables.KINDS[kind], jump, first, last)
+            yield Arc(program.modes[index].name, layouts.kinds[number], structures.KINDS[kind], jump, first, last)
 
 
 def transitions_of(whole: Columns, program: Program) -> Iterator[Transition]:
@@ -172,7 +172,7 @@ def transitions_of(whole: Columns, program: Program) -> Iterator[Transition]:
         used += count
 
 
-def grown(visited: tables.Visited, room: int, width: int) -> tuple[Array, ...]:
+def grown(visited: Any, room: int, width: int) -> tuple[Array, ...]:
     """Give a set of visited states memory for ``room`` of them; returns what must be kept alive."""
     memory = np.empty(room, np.int32), np.empty((room, width)), np.zeros(2 * room, np.int64)
     visited.room, visited.count = room, 0

@@ -15,7 +15,7 @@ from hsdsl.execution import Array, Execution, Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
@@ -87,7 +87,7 @@ class Prepared:
         Returns why it stopped, how many transitions it made, and the last chunk.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self.plan, self.plan.workspaces.new(tables.Task()), self._fresh)
+        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._fresh)
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)

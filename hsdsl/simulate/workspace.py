@@ -14,7 +14,7 @@ import numpy as np
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
-from hsdsl.runtime import tables
+from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.simulate.columns import Shape
 from hsdsl.simulate.output_buffers import OutputBuffers, grown
@@ -26,11 +26,10 @@ MOST_KEPT = 4  # workspaces of one model and method
 class Workspace:
     """One task with its memory. One run works there at a time."""
 
-    def __init__(
-        self, task: tables.Task, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape
-    ) -> None:
+    def __init__(self, task: Any, compiled: CompiledModel, method: Any, scheme: str, shape: Shape) -> None:
         model = compiled.table
-        self.task, self.degree = task, shape.degree
+        self.task: Any = task
+        self.degree = shape.degree
         self.pressed, self.failed = False, list[BaseException]()
         self.laid: object = None  # the plan that the task is filled in from
         self.chunks = OutputBuffers(self.task.chunk, shape)
@@ -38,7 +37,7 @@ class Workspace:
         self._workspace = np.empty(compiled.workspace(method, scheme))
         self._x, self._slope, self._scales = (np.empty(self._width) for _ in range(3))
         self._visited = [grown(self.task.visited, VISITED, self._width)]  # the last is in use
-        self.task.model, self.task.method = ctypes.pointer(model), ctypes.pointer(method)
+        self.task.model, self.task.method = (structures.address(ctypes.pointer(each)) for each in (model, method))
         self.task.workspace = self._workspace.ctypes.data
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
         self.task.stop.scales = self._scales.ctypes.data
@@ -63,7 +62,7 @@ class Workspace:
         """Copy what the task has written to an address; returns how many states a row has there."""
         return self._runtime.hs_pack(self._where, to)
 
-    def run_ensemble(self, ensemble: tables.Ensemble) -> None:
+    def run_ensemble(self, ensemble: Any) -> None:
         """Run instances to their end, their task being the workspace's; the interpreter is free meanwhile."""
         self._runtime.hs_run_ensemble(ctypes.addressof(ensemble))
 
@@ -92,7 +91,7 @@ class Workspace:
             return 2
         return int(self.pressed or self.chunks.full)
 
-    def more_visited(self, larger: tables.Visited) -> int:
+    def more_visited(self, larger: Any) -> int:
         """Make room for twice as many visited states."""
         try:
             self._visited.append(grown(larger, 2 * self.task.visited.room, self._width))
@@ -105,7 +104,7 @@ class Workspace:
 class Workspaces:
     """The free workspaces of one model, method and scheme."""
 
-    def __init__(self, compiled: CompiledModel, method: tables.Method, scheme: str, shape: Shape) -> None:
+    def __init__(self, compiled: CompiledModel, method: Any, scheme: str, shape: Shape) -> None:
         self._made_of = compiled, method, scheme, shape
         self._free: list[Workspace] = []
 
@@ -114,9 +113,9 @@ class Workspaces:
         try:
             return self._free.pop()
         except IndexError:
-            return self.new(tables.Task())
+            return self.new(structures.Task())
 
-    def new(self, task: tables.Task) -> Workspace:
+    def new(self, task: Any) -> Workspace:
         """Make a workspace for a task."""
         return Workspace(task, *self._made_of)
 
@@ -139,7 +138,11 @@ def _answer_poll(task: int) -> int:
 
 
 def _answer_grow(task: int, larger: Any) -> int:
-    return _desks[task].more_visited(larger.contents)
+    return _desks[task].more_visited(structures.Visited.from_address(larger))
 
 
-_flush, _poll, _grow = tables.Ask(_answer_flush), tables.Ask(_answer_poll), tables.Grow(_answer_grow)
+_callbacks = dict(structures.Task._fields_)
+_flush, _poll, _grow = (
+    _callbacks[name](answer)
+    for name, answer in (("flush", _answer_flush), ("poll", _answer_poll), ("grow", _answer_grow))
+)

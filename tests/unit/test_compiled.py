@@ -17,8 +17,8 @@ import hsdsl
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.model import Model
-from hsdsl.runtime import tables
-from hsdsl.runtime.kernel import runtime
+from hsdsl.runtime import structures
+from hsdsl.runtime.compiler import find_compiler
 from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -30,9 +30,23 @@ def model(text: str) -> Model:
 
 
 @needs_compiler
-def test_both_sides_have_one_idea_of_every_structure():
-    sizes = (ctypes.c_int64 * len(tables.STRUCTURES)).in_dll(runtime(), "hs_sizes")
-    assert list(sizes) == [ctypes.sizeof(structure) for structure in tables.STRUCTURES]
+def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tmp_path):
+    ours: list[int] = []
+    lines: list[str] = []
+    for name, structure in structures.STRUCTURES.items():
+        fields = [field for field, _ in structure._fields_]
+        ours += [ctypes.sizeof(structure), *(getattr(structure, field).offset for field in fields)]
+        lines += [f"sizeof({name})", *(f"offsetof({name}, {field})" for field in fields)]
+    for words in structures.ENUMERATIONS.values():
+        ours += range(len(words))
+        lines += [f"HS_{word.upper().replace(' ', '_')}" for word in words]
+    source, library = tmp_path / "layout.c", tmp_path / "layout.so"
+    numbers = ", ".join(f"(long long)({line})" for line in lines)
+    source.write_text(f'#include <stddef.h>\n#include "hs_ensemble.h"\nHS_EXPORT long long layout[] = {{{numbers}}};\n')
+    find_compiler().build(source, [structures.FOLDER], library, "-O1")
+    theirs = (ctypes.c_longlong * len(ours)).in_dll(ctypes.CDLL(str(library)), "layout")
+    assert list(theirs) == ours
+    assert len(ours) > 200
 
 
 @needs_compiler

@@ -230,10 +230,3 @@ void hs_simulate(hs_task *task) {
 }
 
 #include "ensemble.c"
-
-/* Sizes of the structures a caller fills, so that it can check its own idea of them. */
-HS_EXPORT const int64_t hs_sizes[] = {
-    sizeof(hs_edge),     sizeof(hs_mode),  sizeof(hs_model),   sizeof(hs_row),  sizeof(hs_collocation),
-    sizeof(hs_method), sizeof(hs_timeline),
-    sizeof(hs_interpolation), sizeof(hs_settings), sizeof(hs_chunk), sizeof(hs_visited), sizeof(hs_stop), sizeof(hs_task),
-    sizeof(hs_sampling), sizeof(hs_ensemble)};

@@ -18,9 +18,9 @@ typedef struct {
   const double *weight;
 } hs_row;
 
-enum { HS_SECANT, HS_HERMITE, HS_DENSE };
+typedef enum { HS_SECANT, HS_HERMITE, HS_DENSE } hs_interpolant;
 
-typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_kind;
+typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_method_kind;
 
 /* The coefficients of Radau IIA: see Coefficients in hsdsl/integrators/collocation.py. */
 typedef struct {
@@ -82,7 +82,7 @@ typedef struct {
   const double *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
 } hs_settings;
 
-enum { HS_FLOW, HS_STRIP };
+typedef enum { HS_FLOW, HS_STRIP } hs_arc_kind;
 
 typedef struct {
   int64_t first; /* row, counted from the start of the run */
@@ -184,9 +184,7 @@ typedef struct {
   double *x, *slope, *scales;
 } hs_stop;
 
-typedef struct hs_task hs_task;
-
-struct hs_task {
+typedef struct hs_task {
   const hs_model *model;
   const hs_method *method;
   const hs_timeline *timeline;
@@ -197,15 +195,14 @@ struct hs_task {
   double *workspace; /* hs_workspace() numbers */
   hs_chunk chunk;
   hs_visited visited;
-  int (*flush)(hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
-  int (*poll)(hs_task *);                       /* asked now and then: not 0 to stop */
-  int (*grow)(hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
+  int (*flush)(struct hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
+  int (*poll)(struct hs_task *);                       /* asked now and then: not 0 to stop */
+  int (*grow)(struct hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
   double now;                                   /* to be looked at while it runs */
   int64_t made;
   hs_stop stop;
-};
+} hs_task;
 
-extern HS_EXPORT const int64_t hs_sizes[];
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
 HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
