@@ -1,4 +1,4 @@
-"""States misspelt in a flow, and lines that stand too far left: what is taken for what, and what is left alone."""
+"""States misspelt in a flow, and lines indented too little: their corrections, and what is left alone."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def test_lines_too_far_left_are_told_once(right, left, line, where):
     text = MODEL + TAIL
     assert right in text
     ((code, place, hint),) = said(text.replace(right, left))
-    assert (code, place) == ("HS201", line) and hint is not None and hint.endswith(f"to stand {where}")
+    assert (code, place) == ("HS201", line) and hint is not None and hint.endswith(f"{where}")
 
 
 def test_a_mode_and_all_its_sections_too_far_left():
     text = MODEL.replace("    flow", "  flow").replace("    transitions", "  transitions") + TAIL
     ((code, line, hint),) = said(text)
-    assert (code, line, hint) == ("HS201", 5, "indent these lines, to stand in the mode 'm'")
+    assert (code, line, hint) == ("HS201", 5, "indent these lines, so that they are in the mode 'm'")
 
 
 def test_a_key_misspelt_behind_an_empty_section():
