@@ -103,7 +103,7 @@ class Sampler:
         table = structures.Sampling.from_buffer_copy(self._sampled.table)
         table.rows, table.arcs, table.width, table.degree, self._outputs, *places = self._columns.where
         table.times, table.values, table.recorded, table.pieces, table.arc = places
-        table.layout = None if self._layout is None else structures.address_of(self._layout)
+        table.layout = None if self._layout is None else self._layout.ctypes.data
         return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
@@ -123,7 +123,7 @@ class Sampler:
         ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n] = times
-        table, start = structures.Sampling.from_buffer_copy(own), structures.address_of(memory)
+        table, start = structures.Sampling.from_buffer_copy(own), memory.ctypes.data
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]

@@ -9,13 +9,11 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Iterator
-from ctypes import c_char, c_double, c_int, c_int32, c_int64, c_void_p
+from ctypes import c_double, c_int, c_int32, c_int64, c_void_p
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from hsdsl.execution import Array
 
 HEADERS = ("hs.h", "hs_simulate.h", "hs_sample.h", "hs_ensemble.h")
 FOLDER = Path(__file__).parent / "c"
@@ -83,8 +81,3 @@ def array_at(kind: Any, start: int | None, count: int) -> Any:
 def addresses(start: int | None, count: int) -> list[int]:
     """The addresses in an array of pointers."""
     return list(array_at(c_void_p, start, count))
-
-
-def address_of(array: Array) -> int:
-    """Where the numbers of an array are that is not empty and can be written: four times as fast as NumPy's own."""
-    return ctypes.addressof(c_char.from_buffer(array.data))

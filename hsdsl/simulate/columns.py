@@ -102,7 +102,7 @@ class Packed:
         self._memory = np.empty(
             rows * by_row + 3 * arcs + transitions * (4 + 2 * shape.width) + 5 * notes + (alternatives + 1) // 2
         )
-        self._start = structures.address_of(self._memory)
+        self._start = self._memory.ctypes.data
         self._width = pack(self._start)
 
     @cached_property
