@@ -21,6 +21,9 @@ Answers go to standard output, messages and progress to standard error.
 | 3 | the run stopped for [another reason](../meaning.md#m10-stop) |
 | 130 | interrupted; what was computed is kept |
 
+`hsdsl --install-completion` lets bash, zsh, fish or PowerShell complete commands, options, their choices, model files,
+names of `--set`, and codes.
+
 """
 
 
