@@ -29,16 +29,16 @@ def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
     raise Unsure
 
 
-def cycle(here: ModePoint, edge: Edge) -> tuple[str, ...] | None:
-    """The names of the transitions that follow an edge at one instant without end; None without a known cycle."""
+def cycle(here: ModePoint, edge: Edge) -> tuple[Edge, ...] | None:
+    """The transitions that follow an edge at one instant without end; None without a known cycle."""
     visited: list[ModePoint] = []
-    names: list[str] = []
+    edges: list[Edge] = []
     try:
         for following, reached in chain(here, edge):
-            names.append(following.name)
+            edges.append(following)
             for k, before in enumerate(visited):
                 if same(before, reached):
-                    return tuple(names[k + 1 :])
+                    return tuple(edges[k + 1 :])
             visited.append(reached)
     except Unsure:
         return None

@@ -15,7 +15,7 @@ from hsdsl.lint.analysis.question import Answer, at_most_zero, positive, zero
 from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.analysis.zero_time_cycle import cycle, same
 from hsdsl.lint.finding import Alike, Finding
-from hsdsl.lint.subject import EdgePart, ModePart, Subject
+from hsdsl.lint.subject import EdgePart, Subject
 from hsdsl.system import Edge, Mode
 
 
@@ -144,19 +144,20 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
     for part, edge in subject.edges:
         for answer in _followed_at_once(subject.dynamics, part.mode, edge.edge):
             here = ModePoint(subject.dynamics, part.mode, answer.point)
-            names = cycle(here, edge.edge) if answer.somewhere else None
-            if names and frozenset(names) not in reported:
-                reported.add(frozenset(names))
-                yield _cycle_finding(subject, part, edge, answer, names)
+            edges = cycle(here, edge.edge) if answer.somewhere else None
+            names = frozenset(after.name for after in edges or ())
+            if edges and names not in reported:
+                reported.add(names)
+                yield _cycle_finding(subject.dynamics, part.mode, edge, answer, edges)
 
 
-def _cycle_finding(subject: Subject, part: ModePart, edge: EdgePart, answer: Answer, names: tuple[str, ...]) -> Finding:
-    about: list[Any] = [*map(symbol, part.mode.states), subject.dynamics.residual(edge.edge.surface)]
-    where = at(subject.dynamics, part.mode, answer, about)
-    cycle = ", ".join(f"'{name}'" for name in names)
-    follow = "follow each other" if len(names) > 1 else "follows itself"
-    message = f"once '{edge.edge.name}' has fired {where}, {cycle} {follow} at one instant without end"
-    hint = "give them different levels" if len(names) > 1 else "let its reset lead inside the domain"
+def _cycle_finding(dynamics: Dynamics, mode: Mode, edge: EdgePart, answer: Answer, edges: tuple[Edge, ...]) -> Finding:
+    about: list[Any] = [*map(symbol, mode.states), *(dynamics.residual(e.surface) for e in (edge.edge, *edges))]
+    where = at(dynamics, mode, answer, about)
+    names = ", ".join(f"'{after.name}'" for after in edges)
+    follow = "follow each other" if len(edges) > 1 else "follows itself"
+    message = f"once '{edge.edge.name}' has fired {where}, {names} {follow} at one instant without end"
+    hint = "give them different levels" if len(edges) > 1 else "let its reset lead inside the domain"
     return Finding(edge.document.to.place.span, message, hint, "sampled")
 
 
