@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -25,7 +25,14 @@ _COMPARED = {sp.Eq: "__eq__", sp.Ne: "__ne__", sp.Lt: "__lt__", sp.Le: "__le__",
 
 def evaluate(expr: Any, point: Point) -> Number:
     """The value of an expression; NaN where it has none, or where a symbol has no value at the point."""
-    return _Evaluation(point).number(expr)
+    done: dict[Any, Number] = dict(point)
+
+    def value(part: Any) -> Number:
+        if part not in done:
+            done[part] = _value(part, value)
+        return done[part]
+
+    return value(expr)
 
 
 def holds(condition: Any, point: Point) -> bool | None:
@@ -70,34 +77,22 @@ def _number(value: Any, point: Point) -> Number:
     return rational(value) if isinstance(value, Fraction) else evaluate(value, point)
 
 
-class _Evaluation:
-    """One point; shared parts of an expression are worked out once."""
-
-    def __init__(self, point: Point) -> None:
-        self.done: dict[Any, Number] = dict(point)
-
-    def number(self, expr: Any) -> Number:
-        """The value of an expression."""
-        found = self.done.get(expr)
-        if found is None:
-            found = self.done[expr] = self._value(expr)
-        return found
-
-    def _value(self, expr: Any) -> Number:
-        if expr.is_Rational:
-            return numeric.of_rational(expr)
-        if expr == sp.pi:
-            return numeric.PI
-        if expr == sp.E:
-            return numeric.apply("exp", [numeric.of_rational(sp.S.One)])
-        parts = [self.number(part) for part in expr.args]
-        if not parts or not all(numeric.finite(part) for part in parts):
-            return numeric.NAN
-        if expr.is_Add:
-            return numeric.total(parts)
-        if expr.is_Mul:
-            return numeric.product(parts)
-        if expr.is_Pow:
-            return numeric.power(*parts)
-        name = _NAMES.get(type(expr))
-        return numeric.NAN if name is None else numeric.apply(name, parts)
+def _value(expr: Any, value: Callable[[Any], Number]) -> Number:
+    """The value of an expression from those of its parts."""
+    if expr.is_Rational:
+        return numeric.of_rational(expr)
+    if expr == sp.pi:
+        return numeric.PI
+    if expr == sp.E:
+        return numeric.apply("exp", [numeric.of_rational(sp.S.One)])
+    parts = [value(part) for part in expr.args]
+    if not parts or not all(numeric.finite(part) for part in parts):
+        return numeric.NAN
+    if expr.is_Add:
+        return numeric.total(parts)
+    if expr.is_Mul:
+        return numeric.product(parts)
+    if expr.is_Pow:
+        return numeric.power(*parts)
+    name = _NAMES.get(type(expr))
+    return numeric.NAN if name is None else numeric.apply(name, parts)

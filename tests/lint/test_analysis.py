@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from hsdsl.functions import FUNCTIONS
 from hsdsl.lint.analysis.decide import Decider
 from hsdsl.lint.analysis.normal_form import NormalForms, expression
-from hsdsl.lint.analysis.question import Range, at_most_zero, negative, positive, zero
+from hsdsl.lint.analysis.question import SearchRange, at_most_zero, negative, positive, zero
 from hsdsl.lint.analysis.straight_line_program import StraightLine
 
 x, y, v, t = sp.symbols("x y v t", real=True)
 pi = sp.pi
 half = sp.Rational(1, 2)
-FREE = {s: Range(None, None, (-100.0, 100.0), 1.0) for s in (x, y, v)}
-RANGES = {**FREE, t: Range(Fraction(0), Fraction(10), (0.0, 10.0), 0.0)}
+FREE = {s: SearchRange(None, None, (-100.0, 100.0), 1.0) for s in (x, y, v)}
+RANGES = {**FREE, t: SearchRange(Fraction(0), Fraction(10), (0.0, 10.0), 0.0)}
 
 LEAVES = st.one_of(st.sampled_from([x, y]), st.integers(-3, 3).map(sp.Integer), st.just(sp.Rational(1, 3)), st.just(pi))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from hsdsl.lint.analysis.polynomial import Atom, Monomial, Polynomial
 from hsdsl.lint.analysis.question import Relation
-from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds, of_constant
 
 Row = tuple[Polynomial, Relation]
 
@@ -18,7 +18,7 @@ class Contradiction(Exception):
     """The constraints exclude each other."""
 
 
-def tighten(rows: Sequence[Row], bounds: dict[Any, Bounds]) -> None:
+def tighten(rows: Sequence[Row], bounds: dict[Any, RationalBounds]) -> None:
     """Narrow ``bounds`` by what rows say of names.
 
     Raises
@@ -41,7 +41,7 @@ def tighten(rows: Sequence[Row], bounds: dict[Any, Bounds]) -> None:
         if atom.kind == "name" and exponent == 1 and not others and not more:
             _narrow(bounds, atom.head, low and low[0], high and high[0])
 
-    def of_atom(atom: Atom) -> Bounds:
+    def of_atom(atom: Atom) -> RationalBounds:
         return bounds[atom.head] if atom.kind == "name" else of_constant(atom)
 
     for p, relation in rows:  # of a name alone all is known by now
@@ -77,7 +77,7 @@ def _lower(ends: list[Any], level: Fraction, strict: bool) -> None:
         ends[1] = (level, strict)
 
 
-def _narrow(bounds: dict[Any, Bounds], symbol: Any, low: Fraction | None, high: Fraction | None) -> None:
+def _narrow(bounds: dict[Any, RationalBounds], symbol: Any, low: Fraction | None, high: Fraction | None) -> None:
     first, last = bounds[symbol]
     if low is not None and (first is None or low > first):
         first = low

@@ -7,7 +7,7 @@ budget for all its questions, after which only exact reasoning goes on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +19,7 @@ from hsdsl.lint.analysis.elimination import Reduced
 from hsdsl.lint.analysis.newton_search import ROUNDS, STARTS, NewtonSearch
 from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.polynomial import Polynomial
-from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Range
+from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Ranges
 from hsdsl.lint.analysis.straight_line_program import Array, StraightLine, too_large
 from hsdsl.lower.straight import replaced
 
@@ -40,7 +40,7 @@ class Decider:
     _left: dict[Any, Reduced | None] = field(default_factory=dict)
     _samples: dict[Any, Array] = field(default_factory=dict)
 
-    def decide(self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], prove: bool = False) -> Answer:
+    def decide(self, constraints: Sequence[Constraint], ranges: Ranges, prove: bool = False) -> Answer:
         """Answer whether there is a point that satisfies all constraints.
 
         Parameters
@@ -57,7 +57,7 @@ class Decider:
             self._known[key] = self._decide(constraints, ranges, prove)
         return self._known[key]
 
-    def _decide(self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], prove: bool) -> Answer:
+    def _decide(self, constraints: Sequence[Constraint], ranges: Ranges, prove: bool) -> Answer:
         if too_large((c.expr for c in constraints), MOST_PARTS):
             return UNKNOWN
         reduced = self._reduced(constraints, ranges)
@@ -68,7 +68,7 @@ class Decider:
             return Answer("somewhere", "symbolic", point)
         return self._numerically(constraints, ranges, reduced, prove)
 
-    def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Decided | None:
+    def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Ranges) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
         if too_large([expr, *(c.expr for c in given)], MOST_PARTS):
             return None
@@ -88,27 +88,25 @@ class Decider:
         size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
         return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
 
-    def sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
+    def sample(self, given: Sequence[Constraint], ranges: Ranges) -> Array:
         """Points where constraints hold, as many as are found: array (n, names of ranges)."""
         key = (tuple(given), id(ranges))
         if key not in self._samples:
             self._samples[key] = self._sample(given, ranges)
         return self._samples[key]
 
-    def _sample(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Array:
+    def _sample(self, given: Sequence[Constraint], ranges: Ranges) -> Array:
         reduced = self._reduced(given, ranges)
         search = self._search(given, ranges, reduced, list(ranges)) if reduced else None
         return np.zeros((0, len(ranges))) if search is None else search.points()
 
-    def _reduced(self, given: Sequence[Constraint], ranges: Mapping[Any, Range]) -> Reduced | None:
+    def _reduced(self, given: Sequence[Constraint], ranges: Ranges) -> Reduced | None:
         key = (tuple(given), id(ranges))
         if key not in self._left:
             self._left[key] = elimination.reduce(given, self.normal_forms, ranges)
         return self._left[key]
 
-    def _numerically(
-        self, constraints: Sequence[Constraint], ranges: Mapping[Any, Range], reduced: Reduced, prove: bool
-    ) -> Answer:
+    def _numerically(self, constraints: Sequence[Constraint], ranges: Ranges, reduced: Reduced, prove: bool) -> Answer:
         solved = _solutions(reduced)
         rest = self._rest(constraints, reduced, solved)
         names = sorted({s for c in rest for s in c.expr.free_symbols}, key=lambda s: s.name)
@@ -138,7 +136,7 @@ class Decider:
         return rest + [Constraint(expression(p), r) for p, r in reduced.rows if (p, r) not in settled]
 
     def _search(
-        self, rest: Sequence[Constraint], ranges: Mapping[Any, Range], reduced: Reduced, names: Sequence[Any]
+        self, rest: Sequence[Constraint], ranges: Ranges, reduced: Reduced, names: Sequence[Any]
     ) -> NewtonSearch | None:
         """A search for points; None where that would cost more than there is left."""
         if too_large((c.expr for c in rest), MOST_PARTS):
@@ -158,9 +156,7 @@ class Decider:
         self.left -= 8 * length * most
         return most > 0 and branch_and_bound.excluded(search.program, search.relations, search.low, search.high, most)
 
-    def _somewhere(
-        self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Mapping[Any, Range]
-    ) -> Answer:
+    def _somewhere(self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Ranges) -> Answer:
         for symbol, limits in ranges.items():
             if symbol not in point and symbol not in solved:
                 low, high = reduced.bounds[symbol]
@@ -182,7 +178,7 @@ def _solutions(reduced: Reduced) -> dict[Any, Any]:
     return found
 
 
-def _box(names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]) -> tuple[Array, Array]:
+def _box(names: Sequence[Any], reduced: Reduced, ranges: Ranges) -> tuple[Array, Array]:
     low: list[float] = []
     high: list[float] = []
     for symbol in names:
@@ -195,9 +191,7 @@ def _box(names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]) ->
     return np.array(low), np.array(high)
 
 
-def _searched(
-    names: Sequence[Any], reduced: Reduced, ranges: Mapping[Any, Range]
-) -> tuple[tuple[Any, float, float], ...]:
+def _searched(names: Sequence[Any], reduced: Reduced, ranges: Ranges) -> tuple[tuple[Any, float, float], ...]:
     """How far was looked in names that nothing bounds: an end that the constraints themselves give is none."""
     found: list[tuple[Any, float, float]] = []
     for symbol, low, high in zip(names, *_box(names, reduced, ranges), strict=True):

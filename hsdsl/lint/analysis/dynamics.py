@@ -19,7 +19,7 @@ from hsdsl.errors import Decided
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
-from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Range, at_most_zero, zero
+from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Ranges, SearchRange, at_most_zero, zero
 from hsdsl.lint.analysis.straight_line_program import at_point, enclosure, parts_of, too_large
 from hsdsl.lower.straight import derivative, lie_derivative, replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
@@ -46,7 +46,7 @@ class Dynamics:
         self.decider = Decider()
         self._values = system.parameter_values(lambda value, earlier: replaced(value, earlier, {}))
         self._done: dict[Any, Any] = {}
-        self._ranges: dict[tuple[str, ...], dict[Any, Range]] = {}
+        self._ranges: dict[tuple[str, ...], Ranges] = {}
         self._remembered: dict[Any, Any] = {}
 
     def placed(self, expr: Any) -> Any:
@@ -186,17 +186,17 @@ class Dynamics:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
         return self.decider.vanishes(expr, given, self.ranges(mode))
 
-    def ranges(self, mode: Mode) -> dict[Any, Range]:
+    def ranges(self, mode: Mode) -> Ranges:
         """What is known of the values of a mode's states, of the sampled inputs and of time."""
         if mode.states not in self._ranges:
             states = {symbol(s): self._of_state(s) for s in mode.states}
             self._ranges[mode.states] = {**states, **self._common}
         return self._ranges[mode.states]
 
-    def _of_state(self, name: str) -> Range:
+    def _of_state(self, name: str) -> SearchRange:
         typical = float(self.start.get(name, Fraction(1)))
         reach = 10 * max(1.0, abs(typical), min(self._levels.get(name, 0.0), float(_LARGEST)))
-        return Range(None, None, (-reach, reach), typical)
+        return SearchRange(None, None, (-reach, reach), typical)
 
     @cached_property
     def start(self) -> dict[str, Fraction]:
@@ -224,15 +224,15 @@ class Dynamics:
         return found
 
     @cached_property
-    def _common(self) -> dict[Any, Range]:
+    def _common(self) -> Ranges:
         inputs = {symbol(given.name): self._of_input(given) for given in self.system.inputs}
         end = max(self.until, Fraction(0))
-        return {**inputs, TIME: Range(Fraction(0), end, (0.0, float(end)), 0.0)}
+        return {**inputs, TIME: SearchRange(Fraction(0), end, (0.0, float(end)), 0.0)}
 
-    def _of_input(self, given: SampledInput) -> Range:
+    def _of_input(self, given: SampledInput) -> SearchRange:
         values = [v if isinstance(v, Fraction) else _middle(self.placed(v)) for v in given.values]
         low, high = min(values), max(values)
-        return Range(low, high, (float(low), float(high)), float(values[0]))
+        return SearchRange(low, high, (float(low), float(high)), float(values[0]))
 
     @cached_property
     def inputs(self) -> frozenset[Any]:

@@ -7,7 +7,7 @@ the constraints themselves give (`bound_propagation`). No search, no general sol
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -15,8 +15,8 @@ from typing import Any
 from hsdsl.lint.analysis.bound_propagation import Contradiction, Row, tighten
 from hsdsl.lint.analysis.normal_form import NormalForms
 from hsdsl.lint.analysis.polynomial import Polynomial, linear_in, number
-from hsdsl.lint.analysis.question import Constraint, Range
-from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.question import Constraint, Ranges, SearchRange
+from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds, of_constant
 
 
 @dataclass
@@ -35,10 +35,10 @@ class Reduced:
 
     rows: list[Row]
     solved: list[tuple[Any, Polynomial]] = field(default_factory=list)
-    bounds: dict[Any, Bounds] = field(default_factory=dict)
+    bounds: dict[Any, RationalBounds] = field(default_factory=dict)
 
 
-def reduce(constraints: Sequence[Constraint], normal_forms: NormalForms, ranges: Mapping[Any, Range]) -> Reduced | None:
+def reduce(constraints: Sequence[Constraint], normal_forms: NormalForms, ranges: Ranges) -> Reduced | None:
     """Say what is left of a question when its linear equations are solved; None where it has no answer."""
     try:
         reduced = Reduced([(normal_forms.of(c.expr), c.relation) for c in constraints])
@@ -57,7 +57,7 @@ def moved(p: Polynomial, reduced: Reduced, normal_forms: NormalForms) -> Polynom
     return p
 
 
-def _eliminate(reduced: Reduced, normal_forms: NormalForms, ranges: Mapping[Any, Range]) -> None:
+def _eliminate(reduced: Reduced, normal_forms: NormalForms, ranges: Ranges) -> None:
     reduced.rows = _kept(reduced.rows)
     while True:
         found = _solvable(reduced.rows, ranges)
@@ -71,7 +71,7 @@ def _eliminate(reduced: Reduced, normal_forms: NormalForms, ranges: Mapping[Any,
         reduced.rows = [row for row in rest if symbol not in row[0].names] + _kept(touched + limits)
 
 
-def _solvable(rows: list[Row], ranges: Mapping[Any, Range]) -> tuple[int, Any, Polynomial] | None:
+def _solvable(rows: list[Row], ranges: Ranges) -> tuple[int, Any, Polynomial] | None:
     """An equation and the name to solve it for: one without bounds of its own rather than time or an input."""
     best = None
     for index, (p, relation) in enumerate(rows):
@@ -99,7 +99,7 @@ def _single(p: Polynomial) -> Polynomial:
     return p
 
 
-def _limits(value: Polynomial, limits: Range) -> list[Row]:
+def _limits(value: Polynomial, limits: SearchRange) -> list[Row]:
     rows: list[Row] = []
     if limits.low is not None:
         rows.append((number(limits.low) - value, "<= 0"))

@@ -45,13 +45,16 @@ def positive(expr: Any) -> Constraint:
 
 
 @dataclass(frozen=True)
-class Range:
+class SearchRange:
     """What is known of a name's values: ends that hold for certain (None: without), and how far to look for points."""
 
     low: Any | None
     high: Any | None
     search: tuple[float, float]
     typical: float
+
+
+Ranges = Mapping[Any, SearchRange]  # by name
 
 
 @dataclass(frozen=True)

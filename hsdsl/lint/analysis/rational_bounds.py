@@ -10,19 +10,19 @@ from hsdsl.lint.analysis.polynomial import UNIT, Atom, Polynomial
 from hsdsl.lint.analysis.question import Relation
 from hsdsl.lint.analysis.straight_line_program import enclosure
 
-Bounds = tuple[Fraction | None, Fraction | None]  # None: without end
+RationalBounds = tuple[Fraction | None, Fraction | None]  # None: without end
 _SIGNED = {"sin": (-1, 1), "cos": (-1, 1), "tanh": (-1, 1), "exp": (0, None), "cosh": (1, None), "absolute": (0, None)}
 _SIGNED |= {"sign": (-1, 1)}
 
 
-def bounds_of(p: Polynomial, of_atom: Callable[[Atom], Bounds]) -> Bounds:
-    """Bounds of a polynomial from bounds of its atoms, term by term, exact."""
+def bounds_of(p: Polynomial, of_atom: Callable[[Atom], RationalBounds]) -> RationalBounds:
+    """RationalBounds of a polynomial from bounds of its atoms, term by term, exact."""
     low: Fraction | None = p.terms.get(UNIT, Fraction(0))
     high: Fraction | None = low
     for monomial, coefficient in p.terms.items():
         if not monomial:
             continue
-        term: Bounds = (Fraction(1), Fraction(1))
+        term: RationalBounds = (Fraction(1), Fraction(1))
         for atom, exponent in monomial:
             term = _times(term, _raised(of_atom(atom), exponent))
         first, last = term if coefficient > 0 else (term[1], term[0])
@@ -31,7 +31,7 @@ def bounds_of(p: Polynomial, of_atom: Callable[[Atom], Bounds]) -> Bounds:
     return low, high
 
 
-def _raised(base: Bounds, exponent: int) -> Bounds:
+def _raised(base: RationalBounds, exponent: int) -> RationalBounds:
     low, high = base
     if exponent < 0:
         if low is not None and low > 0:
@@ -54,7 +54,7 @@ def _raised(base: Bounds, exponent: int) -> Bounds:
     return Fraction(0), most
 
 
-def _times(left: Bounds, right: Bounds) -> Bounds:
+def _times(left: RationalBounds, right: RationalBounds) -> RationalBounds:
     corners: list[tuple[int, Fraction | None]] = []
     for i, a in enumerate(left):
         for j, b in enumerate(right):
@@ -77,7 +77,7 @@ def _end_sign(value: Fraction | None, end: int) -> int:
     return 1 if value > 0 else -1
 
 
-def holds(bounds: Bounds, relation: Relation) -> bool | None:
+def holds(bounds: RationalBounds, relation: Relation) -> bool | None:
     """Whether a sign is known to hold, or not to hold, within bounds; None where they do not say."""
     low, high = bounds
     if relation == "= 0":
@@ -92,12 +92,12 @@ def holds(bounds: Bounds, relation: Relation) -> bool | None:
     return None
 
 
-def of_constant(atom: Atom) -> Bounds:
-    """Bounds of an atom that has no name of its own: a constant, or the value of a function."""
+def of_constant(atom: Atom) -> RationalBounds:
+    """RationalBounds of an atom that has no name of its own: a constant, or the value of a function."""
     return enclosure(atom.head) or (None, None) if atom.kind == "constant" else _by_nature(atom)
 
 
-def _by_nature(atom: Atom) -> Bounds:
+def _by_nature(atom: Atom) -> RationalBounds:
     """What an atom's values always lie between."""
     if atom.kind == "root":
         return Fraction(0), None

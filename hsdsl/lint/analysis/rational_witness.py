@@ -9,11 +9,11 @@ from typing import Any
 
 from hsdsl.lint.analysis.elimination import Reduced
 from hsdsl.lint.analysis.polynomial import Atom, Polynomial, linear_in
-from hsdsl.lint.analysis.question import Range
-from hsdsl.lint.analysis.rational_bounds import Bounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.question import Ranges, SearchRange
+from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds, of_constant
 
 
-def point(reduced: Reduced, ranges: Mapping[Any, Range]) -> dict[Any, float] | None:
+def point(reduced: Reduced, ranges: Ranges) -> dict[Any, float] | None:
     """A point that satisfies everything, where trying a few values exactly finds one."""
     if any(relation == "= 0" for _, relation in reduced.rows):
         return None
@@ -28,7 +28,7 @@ def point(reduced: Reduced, ranges: Mapping[Any, Range]) -> dict[Any, float] | N
     return None
 
 
-def _inside(bounds: Bounds, limits: Range) -> Fraction:
+def _inside(bounds: RationalBounds, limits: SearchRange) -> Fraction:
     """A plain value within bounds, the typical one if it can be."""
     low, high = bounds
     typical = Fraction(limits.typical)
@@ -41,14 +41,14 @@ def _inside(bounds: Bounds, limits: Range) -> Fraction:
     return low + 1 if low is not None else high - 1 if high is not None else typical
 
 
-def _valued(p: Polynomial, values: Mapping[Any, Fraction]) -> Bounds:
-    def of_atom(atom: Atom) -> Bounds:
+def _valued(p: Polynomial, values: Mapping[Any, Fraction]) -> RationalBounds:
+    def of_atom(atom: Atom) -> RationalBounds:
         return (values[atom.head], values[atom.head]) if atom.kind == "name" else of_constant(atom)
 
     return bounds_of(p, of_atom)
 
 
-def _repair(p: Polynomial, values: dict[Any, Fraction], bounds: Mapping[Any, Bounds]) -> bool:
+def _repair(p: Polynomial, values: dict[Any, Fraction], bounds: Mapping[Any, RationalBounds]) -> bool:
     """Move one name so that a linear constraint holds with room to spare."""
     low, high = _valued(p, values)
     if low is None or high is None:
@@ -70,7 +70,7 @@ def _repair(p: Polynomial, values: dict[Any, Fraction], bounds: Mapping[Any, Bou
 
 def _complete(values: dict[Any, Fraction], reduced: Reduced) -> dict[Any, float] | None:
     """Put values into what was eliminated, last first."""
-    known: dict[Any, Bounds] = {s: (v, v) for s, v in values.items()}
+    known: dict[Any, RationalBounds] = {s: (v, v) for s, v in values.items()}
     for symbol, p in reversed(reduced.solved):
         low, high = bounds_of(p, lambda atom: known[atom.head] if atom.kind == "name" else of_constant(atom))
         if low is None or high is None or high - low > Fraction(1, 10**15) * (1 + abs(low)):

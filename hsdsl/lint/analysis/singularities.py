@@ -88,17 +88,18 @@ def breaks(expr: Any) -> tuple[Clause, ...] | None:
     jumping = discontinuities(expr)
     if jumping is None:
         return None
-    found = list(jumping)
-    for part in parts(expr):
-        if part.is_Pow and not (part.exp.is_Integer or part.base.is_number):
-            found.append((zero(part.base),))
-        elif isinstance(part, sp.log):
-            found.append((zero(part.args[0]),))
-        elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
-            found += [(zero(1 - part.args[0]),), (zero(1 + part.args[0]),)]
-        elif isinstance(part, sp.acosh):
-            found.append((zero(part.args[0] - 1),))
-    return tuple(found)
+    return (*jumping, *((zero(end),) for part in parts(expr) for end in _ends(part)))
+
+
+def _ends(part: Any) -> tuple[Any, ...]:
+    """What is positive inside the real domain of a root, a logarithm or an inverse function, and 0 at its end."""
+    if part.is_Pow:
+        return () if part.exp.is_Integer or part.base.is_number else (part.base,)
+    if isinstance(part, (sp.asin, sp.acos, sp.atanh)):
+        return 1 - part.args[0], 1 + part.args[0]
+    if isinstance(part, sp.acosh):
+        return (part.args[0] - 1,)
+    return part.args if isinstance(part, sp.log) else ()
 
 
 def kinks(expr: Any) -> Iterator[Part]:
@@ -135,32 +136,22 @@ def divisors(expr: Any) -> Iterator[Any]:
 def without_value(expr: Any) -> Iterator[Part]:
     """Where square roots, logarithms and inverse functions have no real value."""
     for part in parts(expr):
-        if part.is_Pow and not part.exp.is_Integer and not part.base.is_number:
-            name = "a square root" if abs(part.exp) == sp.Rational(1, 2) else "a power that is no whole number"
-            yield Part(part.base, name, ((negative(part.base),),))
-        elif isinstance(part, sp.log):
-            yield Part(part.args[0], "a logarithm", ((at_most_zero(part.args[0]),),))
-        elif isinstance(part, (sp.asin, sp.acos, sp.atanh)):
-            inside = part.args[0]
-            both = ((negative(1 - inside),), (negative(1 + inside),))
-            yield Part(inside, f"`{_name(part)}`", both)
-        elif isinstance(part, sp.acosh):
-            yield Part(part.args[0], "`acosh`", ((negative(part.args[0] - 1),),))
+        if ends := _ends(part):
+            outside = at_most_zero if isinstance(part, sp.log) else negative
+            name = _label(part, "a power that is no whole number")
+            yield Part(part.args[0], name, tuple((outside(end),) for end in ends))
 
 
 def infinite_slopes(expr: Any) -> Iterator[Part]:
-    """Where roots and inverse functions have an infinite slope."""
+    """Where roots and inverse functions have an infinite slope, unless what they are multiplied with vanishes there."""
     for part in parts(expr):
-        if part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1 and not part.base.is_number:
-            name = "a square root" if part.exp == sp.Rational(1, 2) else "a fractional power"
-            yield _steep(expr, part, part.base, name, (part.base,))
-        elif isinstance(part, (sp.asin, sp.acos)):
-            inside = part.args[0]
-            yield _steep(expr, part, inside, f"`{_name(part)}`", (1 - inside, 1 + inside))
-        elif isinstance(part, sp.acosh):
-            yield _steep(expr, part, part.args[0], "`acosh`", (part.args[0] - 1,))
+        steep = part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1
+        if (steep or isinstance(part, (sp.asin, sp.acos, sp.acosh))) and (ends := _ends(part)):
+            alternatives = tuple((zero(end), weight) for end in ends for weight in _weights(expr, part))
+            yield Part(part.args[0], _label(part, "a fractional power"), alternatives)
 
 
-def _steep(expr: Any, part: Any, inside: Any, name: str, ends: tuple[Any, ...]) -> Part:
-    """Where an argument is at an end, unless what the function is multiplied with vanishes there."""
-    return Part(inside, name, tuple((zero(end), w) for end in ends for w in _weights(expr, part)))
+def _label(part: Any, power: str) -> str:
+    if part.is_Pow:
+        return "a square root" if abs(part.exp) == sp.Rational(1, 2) else power
+    return "a logarithm" if isinstance(part, sp.log) else f"`{_name(part)}`"

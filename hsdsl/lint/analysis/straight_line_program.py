@@ -68,7 +68,7 @@ class StraightLine:
         return np.array(rows).reshape(len(rows), len(points))
 
     def over(self, low: Array, high: Array) -> Range:
-        """Bounds over boxes: arrays (n, symbols) to arrays (results, n)."""
+        """RationalBounds over boxes: arrays (n, symbols) to arrays (results, n)."""
         values: list[Range] = hull(low, high)
         with quiet():
             for operation in self._operations:
