@@ -44,8 +44,8 @@ def closest(name: str, candidates: Iterable[str]) -> str | None:
         return None
     import difflib  # few names are misspelt
 
-    found = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    return found[0] if found else None
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    return matches[0] if matches else None
 
 
 def _spelled(name: str) -> str:

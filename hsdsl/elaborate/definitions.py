@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 
-from hsdsl.elaborate.symbols import SymbolTable, Values, definition_order
+from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.names import did_you_mean, shown
 from hsdsl.schema import ParameterEntry
@@ -18,8 +18,8 @@ _ONLY_PARAMETERS = "a parameter is an expression of earlier parameters"
 
 def define_parameters(symbols: SymbolTable) -> tuple[Parameter, ...]:
     """Every parameter; what its name means goes to ``symbols.values``."""
-    refused: Values = {}
-    earlier: Values = {}
+    refused: Meanings = {}
+    earlier: Meanings = {}
     scope = Scope(ChainMap(refused, earlier, symbols.scope((), _ONLY_PARAMETERS, hint=_UNDER_LET).values))  # pyright: ignore[reportArgumentType]
     parameters: list[Parameter] = []
     for name in definition_order(symbols.document.parameters, "parameters", refused):
@@ -58,8 +58,8 @@ def _number(value: Value) -> str:
 def define_lets(symbols: SymbolTable) -> None:
     """The meaning of every top-level `let`, in ``symbols.values``: it may use states, and says which it used."""
     base = symbols.scope(("time", "parameters", "inputs", "states"), "").values
-    refused: Values = {}
-    earlier: Values = {}
+    refused: Meanings = {}
+    earlier: Meanings = {}
     scope = Scope(ChainMap(refused, earlier, base))  # pyright: ignore[reportArgumentType]
     for name in definition_order(symbols.document.let, "`let` names", refused):
         symbols.values[name] = earlier[name] = symbols.number(symbols.document.let[name], scope)

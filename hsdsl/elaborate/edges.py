@@ -21,11 +21,11 @@ def surface(resolver: ExpressionResolver, scalar: Scalar, scope: Scope, key: str
 
     ``when: L >= R`` ends the domain where L - R rises through 0; a wall ``L >= R`` where R - L does.
     """
-    found = resolver.inequality(scalar, scope, key)
-    if found is None:
+    sides = resolver.inequality(scalar, scope, key)
+    if sides is None:
         return None
-    left, right = found.left.expr, found.right.expr
-    greater = found.operator in (">", ">=")
+    left, right = sides.left.expr, sides.right.expr
+    greater = sides.operator in (">", ">=")
     residual = left - right if greater == (key == "when") else right - left
     return Surface(left, right, residual, scalar.value)
 

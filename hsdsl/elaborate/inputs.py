@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from hsdsl.elaborate.samples import read_samples
-from hsdsl.elaborate.symbols import SymbolTable, Values
+from hsdsl.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import Key, Scalar
@@ -18,25 +18,24 @@ from hsdsl.system import SampledInput
 def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
     """The sampled inputs; what the name of every input means goes to ``symbols.values``."""
     feedback = "write expressions of states under `let`, or in `flow` itself"
-    inputs, hint = symbols.document.inputs, "combine them under `let`"
-    refusals: Values = {
-        str(name): Refusal("HS117", f"'{name}' is an input; an input cannot use another input", hint) for name in inputs
+    names, hint = symbols.document.inputs, "combine them under `let`"
+    refusals: Meanings = {
+        str(name): Refusal("HS117", f"'{name}' is an input; an input cannot use another input", hint) for name in names
     }
     sentence = "an input is an expression of t and parameters"
     timed = symbols.scope(("time", "parameters"), sentence, refusals, hint=feedback)
     constant = symbols.scope(("parameters",), "samples are numbers or expressions of parameters")
-    found: list[SampledInput] = []
+    inputs: list[SampledInput] = []
     for name, entry in symbols.document.inputs.items():
         if isinstance(entry, Scalar):
             symbols.values[name] = symbols.number(entry, timed)
             continue
         symbols.values[name] = Value(symbol(name))
-        sampled = (
-            _file(symbols, name, entry) if isinstance(entry, InputFile) else _inline(symbols, name, entry, constant)
-        )
+        in_file = isinstance(entry, InputFile)
+        sampled = _file(symbols, name, entry) if in_file else _inline(symbols, name, entry, constant)
         if sampled is not None:
-            found.append(sampled)
-    return tuple(found)
+            inputs.append(sampled)
+    return tuple(inputs)
 
 
 def _file(symbols: SymbolTable, name: Key, entry: InputFile) -> SampledInput | None:

@@ -8,7 +8,7 @@ from collections import ChainMap
 from hsdsl.elaborate.edges import elaborate_edges, surface
 from hsdsl.elaborate.outputs import outputs_of
 from hsdsl.elaborate.resolver import all_of
-from hsdsl.elaborate.symbols import KINDS, SymbolTable, Values, definition_order
+from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.schema import ModeDocument
 from hsdsl.source import Key
@@ -53,8 +53,8 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
     """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
     states = frozenset(symbols.states[name])
     place = f"the mode '{name}'"
-    own: Values = {}
-    refused: Values = {}
+    own: Meanings = {}
+    refused: Meanings = {}
     scope = Scope(ChainMap(refused, own, symbols.values, symbols.elsewhere), states, place)  # pyright: ignore[reportArgumentType]
     for key in definition_order(document.let, "`let` names", refused):
         kind = symbols.names.get(key)

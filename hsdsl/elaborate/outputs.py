@@ -23,14 +23,14 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
     scope = symbols.scope(
         ("time", "parameters", "inputs", "states", "let"), "", {name: state(name) for name in symbols.inner_lets}
     )
-    found: dict[str, Value | None] = {}
+    outputs: dict[str, Value | None] = {}
     for name, scalar in symbols.document.outputs.items():
         _check_name(symbols, name)
-        found[name] = symbols.number(scalar, scope)
+        outputs[name] = symbols.number(scalar, scope)
     for mode in symbols.document.modes.values():
         for name in mode.outputs:
             _check_name(symbols, name)
-    return found
+    return outputs
 
 
 def _check_name(symbols: SymbolTable, name: Key) -> None:
@@ -41,9 +41,9 @@ def _check_name(symbols: SymbolTable, name: Key) -> None:
 
 def outputs_of(symbols: SymbolTable, shared: dict[str, Value | None], document: ModeDocument, scope: Scope) -> tuple:
     """The outputs of a mode, in the order of `SymbolTable.all_outputs`; None for one that it does not have."""
-    found = {name: _here(symbols, name, value, scope) for name, value in shared.items()}
-    found |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
-    values = (found.get(name) for name in symbols.all_outputs)
+    outputs = {name: _here(symbols, name, value, scope) for name, value in shared.items()}
+    outputs |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
+    values = (outputs.get(name) for name in symbols.all_outputs)
     return tuple(None if value is None else value.expr for value in values)
 
 

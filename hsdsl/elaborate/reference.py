@@ -75,7 +75,7 @@ class _Checker:
         return KnownState(self.number(state.time), mode, self.numbers(state.__pydantic_extra__))
 
     def numbers(self, given: dict[Key, Scalar]) -> dict[str, str]:
-        """Values of states and outputs."""
+        """Meanings of states and outputs."""
         columns = [*self.symbols.all_states(), *self.symbols.all_outputs]
         for key in given:
             self.known(key, key.place, "state or output", columns)

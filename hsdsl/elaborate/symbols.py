@@ -16,7 +16,7 @@ from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
 
 KINDS = {"parameters": "a parameter", "inputs": "an input", "states": "a state", "let": "a `let` name"}
-Values = dict[str, Value | Refusal | None]
+Meanings = dict[str, Value | Refusal | None]
 
 
 @dataclass
@@ -43,7 +43,7 @@ class SymbolTable:
     resolver: ExpressionResolver
     files: ModelFiles
     names: dict[str, str] = field(default_factory=dict)
-    values: Values = field(default_factory=dict)
+    values: Meanings = field(default_factory=dict)
     states: dict[str, tuple[str, ...]] = field(default_factory=dict)
     undeclared: frozenset[str] = frozenset()
     scopes: dict[str, Scope] = field(default_factory=dict)
@@ -74,14 +74,14 @@ class SymbolTable:
         return [key for key in given if closest(key, map(str, mode.flow)) is None]
 
     def scope(
-        self, usable: tuple[str, ...], sentence: str, values: Values | None = None, hint: str | None = None
+        self, usable: tuple[str, ...], sentence: str, values: Meanings | None = None, hint: str | None = None
     ) -> Scope:
         """A scope with names of some kinds; the others are refused with a sentence and a hint."""
 
         def refusal(name: str, kind: str) -> Refusal:
             return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
 
-        known: Values = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
+        known: Meanings = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
         for name, kind in self.names.items():
             if kind not in usable:
                 known[name] = refusal(name, KINDS[kind])
@@ -131,7 +131,7 @@ class SymbolTable:
         return frozenset(str(key) for mode in self.document.modes.values() for key in mode.let)
 
     @cached_property
-    def elsewhere(self) -> Values:
+    def elsewhere(self) -> Meanings:
         """Refusals of those names for modes that do not define them."""
         hint = "give it to this mode too, or define it once in the `let` of the whole model"
         return {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
@@ -141,7 +141,7 @@ class SymbolTable:
         return mode.final and mode.flow is None
 
 
-def definition_order(keys: Iterable[Key], kind: str, refused: Values) -> Iterator[Key]:
+def definition_order(keys: Iterable[Key], kind: str, refused: Meanings) -> Iterator[Key]:
     """The names of definitions that may use earlier ones only.
 
     ``refused`` holds, at a name's turn, refusals of it and of those below, and in the end nothing.

@@ -240,12 +240,19 @@ def _outputs(execution: Execution, at: _Places, values: Array) -> Array:
 
 def _by_name(execution: Execution, at: _Places, values: Array) -> tuple[Array, Array]:
     """Sort the states into one column a name, and say where a mode has them."""
-    names, table = execution.states, execution.arc_table
+    table = execution.arc_table
+    return columns_by_name(values, table.layout[at.arc], table.layouts, execution.states)
+
+
+def columns_by_name(
+    values: Array, layout: Array, layouts: Sequence[tuple[str, ...]], names: tuple[str, ...]
+) -> tuple[Array, Array]:
+    """Sort rows of states, each of a layout, into one column a name; also where a row has the state."""
     columns = np.full((len(values), len(names)), float("nan"), dtype=values.dtype)
     present = np.zeros(columns.shape, dtype=bool)
-    for number, layout in enumerate(table.layouts):
-        here = table.layout[at.arc] == number
-        for i, name in enumerate(layout):
+    for number, states in enumerate(layouts):
+        here = layout == number
+        for i, name in enumerate(states):
             columns[here, names.index(name)] = values[here, i]
             present[here, names.index(name)] = True
     return columns, present

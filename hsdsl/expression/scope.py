@@ -76,7 +76,7 @@ class Scope:
 
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
-        found: list[ExpressionError] = []
+        faults: list[ExpressionError] = []
         end = 0
         for node in walk(tree):
             if node.start < end:
@@ -87,9 +87,9 @@ class Scope:
             elif isinstance(node, Call):
                 fault = self._call(node)
                 end = node.end if fault and timed(node.function, None) else end  # its units mean nothing here
-            if fault and fault.message not in [other.message for other in found]:
-                found.append(fault)
-        return found
+            if fault and fault.message not in [other.message for other in faults]:
+                faults.append(fault)
+        return faults
 
     def broken(self, tree: Tree) -> bool:
         """Whether a name in it has a definition that is reported already."""

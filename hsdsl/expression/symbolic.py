@@ -96,9 +96,9 @@ class _Builder:
         """A constant, or what the scope has."""
         if tree.name in CONSTANTS:
             return Value(CONSTANTS[tree.name], numeric.PI, True)
-        found = self.scope.values[tree.name]
-        assert isinstance(found, Value)
-        return found
+        value = self.scope.values[tree.name]
+        assert isinstance(value, Value)
+        return value
 
     def sum(self, tree: syntax.Sum) -> Value:
         """Terms added; the common denominator is measured first."""

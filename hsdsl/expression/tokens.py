@@ -38,17 +38,17 @@ def tokenize(text: str, expected: Expected) -> list[Token]:
     if len(text) > LONGEST:
         message = f"the expression has {len(text):,} characters; the most is {LONGEST:,}"
         raise ExpressionError("HS110", message, 0, 1, "name its parts under `let`")
-    found: list[Token] = []
+    tokens: list[Token] = []
     at = 0
     while at < len(text):
         if text[at].isspace():
             at += 1
             continue
         token = _number(text, at) or _name(text, at) or _operator(text, at, expected)
-        found.append(token)
+        tokens.append(token)
         at = token.end
-    found.append(Token("end", "", len(text), len(text)))
-    return found
+    tokens.append(Token("end", "", len(text), len(text)))
+    return tokens
 
 
 def _number(text: str, at: int) -> Token | None:

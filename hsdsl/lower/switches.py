@@ -61,8 +61,8 @@ class Switches:
         return self._done[expr]
 
     def _of_time(self, expr: sp.Basic) -> bool:
-        found = expr.free_symbols
-        return bool(found & self.moving) and found <= self.moving | self.known | set(self.symbols)
+        names = expr.free_symbols
+        return bool(names & self.moving) and names <= self.moving | self.known | set(self.symbols)
 
     def number(self, kind: str, argument: sp.Expr, jumps: bool = False) -> sp.Expr:
         """The number of a switch: the floor or the sign of its argument."""

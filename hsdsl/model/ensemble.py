@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -15,10 +15,11 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Ensemble, Execution
+from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.options import KEYS, Options, check_arguments, overrides_of
 from hsdsl.model.settings import check_memory, setting_columns, whole
-from hsdsl.model.values import Columns, evaluate_parameters, initial_columns
-from hsdsl.model.workers import Progress, Recorder, run_compiled, run_in_turn
+from hsdsl.model.values import InstanceTable, evaluate_parameters, initial_columns
+from hsdsl.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
 from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept
 from hsdsl.simulate.state_layouts import StateLayouts
@@ -142,7 +143,7 @@ class PreparedEnsemble:
     model: Model
     request: EnsembleRequest
     base: Prepared
-    columns: Columns
+    columns: InstanceTable
     places: list[int]
     instances: Instances
     kinds: list[tuple[str, ...]]
@@ -167,7 +168,7 @@ class PreparedEnsemble:
         if plan is None:
             modes = [mode.name for mode in program.modes]
             again = [partial(self.again.numbered, place) for place in self.places]
-            run_in_turn(again, Recorder(self.instances, kept, self.names, self.kinds, modes), progress)
+            run_in_turn(again, ArrayRecorder(self.instances, kept, self.names, self.kinds, modes), progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
@@ -184,11 +185,12 @@ class PreparedEnsemble:
             full[self.places] = array
             return full.reshape((*shape, *array.shape[1:]))
 
-        def columns(arrays: Iterator[tuple[str, Array]]) -> dict[str, Array]:
+        def columns(arrays: Iterable[tuple[str, Array]]) -> dict[str, Array]:
             return {name: placed(column, math.nan) for name, column in arrays}
 
         sampled = [(name, kept.states[:, i]) for i, name in enumerate(self.names)]
         sampled += [(name, kept.results[:, :, i]) for i, name in enumerate(program.outputs)]
+        final, _ = columns_by_name(kept.final, kept.kind, self.kinds, self.names)
         modes = np.array([*(mode.name for mode in program.modes), ""])
         refused = self.columns.refused.items()
         return Ensemble(
@@ -202,26 +204,16 @@ class PreparedEnsemble:
             stop=placed(kept.stop, "refused"),
             time=placed(kept.ended, math.nan),
             mode=placed(modes[kept.mode], ""),
-            state=columns(self._final_states(kept)),
+            state=columns(zip(self.names, final.T, strict=True)),
             outputs=columns((name, kept.outputs[:, i]) for i, name in enumerate(program.outputs)),
             transitions=placed(kept.transitions, 0),
             transition_times=placed(kept.crossed, math.nan),
             sample_times=placed(self.instances.time, math.nan),
-            samples=columns(iter(sampled if self.instances.time.shape[1] else [])),
+            samples=columns(sampled if self.instances.time.shape[1] else ()),
             seconds={"simulate": seconds},
             refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
             again=self.again,
         )
-
-    def _final_states(self, kept: Kept) -> Iterator[tuple[str, Array]]:
-        """The final states by name; their columns depend on the mode."""
-        for name in self.names:
-            column = np.full(len(self.places), math.nan)
-            for number, kind in enumerate(self.kinds):
-                if name in kind:
-                    here = kept.kind == number
-                    column[here] = kept.final[here, kind.index(name)]
-            yield name, column
 
 
 def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
@@ -231,7 +223,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     """
     pipeline, call = model.pipeline, request.call
     values = pipeline.values(FLOAT64)
-    columns = Columns(values, [()] * math.prod(request.shape))
+    columns = InstanceTable(values, [()] * math.prod(request.shape))
     evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
     first = next((k for k in range(len(columns.rows)) if k not in columns.refused), None)
     if first is None:
@@ -254,7 +246,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
 
 
-def _settings(columns: Columns, base: Settings, options: Options) -> dict[int, Settings]:
+def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[int, Settings]:
     """The settings of every instance that can be run, by its number."""
     rows = enumerate(setting_columns(options, columns))
     kept: Mapping[int, dict[str, Any]] = {k: row for k, row in rows if k not in columns.refused}

@@ -17,19 +17,19 @@ def guard_lines(values: Values) -> list[GuardLine]:
     """Return the level of every guard and wall that compares one state with parameters."""
     system = values.system
     parameters = set(system.parameter_symbols)
-    found: list[tuple[str, str, sp.Expr, str]] = []
+    lines: list[tuple[str, str, sp.Expr, str]] = []
     for mode in system.modes:
         states = {symbol(name): name for name in mode.states}
         labelled = [(edge.surface, edge.name) for edge in mode.edges] + [(wall, wall.text) for wall in mode.walls]
         for surface, label in labelled:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
                 if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters:
-                    found.append((mode.name, states[side], level, label))
-    if not found:
+                    lines.append((mode.name, states[side], level, label))
+    if not lines:
         return []
-    routines = lower_expressions(system, {f"level_{k}": level for k, (_, _, level, _) in enumerate(found)})
+    routines = lower_expressions(system, {f"level_{k}": level for k, (_, _, level, _) in enumerate(lines)})
     levels = compile_routines(routines, values.kernel.arithmetic, "levels")()
     return [
         GuardLine(mode, state, float(level(*values.parameters)[0]), label)
-        for (mode, state, _, label), level in zip(found, levels, strict=True)
+        for (mode, state, _, label), level in zip(lines, levels, strict=True)
     ]

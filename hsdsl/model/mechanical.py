@@ -53,7 +53,7 @@ def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
     if mode.flow[position] != v:
         raise _refusal(f"the derivative of {x} is not {v}")
     residual, acceleration = edge.surface.residual, mode.flow[1 - position]
-    found = {
+    expressions = {
         "slope": residual.diff(x),
         "offset": residual.subs({x: 0}),
         "stiffness": sp.expand(-acceleration.diff(x)),
@@ -61,14 +61,14 @@ def _structure(system: HybridSystem) -> tuple[int, dict[str, sp.Expr]]:
         "restitution": -edge.reset[1 - position].diff(v),
     }
     for name, what in (("stiffness", x), ("drag", v)):
-        if not found[name].free_symbols <= known:
+        if not expressions[name].free_symbols <= known:
             raise _refusal(f"the acceleration does not have a constant coefficient of {what}")
     if edge.reset[position] != x:
         raise _refusal(f"the reset changes {x}")
-    remainder = sp.expand(edge.reset[1 - position] + found["restitution"] * v)
-    if remainder != 0 or not found["restitution"].free_symbols <= known:
+    remainder = sp.expand(edge.reset[1 - position] + expressions["restitution"] * v)
+    if remainder != 0 or not expressions["restitution"].free_symbols <= known:
         raise _refusal(f"the reset of {v} is not a constant times {v}")
-    return position, found
+    return position, expressions
 
 
 def _only(system: HybridSystem) -> tuple[Mode, Edge]:
@@ -100,12 +100,12 @@ def _position(edge: Edge, symbols: list[sp.Symbol], known: set[sp.Symbol]) -> in
 def _evaluate(values: Values, expressions: dict[str, sp.Expr]) -> dict[str, Number]:
     arithmetic = values.kernel.arithmetic
     routines = compile_routines(lower_expressions(values.system, expressions), arithmetic, "one_stop")()
-    found: dict[str, Number] = {}
+    numbers: dict[str, Number] = {}
     for name, routine in zip(expressions, routines, strict=True):
         try:
-            found[name] = routine(*values.parameters)[0]
+            numbers[name] = routine(*values.parameters)[0]
         except DOMAIN_ERRORS:
-            found[name] = arithmetic.functions["nan"]
-        if not arithmetic.isfinite(found[name]):
+            numbers[name] = arithmetic.functions["nan"]
+        if not arithmetic.isfinite(numbers[name]):
             raise _refusal(f"its {name} has no finite value")
-    return found
+    return numbers

@@ -34,10 +34,10 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
 def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], options: Options) -> dict[str, Any]:
     """The overrides of a run, by the names of `--set`, each value as it was written."""
     given = {key: option.value for key, option in options.values.items() if option.origin not in (FILE, DEFAULT)}
-    found = dict(parameters)
+    overrides = dict(parameters)
     for group, values in (("initial", initial), ("experiment", given)):
-        found |= {f"{group}.{name}": value for name, value in values.items()}
-    return {name: _written(value) for name, value in found.items()}
+        overrides |= {f"{group}.{name}": value for name, value in values.items()}
+    return {name: _written(value) for name, value in overrides.items()}
 
 
 def _written(value: Any) -> Any:

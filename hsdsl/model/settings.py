@@ -14,7 +14,7 @@ from hsdsl.errors import UsageError
 from hsdsl.integrators import AUTO, Method, TaylorMethod
 from hsdsl.limits import current
 from hsdsl.model.options import DEFAULT, FILE, SCALE, Options
-from hsdsl.model.values import Columns, Values
+from hsdsl.model.values import InstanceTable, Values
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
@@ -55,7 +55,7 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
     )
 
 
-def setting_columns(options: Options, columns: Columns) -> list[dict[str, Any]]:
+def setting_columns(options: Options, columns: InstanceTable) -> list[dict[str, Any]]:
     """The numbers of the settings of every instance, by their names in `Settings`."""
     scales = [name for name in options.values if name.startswith(SCALE)]
     names = ("until", "max_transitions", "relaxation", options.size, *scales)
@@ -73,7 +73,7 @@ def setting_columns(options: Options, columns: Columns) -> list[dict[str, Any]]:
     return rows
 
 
-def _column(options: Options, columns: Columns, name: str) -> Sequence[Number]:
+def _column(options: Options, columns: InstanceTable, name: str) -> Sequence[Number]:
     option, program = options.values[name], columns.values.program
     state = name.removeprefix(SCALE)
     if state != name and state not in program.all_states:

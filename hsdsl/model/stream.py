@@ -15,6 +15,7 @@ import numpy as np
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Samples, Stop
 from hsdsl.execution.samples import split
+from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.options import check_arguments
 from hsdsl.model.settings import whole
 from hsdsl.program import Program
@@ -94,13 +95,7 @@ class Rows:
         return {name: chunk[name].copy() for name in ("times", "values", "outputs")} | places
 
     def _table(self, rows: dict[str, Array]) -> Samples:
-        columns = np.full((len(rows["times"]), len(self._names)), float("nan"))
-        present = np.zeros(columns.shape, dtype=bool)
-        for number, layout in enumerate(self._layouts.kinds):
-            here = rows["kind"] == number
-            for i, name in enumerate(layout):
-                columns[here, self._names.index(name)] = rows["values"][here, i]
-                present[here, self._names.index(name)] = True
+        columns, present = columns_by_name(rows["values"], rows["kind"], self._layouts.kinds, self._names)
         return Samples(
             time=rows["times"],
             mode=np.array([mode.name for mode in self._program.modes])[rows["mode"]],

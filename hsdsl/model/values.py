@@ -90,13 +90,13 @@ class Values:
         """Whether the file gives this constant."""
         return self.kernel.has_constant(name)
 
-    def alone(self) -> Columns:
+    def alone(self) -> InstanceTable:
         """A table of one instance, which refuses by an exception."""
-        return Columns(self, [self.parameters], strict=True)
+        return InstanceTable(self, [self.parameters], strict=True)
 
 
 @dataclass
-class Columns:
+class InstanceTable:
     """Numbers of instances; ``rows`` has their parameters.
 
     ``refused`` has the instances without numbers, and why; with ``strict`` a refusal is an exception.
@@ -154,12 +154,14 @@ def _attempt(routine: Routine, row: Row) -> Row:
 
 def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
     """The values of a single run with these overrides."""
-    columns = Columns(values, [()], strict=True)
+    columns = InstanceTable(values, [()], strict=True)
     evaluate_parameters(columns, overrides, {})
     return replace(values, parameters=columns.rows[0])
 
 
-def evaluate_parameters(columns: Columns, shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]) -> None:
+def evaluate_parameters(
+    columns: InstanceTable, shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
+) -> None:
     """Evaluate the parameters in file order, derived ones anew, and check the bounds of the file."""
     values = columns.values
     program = values.program
@@ -225,16 +227,16 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
 
 
 def initial_columns(
-    columns: Columns, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
+    columns: InstanceTable, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
 ) -> list[Sequence[Number]]:
     """The initial value of each state, of every instance."""
     in_file = columns.constant("initial", "initial")
     numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False))
-    found: list[Sequence[Number]] = []
+    initial: list[Sequence[Number]] = []
     for name in states:
         what = f"initial.{name}"
         if name in varied:
-            found.append(columns.given(varied[name], what))
+            initial.append(columns.given(varied[name], what))
         else:
-            found.append(columns.expression(shared[name], what) if name in shared else numbers[name])
-    return found
+            initial.append(columns.expression(shared[name], what) if name in shared else numbers[name])
+    return initial

@@ -76,7 +76,7 @@ def run_in_turn(
 
 
 @dataclass(frozen=True, eq=False)
-class Recorder:
+class ArrayRecorder:
     """Arrays for executions; ``kinds`` are the layouts of states, ``modes`` and ``names`` those of the model."""
 
     instances: Instances

@@ -18,7 +18,7 @@ from hsdsl.schema.recovery import recover
 from hsdsl.schema.spelling import correct_spelling
 from hsdsl.schema.suggestions import key_meant, missing_key_hint, part_of_transition, path_meant, unknown_key_hint
 from hsdsl.schema.value_suggestions import assigned, undifferentiated
-from hsdsl.source import Mapping, Node, Path, Scalar, Sequence, SourceRange, descend, keys
+from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange, descend, keys
 
 _MOST_READINGS = 8
 _TAG = re.compile(r"<(?:expression|mapping|list|samples|file)>|function-\w+\[.*")  # of a union; no key in the file
@@ -90,7 +90,7 @@ def _key_meant(root: Node, fault: ErrorDetails) -> str | None:
     return key_meant(str(path[-1]), keys_of(*_pattern(path[:-1])), descend(root, _untagged(path[:-1])))
 
 
-def _target(root: Node, fault: ErrorDetails, meant: str | None) -> Path:
+def _target(root: Node, fault: ErrorDetails, meant: str | None) -> NodePath:
     """The path that a fault's key is taken for: with another name, or in another mapping."""
     path = fault["loc"]
     if fault["type"] != "extra_forbidden" or meant is not None:
@@ -98,7 +98,7 @@ def _target(root: Node, fault: ErrorDetails, meant: str | None) -> Path:
     return path_meant(root, str(path[-1]), descend(root, _untagged(path)))
 
 
-def _is_part(root: Node, path: Path) -> bool:
+def _is_part(root: Node, path: NodePath) -> bool:
     """Whether a missing key is reported already: a dash too many makes two transitions of one."""
     match path:
         case ("modes", mode, "transitions", int(index), key):
@@ -129,7 +129,7 @@ def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:
     return place.diagnostic(code, message, hint)
 
 
-def _unknown_key(root: Node, path: Path) -> Diagnostic:
+def _unknown_key(root: Node, path: NodePath) -> Diagnostic:
     key, fields = str(path[-1]), keys_of(*_pattern(path[:-1]))
     meant = key_meant(key, fields, descend(root, _untagged(path[:-1])))
     message = f"unknown key '{shown(key)}' in {_description(path[:-1])}"
@@ -137,7 +137,7 @@ def _unknown_key(root: Node, path: Path) -> Diagnostic:
     return _find(root, path, key=True).diagnostic("HS201", message, hint)
 
 
-def _missing_key(root: Node, path: Path) -> Diagnostic:
+def _missing_key(root: Node, path: NodePath) -> Diagnostic:
     above = _untagged(path[:-1])
     place = _find(root, path[:-1], key=True)
     span = place.span
@@ -156,7 +156,7 @@ def _missing_key(root: Node, path: Path) -> Diagnostic:
     return place.text.diagnostic("HS202", message, span, hint)
 
 
-def _untagged(path: Path) -> Path:
+def _untagged(path: NodePath) -> NodePath:
     return tuple(step for step in path if isinstance(step, int) or not _TAG.fullmatch(step))
 
 
@@ -164,22 +164,22 @@ def _trimmed(pattern: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(step for step in pattern if not step.startswith("<"))
 
 
-def _description(path: Path) -> str:
+def _description(path: NodePath) -> str:
     return _DESCRIPTIONS[_trimmed(_pattern(path))]
 
 
-def _pattern(path: Path) -> tuple[str, ...]:
+def _pattern(path: NodePath) -> tuple[str, ...]:
     """The kind of mapping at a path: a key of :data:`SHAPES`."""
     names = _untagged(path)
     exact = (pattern for pattern in SHAPES if _fits(pattern, path))
     return next(exact, None) or next((pattern for pattern in SHAPES if _fits(_trimmed(pattern), names)), ())
 
 
-def _fits(pattern: tuple[str, ...], path: Path) -> bool:
+def _fits(pattern: tuple[str, ...], path: NodePath) -> bool:
     return len(pattern) == len(path) and all(p in ("*", step) for p, step in zip(pattern, path, strict=True))
 
 
-def _find(root: Node, path: Path, key: bool = False) -> SourceRange:
+def _find(root: Node, path: NodePath, key: bool = False) -> SourceRange:
     """The place of a value, or of its key; of the nearest node above it that exists."""
     node, place = root, root.place
     for number, step in enumerate(path):

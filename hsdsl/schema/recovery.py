@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsdsl.schema.value_suggestions import assigned
-from hsdsl.source import Key, Mapping, Node, Path, Scalar, Sequence, SourceRange, absent, descend, is_empty
+from hsdsl.source import Key, Mapping, Node, NodePath, Scalar, Sequence, SourceRange, absent, descend, is_empty
 
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",))
 _CONTAINERS = ("parameters", "inputs", "let", "modes", "outputs", "flow", "initial", "experiment")
@@ -11,7 +11,7 @@ _OF_AN_INPUT = ("times", "values", "file")  # an input that lacks one is dropped
 _INDISPENSABLE = ("modes", "initial", "experiment")
 
 
-def recover(root: Node, path: Path, fault: str, meant: str | None, target: Path = ()) -> bool:
+def recover(root: Node, path: NodePath, fault: str, meant: str | None, target: NodePath = ()) -> bool:
     """Take one fault out of the nodes, in place; False where nothing sensible would be left.
 
     Parameters
@@ -84,7 +84,7 @@ def _after_equals(place: SourceRange, key: str, text: str) -> Scalar:
     return Scalar(text, True, own)
 
 
-def _moved(root: Node, parent: Node | None, key: str, target: Path) -> bool:
+def _moved(root: Node, parent: Node | None, key: str, target: NodePath) -> bool:
     above = descend(root, target[:-1]) if target else None
     if above is not None and is_empty(above) and isinstance(root, Mapping):
         name = str(target[0])
@@ -98,7 +98,7 @@ def _moved(root: Node, parent: Node | None, key: str, target: Path) -> bool:
     return True
 
 
-def _dropped(root: Node, path: Path) -> bool:
+def _dropped(root: Node, path: NodePath) -> bool:
     parent = descend(root, path[:-1])
     return isinstance(parent, Mapping) and parent.entries.pop(str(path[-1]), None) is not None
 

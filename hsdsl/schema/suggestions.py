@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 
 from hsdsl.names import closest
 from hsdsl.schema.documents import keys_of
-from hsdsl.source import Key, Mapping, Node, Path, Sequence, child, is_empty, keys
+from hsdsl.source import Key, Mapping, Node, NodePath, Sequence, child, is_empty, keys
 
 _OF_OTHERS = {
     "when": "guard trigger event on condition",
@@ -100,7 +100,7 @@ def _home(key: str) -> tuple[str, ...] | None:
     return next((pattern for pattern, _ in _HOMES if key in keys_of(*pattern)), None)
 
 
-def path_meant(root: Node, key: str, value: Node | None) -> Path:
+def path_meant(root: Node, key: str, value: Node | None) -> NodePath:
     """The path that a key in the wrong place belongs to, if there is one and it is free; else an empty one."""
     pattern = ("modes",) if _is_a_mode(value) else _home(key)
     if not isinstance(root, Mapping) or pattern not in (("modes",), ("experiment",)):

@@ -20,17 +20,17 @@ _AND = re.compile(r"\s+and\s+|\s*(?:,|&&)\s*")
 def assigned(text: str) -> tuple[str, str] | None:
     """The name and the value of ``x = 1``, ``x := 1``, ``x' = 1``, ``der(x) = 1`` or ``reinit(x, 1)``."""
     short = len(text) < _LONGEST
-    found = (_ASSIGNMENT.fullmatch(text) or _REINIT.fullmatch(text)) if short else None
-    if not found:
+    match = (_ASSIGNMENT.fullmatch(text) or _REINIT.fullmatch(text)) if short else None
+    if not match:
         return None
-    *names, value = found.groups()
+    *names, value = match.groups()
     return next(name for name in names if name), (value or "").strip()
 
 
 def undifferentiated(key: str) -> str | None:
     """The state that ``x'``, ``dx/dt`` or ``der(x)`` is the derivative of, also the second."""
-    found = (_DERIVATIVE.fullmatch(key) or _SECOND.fullmatch(key)) if len(key) < _LONGEST else None
-    return next(part for part in found.groups() if part) if found else None
+    match = (_DERIVATIVE.fullmatch(key) or _SECOND.fullmatch(key)) if len(key) < _LONGEST else None
+    return next(part for part in match.groups() if part) if match else None
 
 
 def as_name(key: str) -> str:
@@ -120,8 +120,8 @@ def _braces(items: list[Any]) -> str | None:
         match item:
             case {**entries} if all(isinstance(inner, Scalar) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
                 texts += [f"{key}: {inner.value}" for key, inner in cast(dict[str, Scalar], entries).items()]
-            case Scalar(value=text) if found := assigned(text):
-                texts.append(": ".join(found))
+            case Scalar(value=text) if equation := assigned(text):
+                texts.append(": ".join(equation))
             case _:
                 return None
     return f"write {{{shown(', '.join(texts))}}}"

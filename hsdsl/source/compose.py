@@ -83,16 +83,16 @@ class _Composer:
             self._tag(event)
         self._grow(event, 1, 1)
         if isinstance(event, yaml.ScalarEvent):
-            found: tuple[Node, int, int] = (self._scalar(event), 1, 1)
-            if anchor is not None and found[0].plain:  # pyright: ignore[reportAttributeAccessIssue]
+            measured: tuple[Node, int, int] = (self._scalar(event), 1, 1)
+            if anchor is not None and measured[0].plain:  # pyright: ignore[reportAttributeAccessIssue]
                 self.unused[anchor] = event
         else:
             self.depth += 1
-            found = self._sequence(event) if isinstance(event, yaml.SequenceStartEvent) else self._mapping(event)
+            measured = self._sequence(event) if isinstance(event, yaml.SequenceStartEvent) else self._mapping(event)
             self.depth -= 1
         if anchor is not None:
-            self.anchors[anchor] = found
-        return found
+            self.anchors[anchor] = measured
+        return measured
 
     def _scalar(self, event: Any) -> Scalar:
         if event.tag is not None:

@@ -114,13 +114,13 @@ class Mapping:
         """Give an entry another name, and another value if there is one, in its place."""
         entries = list(self.entries.items())
         self.entries.clear()
-        for old, (found, node) in entries:
-            renamed = (Key.at(name, found.place), node if value is None else value)
-            self.entries[name if old == key else old] = renamed if old == key else (found, node)
+        for old, (kept, node) in entries:
+            renamed = (Key.at(name, kept.place), node if value is None else value)
+            self.entries[name if old == key else old] = renamed if old == key else (kept, node)
 
 
 Node = Scalar | Sequence | Mapping
-Path = tuple[int | str, ...]  # keys and indices from the root to a node
+NodePath = tuple[int | str, ...]  # keys and indices from the root to a node
 ABSENT = "\0"  # the value of a scalar in place of one already reported; no text can contain it, written or escaped
 
 
@@ -152,7 +152,7 @@ def keys(node: Node | None) -> list[Key]:
     return [key for key, _ in node] if isinstance(node, Mapping) else []
 
 
-def descend(root: Node, path: Path) -> Node | None:
+def descend(root: Node, path: NodePath) -> Node | None:
     """The node at the end of a path, if there is one."""
     node: Node | None = root
     for step in path:

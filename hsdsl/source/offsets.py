@@ -13,43 +13,43 @@ def positions(raw: str, length: int, value: str) -> list[int]:
     if raw == value:
         return list(range(length + 1))
     if raw.startswith('"'):
-        found = _double_quoted(raw)
+        offsets = _double_quoted(raw)
     elif raw.startswith("'"):
-        found = _single_quoted(raw)
+        offsets = _single_quoted(raw)
     else:
-        found = []
-    if len(found) == length + 1:
-        return found
+        offsets = []
+    if len(offsets) == length + 1:
+        return offsets
     return _aligned(raw, value)
 
 
 def _single_quoted(raw: str) -> list[int]:
-    found: list[int] = []
+    offsets: list[int] = []
     at = 1
     while at < len(raw) - 1:
-        found.append(at)
+        offsets.append(at)
         at += 2 if raw[at] == "'" else 1
-    return [*found, len(raw) - 1]
+    return [*offsets, len(raw) - 1]
 
 
 def _double_quoted(raw: str) -> list[int]:
-    found: list[int] = []
+    offsets: list[int] = []
     at = 1
     while at < len(raw) - 1:
-        found.append(at)
+        offsets.append(at)
         at += 2 + _ESCAPE_LENGTHS.get(raw[at + 1], 0) if raw[at] == "\\" else 1
-    return [*found, len(raw) - 1]
+    return [*offsets, len(raw) - 1]
 
 
 def _aligned(raw: str, value: str) -> list[int]:
     """Match the visible characters one after the other: folding changes blanks alone."""
     at = raw.find("\n") + 1 if raw[:1] in ("|", ">") else 0
-    found: list[int] = []
+    offsets: list[int] = []
     last = at
     for character in value:
         if not character.isspace():
             here = raw.find(character, at)
             if here >= 0:
                 last, at = here, here + 1
-        found.append(last)
-    return [*found, min(last + 1, len(raw))]
+        offsets.append(last)
+    return [*offsets, min(last + 1, len(raw))]

@@ -93,15 +93,15 @@ def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> 
         hint = "remove it, or quote the value it belongs to"
         return text.fault("HS004", "this is not valid YAML from here on", line, column, hint)
     content = text.lines[line - 1] if line <= len(text.lines) else ""
-    found, below = _character(text, line, column), line != opened[0]
+    sign, below = _character(text, line, column), line != opened[0]
     outdented = not content[: column - 1].strip() and column <= _indent(text.lines[opened[0] - 1]) + 1
-    if column > len(content) or (below and (found == ":" or outdented)):
+    if column > len(content) or (below and (sign == ":" or outdented)):
         message = f"the `{bracket}` that opens here is never closed"
         return text.fault("HS004", message, *opened, f"close it with `{closing}`")
-    message = f"YAML cannot read on at `{found}` inside `{bracket}` and `{closing}`"
-    hint = f"{_QUOTE} if `{found}` belongs to one"
+    message = f"YAML cannot read on at `{sign}` inside `{bracket}` and `{closing}`"
+    hint = f"{_QUOTE} if `{sign}` belongs to one"
     name = _LAST_WORD.search(content, max(0, column - _FAR), column - 1)
-    if found == ":" and name:
+    if sign == ":" and name:
         hint = f"write a comma before `{name.group(1)}`, or quote the expression that `:` belongs to"
     return text.fault("HS007", message, line, column, hint)
 
@@ -137,12 +137,12 @@ def _without_colon(text: Text, line: int) -> Diagnostic | None:
 
 def _with_colon(content: str) -> str:
     """The hint for a line that should have been a key with its value."""
-    found = _NO_SPACE.fullmatch(content)
-    if found:
-        return f"write a space after the colon: {shown(': '.join(found.groups()))}"
-    found = _EQUATION.fullmatch(content)
-    if found:
-        return f"write {shown(': '.join(part for part in found.groups() if part))}"
+    match = _NO_SPACE.fullmatch(content)
+    if match:
+        return f"write a space after the colon: {shown(': '.join(match.groups()))}"
+    match = _EQUATION.fullmatch(content)
+    if match:
+        return f"write {shown(': '.join(part for part in match.groups() if part))}"
     return _COLON
 
 
@@ -178,8 +178,8 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
     if remark and content[: remark.start()].rstrip()[-1:] in ("", "}", "]"):
         message, length = f"`{remark.group()}` begins no comment", len(remark.group())
         return text.fault("HS004", message, line, remark.start() + 1, "write `#` before it", length)
-    found = _VALUE.match(content)
-    start = found.start("value") if found else column - 1
+    match = _VALUE.match(content)
+    start = match.start("value") if match else column - 1
     first = content[start : start + 1]
     if start >= column or first not in _MEANS:
         start, first = column - 1, content[column - 1 : column]
