@@ -1,4 +1,4 @@
-"""The shortest path through a given sequence of passages, as a convex problem.
+"""Sequences of passages, and the shortest paths through them as convex problems.
 
 With unknowns s (a point on each guard, in its own coordinates) every straight leg of the path is ``M s + o``, so its
 length is a norm of affine functions, to be minimised over a polyhedron: a second-order cone problem.
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.metrics.geometry import Array, Gate, Passage, Space
-from hsdsl.metrics.rounding import UNIT
+from hsdsl.metrics.rounding import UNIT, norm
 
 
 @dataclass(eq=False)
@@ -90,16 +90,11 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A shape with offsets; ``numbers`` is the size of the numbers that the offsets are made of."""
+    """B problems of one shape: offsets (B, n_i), and the size (B,) of the numbers that they are made of."""
 
     shape: Shape
-    offsets: tuple[Array, ...]
-    numbers: float
-
-    def length(self, s: Array) -> float:
-        """The path's length at s."""
-        legs = zip(self.shape.matrices, self.offsets, strict=True)
-        return float(sum(np.linalg.norm(m @ s + o) for m, o in legs))
+    offsets: list[Array]
+    numbers: Array
 
 
 class GateSequence:
@@ -138,21 +133,24 @@ class GateSequence:
         return base, wide
 
     def problem(self, p: Array | None, q: Array | None, kept: bool = False) -> Problem:
-        """The problem between p and q; without a first or last leg where they are None.
+        """The problems between pairs, rows of p and q; without a first or last leg where they are None.
 
         With ``kept`` the last leg measures only the coordinates that no passage changes, to a q in any mode given by
         those coordinates alone: a lower bound for whatever comes after.
         """
-        offsets, numbers = [offset for _, offset in self.inner_legs], self.numbers
+        ends = [x for x in (p, q) if x is not None]
+        count = len(ends[0]) if ends else 1
+        offsets = [np.tile(offset, (count, 1)) for _, offset in self.inner_legs]
+        numbers = np.full(count, float(self.numbers))
         if p is not None:
             base = self.enters[0][0]
             offsets.insert(0, base - p)
-            numbers += float(np.linalg.norm(base) + np.linalg.norm(p))
+            numbers += float(np.linalg.norm(base)) + norm(p)
         if q is not None:
             base = self._last(kept)[0]
             offsets.append(base - q)
-            numbers += float(np.linalg.norm(base) + np.linalg.norm(q))
-        return Problem(self.shape(p is not None, q is not None, kept), tuple(offsets), numbers)
+            numbers += float(np.linalg.norm(base)) + norm(q)
+        return Problem(self.shape(p is not None, q is not None, kept), offsets, numbers)
 
     def shape(self, first: bool, last: bool, kept: bool = False) -> Shape:
         """What problems with or without a first and a last leg share."""

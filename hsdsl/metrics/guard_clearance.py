@@ -10,12 +10,14 @@ import numpy as np
 
 from hsdsl.enclosures import Array
 from hsdsl.metrics.formulas import Formula
-from hsdsl.metrics.geometry import Space
-from hsdsl.metrics.sides import to_entry
+from hsdsl.metrics.geometry import Passage, Space
+from hsdsl.metrics.line import interval_of
+from hsdsl.metrics.rounding import UNIT, norm
 
 HALVINGS = 12
 FARTHEST = 1e6  # times the points' size: no bound beyond it is looked for where a gradient vanishes
-ROUNDING = 4 * 2.0**-53
+ROUNDING = 4 * UNIT
+ROUNDINGS = 32  # in one coordinate, more than those of the few products that make it
 
 
 def to_passages(space: Space, mode: int, x: Array) -> Array:
@@ -61,3 +63,35 @@ def _steepest(formula: Formula, k: int, x: Array, half_width: Array) -> Array:
     below, above = formula.slopes(np.nextafter(low, -np.inf), np.nextafter(high, np.inf))
     largest = np.maximum(np.abs(below[:, k]), np.abs(above[:, k]))
     return np.sqrt(np.sum(largest**2, axis=1)) * (1 + (x.shape[1] + 4) * ROUNDING)
+
+
+def to_entry(passage: Passage, points: Array) -> Array:
+    """A lower bound on the distance from points to where a passage is entered."""
+    return _to_side(passage, passage.enter, passage.across[0], points)
+
+
+def to_exit(passage: Passage, points: Array) -> Array:
+    """A lower bound on the distance from points to where a passage is left."""
+    return _to_side(passage, passage.leave, passage.across[1], points)
+
+
+def _to_side(passage: Passage, side: tuple[Array, Array], across: tuple[Array, Array], points: Array) -> Array:
+    """Less than rounding from exact on guards of at most one dimension, else to the whole plane."""
+    base, frame = side
+    gate = passage.gate
+    if gate.size > 1:
+        vectors, levels = across
+        rounding = norm(points) + float(np.linalg.norm(levels))
+        apart = norm(points @ vectors.T - levels)
+    else:
+        away, far = points - base, np.zeros(len(points))
+        if gate.size == 1:
+            low, high = interval_of(gate.normals, gate.levels)
+            slope = frame[:, 0]
+            square = float(slope @ slope)
+            s = np.clip(away @ slope / square if square else far, low, high)
+            far = np.abs(s) * np.sqrt(square)
+            away = away - s[:, None] * slope
+        rounding = norm(points) + float(np.linalg.norm(base)) + far
+        apart = norm(away)
+    return np.maximum(0.0, apart - (ROUNDINGS + points.shape[1]) * UNIT * rounding)

@@ -20,7 +20,7 @@ from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
 from hsdsl.metrics.search import End, Found
 from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
-from hsdsl.metrics.serial import one_thread
+from hsdsl.metrics.socp import one_thread
 
 MOST_SEQUENCES = 6
 MORE_HOPS = 1  # than the shortest sequence has

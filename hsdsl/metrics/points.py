@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.batch_search import Pairs, around_guards, search_batch
+from hsdsl.metrics.batch_search import Pairs, search_batch
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import INFINITE, ZERO
@@ -124,7 +124,8 @@ def quick_bounds(
     if space.components[pairs.source] != space.components[pairs.target]:
         pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
         return pairs.lower, pairs.upper
-    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, around_guards(pairs, Budget())))
+    passing = pairs.ways(Budget()).around_guards() if not space.curved_gates else 0.0
+    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, passing))
     if not space.domains[pairs.source].convex:
         pairs.upper = np.full(len(pairs.p), np.inf)
     return pairs.bounds()[:2]

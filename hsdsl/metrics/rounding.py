@@ -57,7 +57,7 @@ def brought_inside(shape: Shape, s: Array) -> tuple[Array, Array]:
         s[out] -= over[:, None] * normals[worst]
         beyond = _beyond(shape, s)
     if shape.inner is not None and shape.room is not None:
-        over = np.maximum(beyond, 0)
+        over = np.where(beyond > 0, beyond + _margin(shape, s), 0.0)  # twice the margin, as above
         room = np.maximum(shape.room - _margin(shape, shape.inner[None]), 1e-300)
         share = np.minimum(1.0, (1 + 1e-9) * (over / (over + room)).max(axis=1))
         s = s + share[:, None] * (shape.inner - s)

@@ -7,7 +7,7 @@ that is left to q. A sequence is dropped once that bound reaches the best path f
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -16,17 +16,16 @@ import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.dominance import followers, hops_of, may_follow, passage_number
-from hsdsl.metrics.gate_sequence import Problem, Shape, gate_sequence
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.serial import one_thread
-from hsdsl.metrics.sides import to_entry, to_exit
-from hsdsl.metrics.socp import ROUNDS, solve
+from hsdsl.metrics.passage_bounds import Indices, Ways
+from hsdsl.metrics.socp import ROUNDS, one_thread
 
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
-ROUNDING = 4 * 2.0**-53  # of a sum of bounds, for each of them
+ROUNDING = 16 * 2.0**-53  # of a short sum or a norm, relative to itself
 NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
 NEIGHBOURS_AT = {16, 128, 1024}  # sequences looked at: when the best path's neighbours are
 MOST_CHANGES = 20
+ONE = np.zeros(1, dtype=int)  # the only pair of a search
 HOPS = 8  # more than the fewest that lead from one mode to the other
 
 
@@ -100,18 +99,22 @@ class _Search:
         self, space: Space, start: End, end: End, relaxation: float, hops: int, found: Found, budget: Budget
     ) -> None:
         self.space, self.start, self.end, self.budget = space, start, end, budget
-        self.relaxation, self.hops, self.found = relaxation, hops, found
+        self.hops, self.found = hops, found
+        self.ways = Ways(space, start.mode, start.x[None], end.mode, end.x[None], relaxation, budget)
         self.fixed = start.cost + end.cost
         self.heap: list[tuple[float, int, tuple[int, ...]]] = []
-        self.rest = np.zeros(len(space.passages))
 
     def run(self) -> None:
         """Best first until nothing open can be shorter."""
         self._finish(())
-        least = max(self.fixed, least_with_passages(self.space, self.start, self.end) + self.fixed)
+        first, last = self.ways.enters[:, 0].min(initial=np.inf), self.ways.leaves[:, 0].min(initial=np.inf)
+        if np.isinf(first + last):
+            return
+        least = float(first * (self.start.bound is None) + last * (self.end.bound is None)) * (1 - ROUNDING)
+        least = max(self.fixed, least + self.fixed)
         if self._left_out(least):
             return
-        self.rest = remaining(self.space, self.end, self.relaxation, self.budget)
+        self.ways.solve_leaves()
         self._straight_there()
         self._go_on((), least)
         for looked_at in count(1):
@@ -130,16 +133,19 @@ class _Search:
 
     def _straight_there(self) -> None:
         """Try the sequence that the bounds between passages make look shortest, so that some path is known early."""
-        inner, sequence = gaps(self.space, self.budget), tuple[int, ...]()
+        sequence = tuple[int, ...]()
         while len(sequence) < self.hops:
-            far = np.zeros(len(self.rest)) if not sequence else inner[sequence[-1]]
-            open_ = [i for i in self._following(sequence) if i >= 0 and i not in sequence and self.rest[i] < np.inf]
+            open_ = [i for i in self._following(sequence) if i >= 0 and i not in sequence and self._rest(i) < np.inf]
             if not open_:
                 return
-            sequence = (*sequence, min(open_, key=lambda i: float(far[i] + self.rest[i])))
+            far = self.ways.inner[sequence[-1]] if sequence else np.zeros(len(self.space.passages))
+            sequence = (*sequence, min(open_, key=lambda i: float(far[i]) + self._rest(i)))
             if self.space.passages[sequence[-1]].target == self.end.mode:
                 self._finish(sequence)
                 return
+
+    def _rest(self, i: int) -> float:
+        return float(self.ways.rest(i, ONE)[0])
 
     def _shorten(self) -> None:
         """Replace the best path by shorter ones whose sequences differ by one passage, as long as there are any."""
@@ -211,15 +217,13 @@ class _Search:
     def _keep(self, sequence: tuple[int, ...], rounds: int = ROUNDS) -> float:
         """Keep the shortest path through a sequence where it is the best; a lower bound on it."""
         if sequence:
-            problem = gate_sequence(self.space, sequence).problem(self.start.x, self.end.x)
+            lower, upper, s = (x[0] for x in self.ways.through(sequence, ONE, rounds))
         else:
-            problem = straight(self.start.x, self.end.x)
-        lower, upper, s = solve(problem, rounds)
-        toll = self.fixed + self.relaxation * hops_of(sequence)
-        if min(sequence, default=0) >= 0 and upper + toll < self.found.upper:
-            self.found.upper, self.found.sequence, self.found.unknowns = upper + toll, sequence, s
+            lower, upper, s = _straight(self.start.x, self.end.x)
+        if min(sequence, default=0) >= 0 and upper + self.fixed < self.found.upper:
+            self.found.upper, self.found.sequence, self.found.unknowns = float(upper + self.fixed), sequence, s
             self.found.start, self.found.end = self.start, self.end
-        return lower + toll
+        return float(lower + self.fixed)
 
     def _bound_end(self, sequence: tuple[int, ...]) -> bool:
         if self.end.bound is not None and passage_number(sequence[-1]) != self.end.bound:
@@ -247,86 +251,26 @@ class _Search:
 
     def _bound(self, sequence: tuple[int, ...]) -> float:
         """The least any path beginning with this sequence can have."""
-        toll = self.fixed + self.relaxation * hops_of(sequence)
-        rest = float(self.rest[passage_number(sequence[-1])])
-        if rest == np.inf:
+        if self._rest(sequence[-1]) == np.inf:
             return np.inf
-        chain = gate_sequence(self.space, sequence)
-        simple = self._least(chain.problem(self.start.x, None), rest + toll)
+        simple = self._least(self.ways.beginning, sequence)
         if simple >= self.found.upper * (1 - TOLERANCE) or self.space.kept is None:
             return simple
-        goal = self.end.x[list(self.space.kept[self.end.mode])]
-        return max(simple, self._least(chain.problem(self.start.x, goal, kept=True), toll))
+        return max(simple, self._least(self.ways.beginning_kept, sequence))
 
-    def _least(self, problem: Problem, more: float) -> float:
+    def _least(self, bounds: Callable[[tuple[int, ...], Indices, int], Array], sequence: tuple[int, ...]) -> float:
         """A lower bound, closer where that may decide."""
-        bound = solve(problem, 1)[0] + more
+        bound = float(bounds(sequence, ONE, 1)[0]) + self.fixed
         near = self.found.upper * (1 - NEAR) < bound < self.found.upper * (1 - TOLERANCE)
-        return max(bound, solve(problem)[0] + more) if near else bound
+        return max(bound, float(bounds(sequence, ONE, ROUNDS)[0]) + self.fixed) if near else bound
 
 
-def straight(p: Array, q: Array) -> Problem:
-    """The straight way: no numbers but the difference, which is exact to a share of itself."""
-    nothing = np.zeros((len(p), 0))
-    return Problem(Shape((nothing,), np.zeros((0, 0)), np.zeros(0)), (q - p,), 0.0)
-
-
-def least_with_passages(space: Space, start: End, end: End) -> float:
-    """A lower bound on ways with passages: to the nearest one and from one; infinite without any."""
-    x, y = start.x[None], end.x[None]
-    first = [float(to_entry(p, x)[0]) for p in space.passages if p.source == start.mode]
-    last = [float(to_exit(p, y)[0]) for p in space.passages if p.target == end.mode]
-    if not first or not last:
-        return np.inf
-    return (min(first) if start.bound is None else 0.0) + (min(last) if end.bound is None else 0.0)
+def _straight(p: Array, q: Array) -> tuple[float, float, Array]:
+    """The straight way: the difference is exact to a share of itself."""
+    length, share = float(np.linalg.norm(q - p)), len(p) * 2.0**-53 + ROUNDING
+    return length * (1 - share), length * (1 + share), np.zeros(0)
 
 
 def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:
     """The cap on passages: the one given, or some more than the fewest that lead from one mode to the other."""
     return space.fewest(source)[target] + HOPS if hops is None else hops
-
-
-def remaining(space: Space, end: End, relaxation: float, budget: Budget) -> Array:
-    """For each passage, a lower bound on what is left to the end once it has been left (Bellman's recursion)."""
-    total = len(space.passages)
-    rest = np.full(total, np.inf)
-    for passage in space.passages:
-        if passage.target == end.mode:
-            rest[passage.index] = to_exit(passage, end.x[None])[0]
-            if passage.gate.size > 1 and not budget.spent():
-                goal = gate_sequence(space, (passage.index,)).problem(None, end.x)
-                rest[passage.index] = max(rest[passage.index], solve(goal)[0])
-    between = gaps(space, budget)
-    for _ in range(total):
-        through = np.min(between + (rest + relaxation)[None, :], axis=1, initial=np.inf)
-        closer = np.minimum(rest, through)
-        if np.array_equal(closer, rest):
-            break
-        rest = closer
-    return rest * (1 - total * ROUNDING)
-
-
-def gaps(space: Space, budget: Budget) -> Array:
-    """A lower bound on the way from where one passage is left to where another is entered, inf in different modes.
-
-    It is 0 where the time is over before it is known.
-    """
-    found: Array | None = space.cache.get("gaps")
-    if found is None:
-        total = len(space.passages)
-        found = np.full((total, total), np.inf)
-        for f in space.passages:
-            for g in space.passages:
-                if f.target == g.source and np.isinf(found[f.index, g.index]):
-                    # The same two sides face each other the other way round: passage i backwards is i with the last bit
-                    # changed.
-                    gap = 0.0 if budget.spent() else _gap(space, f.index, g.index)
-                    found[f.index, g.index] = found[g.index ^ 1, f.index ^ 1] = gap
-        if not budget.ran_out:
-            space.cache["gaps"] = found
-    return found
-
-
-def _gap(space: Space, f: int, g: int) -> float:
-    """0 where a passage is taken back at once."""
-    return 0.0 if f == g ^ 1 else solve(gate_sequence(space, (f, g)).problem(None, None), 1)[0]

@@ -1,11 +1,13 @@
-"""One second-order cone problem, to a certified gap: a feasible path above, a feasible dual below.
+"""Shortest paths through gate sequences as second-order cone problems: a feasible path above, a feasible dual below.
 
-The solver (Clarabel) proposes; what is returned is computed from its proposal here. The problem is solved around its
-last answer, in units of its value, until the gap is small or stops shrinking.
+The solver (Clarabel) proposes; bounds are computed from its proposals here. A problem is solved around its last answer,
+in units of its value, until the gap is small or stops shrinking.
 """
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -15,78 +17,88 @@ import numpy as np
 from hsdsl.metrics.gate_sequence import Problem, Shape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.line import on_line
-from hsdsl.metrics.rounding import brought_inside, charge, norm, proved_above, proved_below
+from hsdsl.metrics.rounding import brought_inside, charge, lengths, norm, proved_above, proved_below
 
 GAP = 1e-10  # relative
-SOLVED, ROUGHLY = 1e-12, 1e-8  # what the solver is asked for, and where one round has to do
+SOLVED, ROUGHLY = 1e-12, 1e-8  # the solver's tolerance, and the one of a single round
 ROUNDS = 3
 
 
-def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[float, float, Array]:
-    """Minimise a problem, in at most so many rounds.
+@contextmanager
+def one_thread() -> Generator[None]:
+    """Keep BLAS and LAPACK on the calling thread: for twenty unknowns others cost more than they bring."""
+    with _controller().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _controller() -> Any:
+    import_module("scipy.optimize")  # its own copy of the library has to be loaded to be found
+    return import_module("threadpoolctl").ThreadpoolController()
+
+
+def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
+    """Minimise B problems of one shape, in at most so many rounds.
 
     Returns
     -------
-    lower, upper : float
-        Between which the minimum lies; see :mod:`hsdsl.metrics.rounding`.
-    s : (N,) array
+    lower, upper : (B,) arrays
+        Between which the minima lie; see :mod:`hsdsl.metrics.rounding`.
+    s : (B, N) array
         Where ``upper`` is attained.
     """
-    shape = problem.shape
+    shape, offsets, numbers = problem.shape, problem.offsets, problem.numbers
     if not shape.matrices:
-        return 0.0, 0.0, np.zeros(shape.size)
-    numbers = np.array([problem.numbers])
+        return np.zeros(len(numbers)), np.zeros(len(numbers)), np.zeros((len(numbers), shape.size))
     if shape.size < 2:
-        lower, upper, s = on_line(shape, [o[None, :] for o in problem.offsets], numbers)
-        return float(lower[0]), float(upper[0]), s[0]
-    return _refined(problem, numbers, rounds)
-
-
-def _refined(problem: Problem, numbers: Array, rounds: int) -> tuple[float, float, Array]:
-    shape, offsets = problem.shape, [o[None, :] for o in problem.offsets]
-    center: Array = -shape.back @ np.concatenate(problem.offsets)
-    unit = max(problem.length(center), float(charge(shape, numbers, norm(center[None]))[0]), 1e-300)
-    lower, upper, best = 0.0, np.inf, center
+        return on_line(shape, offsets, numbers)
+    best = -np.hstack(offsets) @ shape.back.T
+    unit = np.maximum(np.maximum(lengths(shape, offsets, best), charge(shape, numbers, norm(best))), 1e-300)
+    lower, upper, todo = np.zeros(len(numbers)), np.full(len(numbers), np.inf), np.arange(len(numbers))
     for _ in range(rounds):
-        found = _around(problem, center, unit, SOLVED if rounds > 1 else ROUGHLY)
-        if found is None:
+        some = [o[todo] for o in offsets]
+        s, vectors, weights = _proposals(shape, some, best[todo], unit[todo], SOLVED if rounds > 1 else ROUGHLY)
+        s, inside = brought_inside(shape, s)
+        value = proved_above(shape, some, numbers[todo], s, inside)
+        below = proved_below(shape, some, numbers[todo], s, vectors, weights)
+        lower[todo] = np.maximum(lower[todo], below)
+        better = value < upper[todo]
+        best[todo[better]], upper[todo[better]] = s[better], value[better]
+        rounding = 2 * charge(shape, numbers[todo], norm(best[todo]))
+        unit[todo] = np.maximum(upper[todo], rounding)
+        todo = todo[upper[todo] - lower[todo] > np.maximum(GAP * upper[todo], rounding)]
+        if not todo.size:
             break
-        proposal, vectors, weights = (x[None] for x in found)
-        s, inside = brought_inside(shape, proposal)
-        value = float(proved_above(shape, offsets, numbers, s, inside)[0])
-        lower = max(lower, float(proved_below(shape, offsets, numbers, s, vectors, weights)[0]))
-        if value < upper:
-            upper, best = value, s[0]
-        rounding = 2 * float(charge(shape, numbers, norm(best[None]))[0])
-        if upper - lower <= max(GAP * upper, rounding):
-            break
-        center, unit = best, max(upper, rounding) if upper < np.inf else unit
     return lower, upper, best
 
 
-def _around(problem: Problem, center: Array, unit: float, tolerance: float) -> tuple[Array, Array, Array] | None:
-    """Solve for ``s = center + unit * sigma``; returns proposals: unknowns, the legs' vectors, and weights."""
+def _proposals(
+    shape: Shape, offsets: list[Array], centers: Array, units: Array, tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Solve each problem for ``s = center + unit * sigma``: proposed unknowns, the legs' vectors, and weights."""
     clarabel: Any = import_module("clarabel")  # heavy, so not before it is needed
-    shape = problem.shape
     if shape.cone is None:
         shape.cone = _cone(shape, clarabel)
     cost, matrix, objective, cones = shape.cone
-    right = [(shape.levels - shape.normals @ center) / unit]
-    for m, o in zip(shape.matrices, problem.offsets, strict=True):
-        right += [np.zeros(1), (m @ center + o) / unit]
-    right = np.concatenate(right)
-    if not np.all(np.isfinite(right)):
-        return None
-    answer: Any = clarabel.DefaultSolver(cost, objective, matrix, right, cones, _settings(clarabel, tolerance)).solve()
-    primal: Array = np.array(answer.x, dtype=float)
-    dual: Array = np.array(answer.z, dtype=float)
-    if not (np.all(np.isfinite(primal)) and np.all(np.isfinite(dual))):
-        return None
-    vectors, at = list[Array](), len(shape.levels)
-    for offset in problem.offsets:
-        vectors.append(-dual[at + 1 : at + 1 + len(offset)])
-        at += 1 + len(offset)
-    return center + unit * primal[: shape.size], np.concatenate(vectors), dual[: len(shape.levels)]
+    # Each leg is a cone of its bound and its vector, after the inequalities.
+    legs = len(shape.levels) + np.cumsum([0, *(1 + len(m) for m in shape.matrices[:-1])])
+    right = np.zeros((len(centers), matrix.shape[0]))
+    right[:, : len(shape.levels)] = shape.levels - centers @ shape.normals.T
+    for at, m, o in zip(legs, shape.matrices, offsets, strict=True):
+        right[:, at + 1 : at + 1 + len(m)] = centers @ m.T + o
+    right /= units[:, None]
+    s, dual, solver = centers.copy(), np.zeros_like(right), None
+    for k in np.flatnonzero(np.all(np.isfinite(right), axis=1)).tolist():
+        if solver is None:
+            solver = clarabel.DefaultSolver(cost, objective, matrix, right[k], cones, _settings(clarabel, tolerance))
+        else:
+            solver.update(b=right[k])
+        answer: Any = solver.solve()
+        s[k], dual[k] = centers[k] + units[k] * np.asarray(answer.x)[: shape.size], answer.z
+    lost = ~(np.all(np.isfinite(s), axis=1) & np.all(np.isfinite(dual), axis=1))
+    s[lost], dual[lost] = centers[lost], 0.0
+    weights, vectors = dual[:, : len(shape.levels)], np.delete(-dual, legs, axis=1)[:, len(shape.levels) :]
+    return s, vectors, weights
 
 
 def _cone(shape: Shape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
@@ -116,4 +128,5 @@ def _settings(clarabel: Any, tolerance: float) -> Any:
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     settings.max_iter = 60
+    settings.presolve_enable = False  # else a solver takes no other offsets
     return settings

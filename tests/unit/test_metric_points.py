@@ -11,7 +11,6 @@ import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.metrics.gate_sequence import Problem, Shape
 from hsdsl.metrics.interval import INFINITE, ZERO
-from hsdsl.metrics.norms import minimise
 from hsdsl.metrics.points import Place, distance, distances, quick_bounds
 from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
@@ -204,20 +203,21 @@ def test_many_pairs_at_once_are_the_pairs_one_by_one(name, modes, relaxation):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_own_solver_agrees_with_the_conic_solver(seed):
+def test_problems_solved_together_have_the_minima_of_each(seed):
     rng = np.random.default_rng(seed)
     unknowns, legs, count = int(rng.integers(2, 6)), int(rng.integers(3, 6)), 8
     matrices = [rng.normal(size=(2, unknowns)) for _ in range(legs)]
     offsets = [rng.normal(size=(count, 2)) * 10 ** rng.uniform(-3, 2) for _ in range(legs)]
     normals = rng.normal(size=(int(rng.integers(1, 5)), unknowns))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    levels = np.abs(rng.normal(size=len(normals))) * rng.integers(0, 2)
-    shape = Shape(tuple(matrices), normals, levels)
+    inner, room = rng.normal(size=unknowns), 10 ** rng.uniform(-3, 0, size=len(normals))
+    levels = normals @ inner + room
+    shape = Shape(tuple(matrices), normals, levels, inner, room)
     numbers = np.array([sum(np.linalg.norm(o[k]) for o in offsets) for k in range(count)])
-    lower, upper, s = minimise(shape, offsets, numbers)
+    lower, upper, s = solve(Problem(shape, offsets, numbers))
     assert np.all(s @ normals.T <= levels)
     for k in range(count):
-        below, above, _ = solve(Problem(shape, tuple(o[k] for o in offsets), numbers[k]))
+        (below,), (above,), _ = solve(Problem(shape, [o[k : k + 1] for o in offsets], numbers[k : k + 1]))
         assert above - below <= 1e-9 * above + 1e-13 * np.abs(np.hstack(offsets)).max()
         assert lower[k] <= above * (1 + 1e-12) and below <= upper[k] * (1 + 1e-12)
         assert upper[k] - lower[k] <= 1e-9 * upper[k] + 1e-13 * np.abs(np.hstack(offsets)).max()

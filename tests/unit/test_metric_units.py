@@ -8,7 +8,7 @@ from affine_scenes import UNITS, BruteForce, path_fault, random_point, random_sc
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.metrics import search
+from hsdsl.metrics import passage_bounds
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.dominance import followers, hops_of
 from hsdsl.metrics.interval import EndsCross, Interval, weakest
@@ -225,7 +225,7 @@ class Looks(Budget):
 @pytest.mark.parametrize("looks", [0, 1, 10, 40])
 def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path, monkeypatch, looks):
     solved = []
-    monkeypatch.setattr(search, "solve", lambda *asked: solved.append(1) or solve(*asked))
+    monkeypatch.setattr(passage_bounds, "solve", lambda *asked: solved.append(1) or solve(*asked))
     for seed in range(4):
         rng = np.random.default_rng(300 + seed)
         scene = random_scene(rng, dimensions=(2,), edges=6)
