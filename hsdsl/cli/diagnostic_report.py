@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from typer import Exit
 
 from hsdsl import __version__
 from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, counted, print_errors, print_json, report_usage
 from hsdsl.cli.options import Format
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
+from hsdsl.names import visible
 
 if TYPE_CHECKING:
     from hsdsl.lint import Ignored
@@ -18,9 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class DiagnosticReport:
-    """Errors and findings so far, and the exit code that follows from them."""
+    """Errors and findings so far, and the exit code that follows from them.
+
+    ``success`` is the key of an entry whose value is false where a model has errors.
+    """
 
     format: Format
+    quiet: bool
+    success: str
     notes: bool = True  # whether text shows notes in full
     entries: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     errors: list[Diagnostic] = field(default_factory=list[Diagnostic])
@@ -28,35 +37,42 @@ class DiagnosticReport:
     ignored: list[Ignored] = field(default_factory=list["Ignored"])
     code: int = 0
 
-    def add_error(self, entry: dict[str, Any], error: ModelError | UsageError) -> None:
-        """Add a model that has errors or cannot be read."""
-        if isinstance(error, ModelError):
-            self.errors += error.diagnostics
-            self.entries.append(entry)
-            self.code = max(self.code, MODEL_ERRORS)
-        else:
-            report_usage(error, json=False)
-            self.entries.append({**entry, "message": str(error)})
-            self.code = WRONG_USAGE
+    @property
+    def chatty(self) -> bool:
+        """Whether it prints a line about each model."""
+        return self.format == "text" and not self.quiet
 
-    def add(self, entry: dict[str, Any], findings: Sequence[Diagnostic] = (), ignored: Sequence[Ignored] = ()) -> None:
-        """Add a model without errors."""
-        self.entries.append(entry)
+    def examine(self, models: Sequence[Path], look: Callable[[Path], tuple[dict[str, Any], str]]) -> None:
+        """Add every model: ``look(path)`` gives its entry and, for text, a line."""
+        for path in models:
+            entry: dict[str, Any] = {"path": str(path), self.success: False}
+            try:
+                result, line = look(path)
+            except ModelError as error:
+                self.errors += error.diagnostics
+                self.code = max(self.code, MODEL_ERRORS)
+            except UsageError as error:
+                report_usage(error, json=False)
+                entry["message"] = str(error)
+                self.code = WRONG_USAGE
+            else:
+                entry |= result
+                if line and self.chatty:
+                    print(f"{visible(str(path))}: {line}")
+            self.entries.append(entry)
+
+    def add(self, findings: Sequence[Diagnostic], ignored: Sequence[Ignored]) -> list[Diagnostic]:
+        """Add findings; return those that text shows."""
         self.findings += findings
         self.ignored += ignored
-        self.code = max(self.code, MODEL_ERRORS * any(found.severity == "warning" for found in findings))
+        warnings = [finding for finding in findings if finding.severity == "warning"]
+        self.code = max(self.code, MODEL_ERRORS * bool(warnings))
+        return list(findings) if self.notes else warnings
 
-    def print(self, lint: bool) -> None:
-        """Print everything: errors as text to standard error, all else to standard output."""
-        if self.format == "json":
-            self._json(lint)
-        elif self.format == "sarif":
-            self._sarif()
-        elif self.format == "github":
-            for diagnostic in (*self.errors, *self.findings):
-                print(as_annotation(diagnostic))
-        else:
-            self._text()
+    def finish(self) -> None:
+        """Print everything, errors as text to standard error, all else to standard output; exit."""
+        {"json": self._json, "sarif": self._sarif, "github": self._github, "text": self._text}[self.format]()
+        raise Exit(self.code)
 
     def _text(self) -> None:
         if self.errors:
@@ -65,20 +81,21 @@ class DiagnosticReport:
         if shown:
             print("\n\n".join(map(render, shown)))
             print(f"\n{counted(len(shown), 'finding')}")
-
-    def count_hidden(self) -> None:
-        """Print the number of notes that text does not show."""
-        hidden = [found.code for found in self.findings if found.severity == "note" and not self.notes]
-        if hidden:
+        hidden = [finding.code for finding in self.findings if finding.severity == "note" and not self.notes]
+        if hidden and self.chatty:
             about = " on the mathematics" if all(code.startswith("HS5") for code in hidden) else ""
             print(f"{counted(len(hidden), 'note')}{about}: hsdsl lint --notes")
 
-    def _json(self, lint: bool) -> None:
+    def _json(self) -> None:
         content: dict[str, Any] = {"models": self.entries, "errors": [measured(error) for error in self.errors]}
-        if lint:
+        if self.success == "clean":
             content["findings"] = [finding(diagnostic) for diagnostic in self.findings]
             content["ignored"] = [{**finding(i.diagnostic), "reason": i.reason} for i in self.ignored]
         print_json(content)
+
+    def _github(self) -> None:
+        for diagnostic in (*self.errors, *self.findings):
+            print(as_annotation(diagnostic))
 
     def _sarif(self) -> None:
         from hsdsl.lint.pages import pages, titles

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-from typer import Exit
+from typing import Any
 
 from hsdsl.cli.console import counted
 from hsdsl.cli.diagnostic_report import DiagnosticReport
 from hsdsl.cli.options import AllowPath, Formatted, Json, Limit, Models, Quiet, answering
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.names import visible
 
 
 def validate(
@@ -22,25 +19,16 @@ def validate(
     limit: Limit = None,
 ) -> None:
     """Check model files and report every error in them."""
-    report = DiagnosticReport("json" if json else format)
+    report = DiagnosticReport("json" if json else format, quiet, "valid")
     with answering(json, allow_path, limit):
-        for path in models:
-            try:
-                line = _checked(path)
-            except (ModelError, UsageError) as error:
-                report.add_error({"path": str(path), "valid": False}, error)
-            else:
-                report.add({"path": str(path), "valid": True})
-                if report.format == "text" and not quiet:
-                    print(line)
-    report.print(lint=False)
-    raise Exit(report.code)
+        report.examine(models, _look)
+    report.finish()
 
 
-def _checked(path: Path) -> str:
+def _look(path: Path) -> tuple[dict[str, Any], str]:
     from hsdsl.model import load
 
     model = load(path)
     model.resolve()
     modes, edges = len(model.system.modes), sum(len(mode.edges) for mode in model.system.modes)
-    return f"{visible(str(path))}: valid, {counted(modes, 'mode')}, {counted(edges, 'transition')}"
+    return {"valid": True}, f"valid, {counted(modes, 'mode')}, {counted(edges, 'transition')}"
