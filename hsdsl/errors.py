@@ -32,24 +32,10 @@ class Edit:
 class Diagnostic:
     """One error in a model, or one finding about it.
 
-    Attributes
-    ----------
-    code : str
-        A stable code: a key of :data:`CODES`, or of a lint rule.
-    message : str
-        One sentence.
-    span : Span or None
-        Where; None when no single place is to blame.
-    hint : str or None
-        What to write instead, when that is known.
-    text : str or None
-        The source line that ``span`` points into, for the caret.
-    severity : {"error", "warning", "note"}
-        An error makes the model unusable; warnings and notes are what lint rules find.
-    decided : {"symbolic", "interval", "sampled"} or None
-        How a lint rule came to know.
-    fix : tuple of Edit
-        Changes of the text that remedy it without changing what the model means.
+    ``code`` is a key of :data:`CODES`, or of a lint rule; ``message`` is one sentence, and ``hint`` the right form,
+    where that is known. ``span`` is its place (None when no single place is to blame) and ``text`` the source line of
+    it. An error makes the model unusable; warnings and notes come from lint rules, ``decided`` tells by which proof.
+    The edits ``fix`` remedy the finding without changing the model's meaning.
     """
 
     code: str

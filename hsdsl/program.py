@@ -53,23 +53,13 @@ class Operation:
 
 @dataclass(frozen=True)
 class Tape:
-    """What Taylor coefficients along a mode's flow are computed from.
+    """The operations that compute Taylor coefficients along a mode's flow.
 
-    Attributes
-    ----------
-    constants : Routines
-        Two routines without arguments, ``flow`` and ``surfaces``: the values of the constants that the flow needs, and
-        of those that surfaces need besides; from the data that ``bind`` takes.
-    constant_count, surface_constant_count : int
-        How many there are of each.
-    operations : tuple of Operation
-        Lines 0 to n are time and the n states, operation i is line n + 1 + i.
-    flow : tuple of int
-        The line of each state's derivative.
-    surfaces : tuple of int or None
-        The line of each surface; None where it is kinked.
-    needed : int
-        How many operations, the first ones, the flow needs.
+    ``constants`` has two routines without arguments, ``flow`` and ``surfaces``: the values of the constants that the
+    flow needs (``constant_count``), and of those that surfaces need besides (``surface_constant_count``); from the data
+    that ``bind`` takes. Lines 0 to n are time and the n states, operation i is line n + 1 + i. ``flow`` has the line of
+    each state's derivative, and ``surfaces`` that of each surface, None where it is kinked. The flow needs the first
+    ``needed`` operations.
     """
 
     constants: Routines

@@ -126,21 +126,9 @@ def _system(symbols: SymbolTable) -> HybridSystem:
 def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:
     """An expression of a model's parameters that is not in its file: the VALUE of ``--set NAME=VALUE``.
 
-    Parameters
-    ----------
-    system : HybridSystem
-        The model.
-    text : str
-        The expression; a plain number is one.
-    where : str
-        The beginning of the sentence of an error: ``"--set c"``.
-    allowed : sequence of str, optional
-        The parameters it may use; all of them unless given.
+    ``where`` begins the sentence of an error, as ``"--set c"``; with ``allowed`` only those parameters can be used.
 
-    Raises
-    ------
-    UsageError
-        It is not an expression, or uses something else.
+    Raises UsageError: it is not an expression, or uses something else.
     """
     usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
     scope = Scope(_override_values(system, usable), place=where)

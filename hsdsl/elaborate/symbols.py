@@ -23,20 +23,11 @@ Meanings = dict[str, Value | Refusal | None]
 class SymbolTable:
     """A document with its names.
 
-    Attributes
-    ----------
-    names : dict of str to str
-        Every name that is not of one mode alone, and which of :data:`KINDS` it is.
-    values : dict
-        The meaning of each of those names that is defined so far; ``t`` is there from the start.
-    states : dict
-        The states of each mode in file order; empty for a final mode without a flow.
-    undeclared : frozenset of str
-        The names that only `initial` knows: states of its mode that lack a flow. They are reported there alone.
-    scopes : dict
-        The scope of each mode, once it is elaborated.
-    data : dict
-        The content of the data files that were used, by name.
+    ``names`` has the kind, of :data:`KINDS`, of every name that is not of one mode alone; ``values`` the meaning of
+    those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
+    a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
+    reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
+    that were used.
     """
 
     document: ModelDocument

@@ -23,14 +23,7 @@ _FOREIGN_WORDS = ("if", "else", "for", "in", "is", "lambda", "then", "AND", "OR"
 
 
 def parse(text: str, expected: Expected = "number") -> Tree:
-    """The tree of an expression.
-
-    Parameters
-    ----------
-    text : str
-        At most 10,000 characters, nested at most 200 deep.
-    expected : {"number", "condition", "inequality"}
-        What the expression is for; it words the hints.
+    """The tree of an expression of at most 10,000 characters, nested at most 200 deep; ``expected`` words the hints.
 
     Raises ExpressionError: at the first fault.
     """

@@ -22,20 +22,11 @@ RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
 class Value:
     """The meaning of an expression.
 
-    Attributes
-    ----------
-    expr : sympy.Expr
-        The expression in states, inputs, parameters and time.
-    number : mpmath number or None
-        Its value with the file's own parameters where no state, input or time is in it; NaN where it has none.
-    constant : bool
-        Whether not even a parameter is in it.
-    uses : frozenset of str
-        The states it was written with.
-    size, depth : int
-        Its nodes, and how deep its parentheses are nested, written out in full.
-    bits : int
-        How long exact numbers get when its products and powers are multiplied out.
+    ``expr`` is over states, inputs, parameters and time. ``number`` is its value with the file's own parameters (an
+    mpmath number; NaN where it has none), None where a state, input or time is in it. ``constant`` says that not even a
+    parameter is in it, and ``uses`` has the states it was written with. ``size`` counts its nodes and ``depth`` the
+    nesting of its parentheses, written out in full; ``bits`` is the length of its exact numbers once products and
+    powers are multiplied out.
     """
 
     expr: Any
@@ -60,14 +51,8 @@ class Refusal:
 class Scope:
     """The names that can be used in an expression.
 
-    Attributes
-    ----------
-    values : mapping
-        The meaning of each name: a value, a refusal, or None where its own definition is broken.
-    states : collection of str or None
-        The states of the mode the expression belongs to; None where every state may be used.
-    place : str
-        Where that is, for a sentence: "mode 'free'".
+    ``values`` has the meaning of each name: a value, a refusal, or None where its own definition is broken. ``states``
+    are those of the mode of the expression, None where every state may be used; ``place`` names the mode in sentences.
     """
 
     values: Mapping[str, Value | Refusal | None]

@@ -49,14 +49,7 @@ class Box:
 
 @contextmanager
 def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
-    """Bound the processor time of a block.
-
-    Parameters
-    ----------
-    seconds : float
-        Processor seconds for the whole block.
-    parts : int
-        Between two calls of ``restart`` there is time for one of so many parts.
+    """Bound the processor time of a block; between two calls of ``restart`` there is time for one of ``parts`` parts.
 
     Raises OutOfTime: in the block, once the time is spent.
     """

@@ -98,14 +98,9 @@ class Cut:
 class Gradient:
     """First derivatives of expressions, and the statements that they are written with.
 
-    Attributes
-    ----------
-    sparse : tuple of dict
-        For each expression its derivatives by those arguments where they are not zero, in the arguments' order.
-    rows : tuple of tuple of sympy.Expr
-        For each expression its derivative by each argument.
-    statements : list of (symbol, expression)
-        What the rows name, in the order of computation; nothing where the expressions are small.
+    For each expression, ``sparse`` has its derivatives by those arguments where they are not zero, in the arguments'
+    order, and ``rows`` those by all arguments. ``statements`` are the names in them, in the order of computation; none
+    where the expressions are small.
     """
 
     def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> None:

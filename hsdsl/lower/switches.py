@@ -30,12 +30,8 @@ _HALF = sp.Rational(1, 2)
 class Switches:
     """The switches of a system, in an order in which each depends on earlier ones only.
 
-    Attributes
-    ----------
-    arguments : dict
-        What each switch is the floor or the sign of: expressions over the file's names and the symbols of switches.
-    jumping : set of sympy.Symbol
-        The switches at which their expression jumps; at the others it bends.
+    ``arguments`` maps the kind and argument of each switch, an expression over the file's names and earlier switches,
+    to its symbol. At ``jumping`` switches the expression jumps; at the others it bends.
     """
 
     moving: frozenset[sp.Symbol]  # time, and inputs that move between their samples

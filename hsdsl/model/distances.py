@@ -42,16 +42,10 @@ def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> In
         A model and two of its points, as ``"free x=13 v=5"``; further arguments as :meth:`hsdsl.Model.distance`
         (``metric``, ``relaxation``, ``parameters``, ``hops``).
 
-    Returns
-    -------
-    Interval
-        The least and the largest possible distance; :meth:`hsdsl.Model.distance` also has the path, and that function
-        the time.
+    The interval has the least and the largest possible distance; :meth:`hsdsl.Model.distance` also has the path, and
+    that function the time.
 
-    Raises
-    ------
-    UsageError
-        The arguments are neither, or do not fit the model.
+    Raises UsageError: the arguments are neither, or do not fit the model.
     """
     from hsdsl.model import Model, load
 
@@ -105,11 +99,8 @@ def distance_of_runs(
     watch : callable, optional
         Called now and then with the bounds so far, for those three.
 
-    Raises
-    ------
-    UsageError
-        Runs of different models, no time in common, an unknown metric, or a model that cannot be found or was edited
-        since.
+    Raises UsageError: runs of different models, no time in common, an unknown metric, or a model that cannot be found
+    or was edited since.
     """
     check_hops(hops)
     source = _RunSpace(run, other, model, parameters or {}, budget_of(seconds, watch), hops)

@@ -20,19 +20,11 @@ SAMPLES = 1000
 class Estimate:
     """The distance between a run and a finer one.
 
-    Attributes
-    ----------
-    settings : dict
-        The settings of the finer run that differ.
-    same_transitions : bool
-        Whether both made the same transitions in the same order and stopped alike.
-    time : Number or None
-        Largest difference between transition times, strips' delays subtracted; None where there is none in common.
-    final : dict or None
-        Difference of each final state; None where the runs ended in different modes or at different times.
-    largest : dict or None
-        Largest difference of each state at `SAMPLES` times away from transitions; None where the runs make other
-        transitions or no such time is left.
+    ``settings`` are those of the finer run that differ; ``same_transitions`` says whether both made the same
+    transitions in the same order and stopped alike. ``time`` is the largest difference between transition times,
+    strips' delays subtracted (None where there is none in common). ``final`` has the difference of each final state
+    (None where the runs ended in different modes or at different times), ``largest`` that of each state at `SAMPLES`
+    times away from transitions (None where the runs make other transitions or no such time is left).
     """
 
     settings: dict[str, Any]

@@ -31,16 +31,10 @@ NO_FILE = "<text>"  # the path of a model that is in no file
 
 
 def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
-    """Read a model file.
+    """Read a model file; `-` is standard input.
 
-    Parameters
-    ----------
-    path : path
-        A YAML file in the language; `-` is standard input.
-    limits : Limits, optional
-        Caps on the file, and folders for its data, in place of the defaults.
-    text : bytes, optional
-        The file's content, where it is not to be read from ``path``.
+    ``text`` is the file's content, where it is not to be read from ``path``; ``limits`` are caps on the file and
+    folders for its data, in place of the defaults.
 
     Raises
     ------
@@ -53,21 +47,11 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
 
 
 def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
-    """Read a model from its text.
+    """Read a model from its text; data files are in ``folder``, or in the present one.
 
-    Parameters
-    ----------
-    text : str
-        What a model file would hold.
-    folder : path, optional
-        Where data files are that the model names; left out, the present folder.
-    limits : Limits, optional
-        As for :func:`load`.
+    ``limits`` are as for :func:`load`.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; all of them are carried.
+    Raises ModelError: the model has errors; all of them are carried.
     """
     return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
@@ -163,10 +147,7 @@ class Model:
         watch : callable, optional
             Given the recorder before the run starts.
 
-        Raises
-        ------
-        UsageError
-            A name, value or combination that cannot be served.
+        Raises UsageError: a name, value or combination that cannot be served.
         """
         arguments = (
             until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions,
@@ -220,10 +201,7 @@ class Model:
         **arguments
             Further arguments of :meth:`simulate`, but ``precision`` and ``samples``.
 
-        Raises
-        ------
-        UsageError
-            There is no compiled engine, the file cannot be written, or the disk is full.
+        Raises UsageError: there is no compiled engine, the file cannot be written, or the disk is full.
         """
         from hsdsl.model.stream import check, stream
 
@@ -261,10 +239,7 @@ class Model:
         **arguments
             Further arguments of :meth:`simulate` for every instance, but ``precision`` and ``outputs``.
 
-        Raises
-        ------
-        UsageError
-            An unknown name, arrays of different shapes, or no instance that can be run.
+        Raises UsageError: an unknown name, arrays of different shapes, or no instance that can be run.
         """
         from hsdsl.model.ensemble import run_ensemble
 
@@ -337,10 +312,7 @@ class Model:
         plot : path, optional
             Draw the shortest path found there (.png or .svg), where its modes have two coordinates.
 
-        Raises
-        ------
-        UsageError
-            A point or a number that does not fit the model, or a point outside its mode's domain.
+        Raises UsageError: a point or a number that does not fit the model, or a point outside its mode's domain.
         """
         from hsdsl.model.distances import budget_of
         from hsdsl.model.points import distance_of_points

@@ -14,18 +14,9 @@ _INDISPENSABLE = ("modes", "initial", "experiment")
 def recover(root: Node, path: NodePath, fault: str, meant: str | None, target: NodePath = ()) -> bool:
     """Take one fault out of the nodes, in place; False where nothing sensible would be left.
 
-    Parameters
-    ----------
-    root : Node
-        The document.
-    path : tuple
-        Keys and indices down to the fault; ``"[key]"`` after a key means the key itself.
-    fault : str
-        pydantic's own type of error, or the code of one of ours.
-    meant : str or None
-        For an unknown key, the one to take it for.
-    target : tuple
-        For a key in the wrong place, the path to move it to; empty where that is not known.
+    ``path`` leads from the root to the fault; ``"[key]"`` after a key means the key itself. ``fault`` is pydantic's own
+    type of error, or the code of one of ours. An unknown key is taken for the key ``meant``, or moved to the path
+    ``target``, where these are known.
     """
     if not path:
         return False
