@@ -69,9 +69,11 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
     target = known_mode(symbols, transition.to)
     if target is None:
         return None
-    states = _target_states(symbols, source, target)
-    complete = _check_reset(symbols, source, target, states, transition)
-    if crossed is None or values is None or not complete or (transition.condition and condition is None):
+    document = symbols.document.modes[target]  # pyright: ignore[reportArgumentType]
+    states = symbols.states[source if symbols.without_states(document) else target]
+    if document.flow is not None or document.final:  # else that mode is reported, and its states are not known
+        _check_reset(symbols, source, target, states, transition)
+    if crossed is None or values is None or (transition.condition and condition is None):
         return None
     resets = dict(zip(map(str, transition.reset), values, strict=True))
     texts = {str(key): scalar.value for key, scalar in transition.reset.items()}
@@ -103,33 +105,18 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
     return None
 
 
-def _target_states(symbols: SymbolTable, source: str, target: str) -> tuple[str, ...]:
-    if symbols.without_states(symbols.document.modes[target]):  # pyright: ignore[reportArgumentType]
-        return symbols.states[source]
-    return symbols.states[target]
-
-
 def _check_reset(
     symbols: SymbolTable, source: str, target: str, states: tuple[str, ...], transition: TransitionDocument
-) -> bool:
-    if symbols.document.modes[target].flow is None and not symbols.document.modes[target].final:  # pyright: ignore[reportArgumentType]
-        return False  # that mode is reported, and its states are not known
-    complete = True
+) -> None:
     for key in transition.reset:
-        if key not in states and key in symbols.undeclared:
-            complete = False  # reported under `initial`
-        elif key not in states:
-            message = f"the mode '{target}' has no state '{shown(key)}' to reset"
+        if key not in states and key not in symbols.undeclared:  # those are reported under `initial`
             name, equals, value = (part.strip() for part in key.partition("="))
-            written = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
-            symbols.report(key.place, "HS306", message, written)
-            complete = False
-    own = symbols.states[source]
+            hint = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
+            message = f"the mode '{target}' has no state '{shown(key)}' to reset"
+            symbols.report(key.place, "HS306", message, hint)
     for state in states:
-        if state not in transition.reset and state not in own:
+        if state not in transition.reset and state not in symbols.states[source]:
             message = (
                 f"the transition to '{target}' gives its state '{state}' no value, and '{source}' has no such state"
             )
             symbols.report(transition.to.place, "HS305", message, f"write reset: {{{state}: ...}}")
-            complete = False
-    return complete
