@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import errors_reported
 from hsdsl.errors import UsageError
+from hsdsl.integrators import METHODS
 from hsdsl.limits import DEFAULT, NUMBERS, Limits, applied
 from hsdsl.names import did_you_mean
 
@@ -22,12 +24,13 @@ def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | 
 
 
 Scheme = Literal["relaxed", "located", "paoli-schatzman"]
-Method = Literal[
-    "auto", "euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853", "taylor", "radau"
-]  # fmt: skip
 Engine = Literal["auto", "c", "python"]
 Metric = Literal["quotient", "relaxed", "rho", "rho-hat", "sup", "skorokhod", "tau-epsilon"]
 Format = Literal["text", "json", "sarif", "github"]
+if TYPE_CHECKING:
+    Method = str
+else:
+    Method = StrEnum("Method", {name: name for name in ("auto", *METHODS)})
 
 Model = Annotated[Path, Argument(metavar="MODEL", help="The model file.", autocompletion=model_files)]
 Models = Annotated[list[Path], Argument(metavar="MODEL...", help="Model files.", autocompletion=model_files)]

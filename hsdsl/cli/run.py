@@ -68,7 +68,7 @@ def run(
     limit: Limit = None,
 ) -> None:
     """Simulate a model and summarise what happened."""
-    settings: dict[str, Any] = {"until": until, "scheme": scheme, "method": method, "step": step}
+    settings: dict[str, Any] = {"until": until, "scheme": scheme, "method": method and str(method), "step": step}
     settings |= {"tolerance": tolerance, "relaxation": relaxation, "engine": engine, "precision": precision}
     with answering(json, allow_path, limit):
         check_target(out, "--out", OUT_SUFFIXES)

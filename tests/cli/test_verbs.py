@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -11,6 +13,7 @@ from cli.conftest import MODELS
 from engines import COMPILER
 
 import hsdsl
+from hsdsl.cli.verbs import VERBS
 
 
 def test_all_models_are_valid(command):
@@ -45,6 +48,17 @@ def test_doctor(command):
     assert hsdsl.__version__ in command("doctor").out
     declared = tomllib.loads((MODELS.parent / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {re.split("[<>=]", text)[0] for text in declared} == set(answer.json["packages"])
+
+
+def test_help_imports_no_library():
+    helps = [["--help"], *([verb, "--help"] for verb in VERBS)]
+    program = (
+        "import sys\nfrom hsdsl.cli.verbs import obey\n"
+        f"codes = [obey(words) for words in {helps}]\n"
+        "print(*codes, *({'numpy', 'sympy', 'pydantic', 'yaml', 'matplotlib', 'rich'} & set(sys.modules)), sep='+')"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "+".join("0" * len(helps))
 
 
 def test_version(command):
