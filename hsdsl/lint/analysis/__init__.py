@@ -1,7 +1,6 @@
-"""The mathematics that lint rules need: whether there is a point of a domain or a guard where something holds.
+"""Decisions on models for lint rules: is there a point of a domain or a guard where some constraints hold?
 
-`dynamics` puts a model into expressions with its parameters' values; `decide` answers questions about them: by exact
-reasoning (`elimination` and `bound_propagation`, with `polynomial`, `normal_form` and `rational_bounds`), by a point
-(`rational_witness`, `newton_search`), or by interval arithmetic (`branch_and_bound`). An answer says which of these
-decided it, and carries the point.
+`dynamics` has the surfaces, rates, domains and guards of a model, with the values of its parameters. `decide` answers
+questions about them by exact reasoning (`elimination`, `bound_propagation`), by a point (`rational_witness`,
+`newton_search`), or by interval arithmetic (`branch_and_bound`). An answer has the kind of its decision, and the point.
 """

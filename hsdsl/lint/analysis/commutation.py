@@ -1,8 +1,8 @@
 # pyright: basic
 """Guards that are reached together, and whether the order of their transitions matters.
 
-Both orders are followed twice: with numbers from one point, which can show that the order matters there; and with
-expressions from all points of the overlap at once, which can prove that it does not.
+Both orders are followed twice. Numbers from one point can show that the order matters there. Expressions for all points
+of the overlap can prove that it does not.
 """
 
 from __future__ import annotations

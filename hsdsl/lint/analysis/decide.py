@@ -1,8 +1,8 @@
 # pyright: basic
 """Decision of questions: exact reasoning, then a search for a point, then a proof by branch and bound.
 
-Every step is bounded in what it does, not in time, so that an answer is the same on every machine; a model has one
-budget for all its questions, after which only exact reasoning goes on.
+Every step is bounded in operations, not in time, so that an answer is the same on every machine. A model has one budget
+for all its questions, after which only exact reasoning goes on.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""Expressions as polynomials in which equal things look equal, and back.
+"""Normal forms: expressions as polynomials in which equal values look equal, and back.
 
-``sin(a)**2 + cos(a)**2`` becomes 1 and the square of a square root what is under it, so that the landing of a reset on
-a surface is seen to be exact. Every step is bounded: what would grow beyond :data:`MOST_TERMS` stays a product.
+``sin(a)**2 + cos(a)**2`` becomes 1, and the square of a square root its argument. So a landing of a reset on a surface
+is known to be exact. Every step is bounded: what would grow beyond :data:`MOST_TERMS` stays a product.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # pyright: basic
 """Sums of products of atoms with exact coefficients: equal ones are equal objects.
 
-The unknowns of such a polynomial are its *atoms*: names, pi, and what is no polynomial (``sin(x + 1)``, a square
-root, the reciprocal of a sum), whose arguments are polynomials again. `normal_form` makes them of expressions.
+The unknowns of such a polynomial are its *atoms*: names, pi, and calls such as ``sin(x + 1)``, a square root or the
+reciprocal of a sum. Arguments of calls are polynomials again. `normal_form` makes them of expressions.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 """A surface function and the flows it depends on, piece by piece: on a piece no abs, sign, min or max is left.
 
 Derivatives of kinked expressions are those of one side, or of none. On a closed piece the function goes on smoothly
-beyond its ends, so what holds for the derivatives of every piece holds on both sides of a kink.
+beyond its ends. So what holds for the derivatives of every piece holds on both sides of a kink.
 """
 
 from __future__ import annotations
