@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -103,7 +103,7 @@ def distance_of_runs(
     or was edited since.
     """
     check_hops(hops)
-    source = _RunSpace(run, other, model, parameters or {}, budget_of(seconds, watch), hops)
+    source = _RunSpace(run, other, model, parameters, budget_of(seconds, watch), hops)
     depth = None if relaxation is None else source.depth(relaxation)
     result = between(metric, Request(run, other, source.space, depth, coordinates, hops))
     return replace(result, note="\n".join(filter(None, (result.note, source.note))))
@@ -128,7 +128,7 @@ def plot_distance(
     from hsdsl.plot.over_time import plot_over_time
 
     check_same_model(run, other)
-    source = _RunSpace(run, other, model, parameters or {}, budget_of(seconds), hops)
+    source = _RunSpace(run, other, model, parameters, budget_of(seconds), hops)
     depth = None if relaxation is None else source.depth(relaxation)
     curves = profiles(run, other, source.space(depth), depth)
     labels = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}
@@ -149,20 +149,17 @@ def check_hops(hops: int | None) -> None:
         raise UsageError(f"hops must be a whole number, not {hops}")
 
 
+@dataclass
 class _RunSpace:
     """The space of a run's model, read when first needed; ``note`` has parameters that differ in the other run."""
 
-    def __init__(
-        self,
-        run: Execution,
-        other: Execution,
-        model: Model | str | os.PathLike[str] | None,
-        parameters: Mapping[str, Any],
-        budget: Budget,
-        hops: int | None,
-    ) -> None:
-        self.run, self.other, self.model, self.parameters = run, other, model, parameters
-        self.budget, self.hops, self.note = budget, hops, ""
+    run: Execution
+    other: Execution
+    model: Model | str | os.PathLike[str] | None
+    parameters: Mapping[str, Any] | None
+    budget: Budget
+    hops: int | None
+    note: str = ""
 
     @cached_property
     def values(self) -> Values:
@@ -175,7 +172,7 @@ class _RunSpace:
                 f"{model.system.path} is not the model that the run is of, or was edited since",
                 "run it again, or give the model as it was",
             )
-        first, second = (parameters_of(run.overrides) | dict(self.parameters) for run in (self.run, self.other))
+        first, second = (parameters_of(run.overrides) | dict(self.parameters or {}) for run in (self.run, self.other))
         plain = model.pipeline.values(FLOAT64)
         values = with_parameters(plain, first)
         if first != second:

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from hsdsl.backends.python import compile_routines
 from hsdsl.expression.scope import symbol
-from hsdsl.lower import lower_expressions
 from hsdsl.model.values import Values
 from hsdsl.plot import GuardLine
 
@@ -25,11 +23,8 @@ def guard_lines(values: Values) -> list[GuardLine]:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
                 if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters:
                     lines.append((mode.name, states[side], level, label))
-    if not lines:
-        return []
-    routines = lower_expressions(system, {f"level_{k}": level for k, (_, _, level, _) in enumerate(lines)})
-    levels = compile_routines(routines, values.kernel.arithmetic, "levels")()
+    levels = values.evaluate({f"level_{k}": level for k, (_, _, level, _) in enumerate(lines)}) if lines else {}
     return [
-        GuardLine(mode, state, float(level(*values.parameters)[0]), label)
-        for (mode, state, _, label), level in zip(lines, levels, strict=True)
+        GuardLine(mode, state, float(level), label)
+        for (mode, state, _, label), level in zip(lines, levels.values(), strict=True)
     ]

@@ -6,12 +6,10 @@ from __future__ import annotations
 
 import sympy as sp
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.backends.python import compile_routines
+from hsdsl.arithmetic import Number
 from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
-from hsdsl.lower import lower_expressions
 from hsdsl.model.values import Values
 from hsdsl.simulate.settings import OneStop
 from hsdsl.simulate.stops import show
@@ -27,7 +25,10 @@ def one_stop(values: Values, x: tuple[Number, ...]) -> OneStop:
     """
     with deep_stack():
         position, expressions = _structure(values.system)
-    numbers = _evaluate(values, expressions)
+    numbers = values.evaluate(expressions)
+    for name, number in numbers.items():
+        if not values.kernel.arithmetic.isfinite(number):
+            raise _refusal(f"its {name} has no finite value")
     slope, offset = numbers["slope"], numbers["offset"]
     if slope == 0:
         raise _refusal("its surface does not depend on the position with these parameters")
@@ -95,17 +96,3 @@ def _position(edge: Edge, symbols: list[sp.Symbol], known: set[sp.Symbol]) -> in
         if slope != 0 and slope.free_symbols <= known and residual.subs({x: 0}).free_symbols <= known:
             return k
     raise _refusal(f"the guard {edge.surface.text} is not a constant level of one state")
-
-
-def _evaluate(values: Values, expressions: dict[str, sp.Expr]) -> dict[str, Number]:
-    arithmetic = values.kernel.arithmetic
-    routines = compile_routines(lower_expressions(values.system, expressions), arithmetic, "one_stop")()
-    numbers: dict[str, Number] = {}
-    for name, routine in zip(expressions, routines, strict=True):
-        try:
-            numbers[name] = routine(*values.parameters)[0]
-        except DOMAIN_ERRORS:
-            numbers[name] = arithmetic.functions["nan"]
-        if not arithmetic.isfinite(numbers[name]):
-            raise _refusal(f"its {name} has no finite value")
-    return numbers

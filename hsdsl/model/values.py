@@ -82,6 +82,17 @@ class Values:
         missing = (arithmetic.zero,) * (len(names) - known)
         return lambda *parameters: routine(*parameters, *missing)
 
+    def evaluate(self, expressions: dict[str, Any]) -> dict[str, Number]:
+        """SymPy expressions of parameters as numbers; NaN for one without a value."""
+        from hsdsl.lower import lower_expressions
+
+        arithmetic = self.kernel.arithmetic
+        routines = compile_routines(lower_expressions(self.system, expressions), arithmetic, "expressions")()
+        rows = (_attempt(routine, self.parameters) for routine in routines)
+        return {
+            name: row[0] if row else arithmetic.functions["nan"] for name, row in zip(expressions, rows, strict=True)
+        }
+
     def constant(self, name: str) -> Row:
         """One of the program's constants; its numbers must be finite."""
         return self.alone().constant(name, name)[0]
