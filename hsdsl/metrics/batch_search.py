@@ -54,13 +54,7 @@ class Pairs:
         return norm(self.p[:, own] - self.q[:, other]) * (1 - ROUNDING)
 
     def bounds(self) -> tuple[Array, Array, str]:
-        """What is known: lower and upper ends, and what they rest on.
-
-        Raises
-        ------
-        EndsCross
-            A lower end is above its upper one.
-        """
+        """Lower and upper ends, and what they rest on; raises :class:`EndsCross` where they contradict."""
         if np.any(self.lower > self.upper):
             worst = int(np.argmax(self.lower > self.upper))
             Interval(float(self.lower[worst]), float(self.upper[worst]))

@@ -14,20 +14,7 @@ Array = npt.NDArray[Any]
 
 
 def restrict(coefficients: Array, begin: Array, end: Array) -> Array:
-    """Write polynomials on [0, 1] anew on a part of it.
-
-    Parameters
-    ----------
-    coefficients : array, shape (n, p + 1, w)
-        By power of s.
-    begin, end : array, shape (n,)
-        The part of each: s = begin + u (end - begin).
-
-    Returns
-    -------
-    array, shape (n, p + 1, w)
-        By power of u.
-    """
+    """Write polynomials, powers of s with shape (n, p + 1, w), by powers of u: s = begin + u (end - begin)."""
     result = coefficients.copy()
     degree = coefficients.shape[1] - 1
     at = begin[:, None]

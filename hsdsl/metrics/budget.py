@@ -10,16 +10,9 @@ from time import monotonic
 
 @dataclass
 class Budget:
-    """Some seconds from now on; unlimited unless said otherwise.
+    """Some seconds from now on, unlimited by default.
 
-    Attributes
-    ----------
-    seconds : float
-        How many.
-    ran_out : bool
-        Whether anything was left undone for it.
-    watch : callable, optional
-        Told now and then what the distance is at least and at most.
+    ``ran_out`` records whether anything was left undone; ``watch`` receives the bounds known so far, now and then.
     """
 
     seconds: float = inf

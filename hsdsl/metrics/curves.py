@@ -28,20 +28,10 @@ RESOLVED = 0.05  # a wider gap is explained in the note
 
 @dataclass(frozen=True)
 class CurveDistance:
-    """A distance between two executions.
+    """A distance between two executions by the metric of a name, over a time span.
 
-    Attributes
-    ----------
-    interval : Interval
-        The distance of the recorded curves lies in it, as its status says.
-    time : float or None
-        Where the lower bound is attained; None for a distance that is not a supremum over time.
-    metric : str
-        Its name in the table of metrics.
-    span : tuple of float
-        The time span that was compared.
-    note : str
-        What a reader should know, a sentence each; empty where there is nothing to say.
+    ``time`` is where the lower bound is attained; None for a distance that is not a supremum over time. ``note`` holds
+    a sentence for each thing a reader should know.
     """
 
     interval: Interval
@@ -95,23 +85,11 @@ def rho(
 ) -> CurveDistance:
     """Return the supremum over the common time span of the distance between two executions (Def. 22).
 
-    Parameters
-    ----------
-    a, b : Execution
-        Runs of one model, of any schemes, steps, engines and lengths; of multiprecision numbers the nearest float64
-        counts.
-    metric : PointMetric
-        The distance of points.
-    relaxation : float, optional
-        Compare on the relaxed space of strips so deep, where a strip's points differ by their depth (``metric`` is that
-        space's); else such a point counts as the guard's.
-    gap : float
-        How far apart lower and upper bound may be, relative to the lower one; less than rounding is not asked for.
+    With a ``relaxation``, distances are those on the relaxed space of strips so deep; else a strip's point counts as
+    the guard's. Bounds end up ``gap`` apart, relative to the lower one, or as near as rounding allows.
 
-    Raises
-    ------
-    UsageError
-        The runs have no time in common, one is not finite there, or a strip is deeper than ``relaxation``.
+    Raises :class:`UsageError` without common time, for runs that are not finite, and for strips deeper than
+    ``relaxation``.
     """
     cells = merged(a, b)
     if relaxation is not None:

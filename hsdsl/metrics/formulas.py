@@ -19,19 +19,11 @@ Boxes = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """m functions of n coordinates.
+    """m functions of n coordinates, and their derivatives.
 
-    Attributes
-    ----------
-    value : callable
-        (n,) to (m,); NaN outside the functions' real domain.
-    jacobian : callable
-        (n,) to (m, n).
-    ranges : callable
-        Boxes, given by lower and upper corners of shape (B, n), to lower and upper bounds (B, m) on the values.
-    slopes : callable
-        The same for the derivatives, (B, m, n): bounds on difference quotients where the functions have kinks,
-        unbounded where they may jump.
+    ``value`` maps (n,) to (m,), NaN outside the functions' real domain, and ``jacobian`` to (m, n). ``ranges`` and
+    ``slopes`` bound both over boxes, given by corners of shape (B, n): (B, m) and (B, m, n). Slopes bound difference
+    quotients where functions have kinks, and are unbounded where functions may jump.
     """
 
     value: Callable[[Array], Array]
@@ -67,15 +59,9 @@ def affine(matrix: Array, constant: Array) -> Formula:
 
 
 def compiled(text: Routines, shape: tuple[int, int], jumps: bool) -> Formula:
-    """A formula from generated routines ``value`` and ``jacobian`` (row by row).
+    """A formula of m functions of n coordinates from routines ``value`` and ``jacobian`` (row by row) over x0, x1, ...
 
-    Parameters
-    ----------
-    text : Routines
-        Both, over coordinates x0, x1, ...
-    shape : (m, n)
-    jumps : bool
-        Whether a function may jump, so that derivatives say nothing of differences.
+    Where functions may jump, derivatives say nothing of differences.
     """
     value, jacobian = compile_routines(text, FLOAT64, "geometry")()
     over: list[Callable[..., Sequence[Any]]] = []

@@ -43,8 +43,8 @@ class Domain:
     def excess(self, x: Array, size: float) -> tuple[float, str | None]:
         """How far a point is beyond the worst inequality, and that inequality's text.
 
-        Relative to ``size``, the length of the points that are compared, and to the inequality's own level. Beyond a
-        curved one it counts how far, to first order, the point is from where the inequality holds.
+        Relative to ``size``, the length of the compared points, and the inequality's level; to first order where it is
+        curved.
         """
         size = max(size, float(np.linalg.norm(x)), 1e-300)
         flat = (self.normals @ x - self.levels) / (size + np.abs(self.levels))
@@ -186,21 +186,9 @@ class Passage:
 class Space:
     """A model's domains glued along its guards, for one set of parameter values.
 
-    Attributes
-    ----------
-    modes : tuple of str
-        Names, in file order.
-    domains : tuple of Domain
-        One for each mode; coordinates are its states and, where ``timed``, time as the last one.
-    gates : tuple of Gate
-        Guards with affine surface and reset, in convex pieces; without those that are empty.
-    curved_gates : tuple of CurvedGate
-        The other guards.
-    kept : tuple of tuple of int, or None
-        For each mode where the coordinates stand that every mode has and no passage changes: their Euclidean distance
-        is a lower bound everywhere. None where there are none.
-    timed : bool
-        Whether a surface, condition or reset depends on time or an input, so that time is a coordinate.
+    ``gates`` are the guards with affine surface and reset, in convex pieces; ``curved_gates`` the others. ``kept`` are,
+    for each mode, the places of coordinates that every mode has and no passage changes: their Euclidean distance is a
+    lower bound everywhere. Where ``timed``, time is the last coordinate of every domain.
     """
 
     modes: tuple[str, ...]
@@ -212,13 +200,7 @@ class Space:
     cache: dict[Any, Any] = field(default_factory=dict[Any, Any], repr=False)
 
     def mode_index(self, name: str) -> int:
-        """Where a mode stands.
-
-        Raises
-        ------
-        KeyError
-            There is none of that name.
-        """
+        """A mode's index by name."""
         try:
             return self.modes.index(name)
         except ValueError:

@@ -29,18 +29,9 @@ class EndsCross(RuntimeError):
 class Interval:
     """A distance known to lie between ``lower`` and ``upper``, both included; ``inf`` where there is no path.
 
-    Attributes
-    ----------
-    lower, upper : float
-    status : str
-        ``certified``: both ends are proved. ``up to N hops``: so are they, but paths with more passages were left out,
-        and one may be shorter than the upper end. ``sampled``: something was looked at in points only. ``searched``:
-        the upper end is the best path that local solves found; the lower end is proved.
-
-    Raises
-    ------
-    EndsCross
-        Unless 0 <= lower <= upper.
+    Status ``certified``: both ends are proved. ``up to N hops``: so are they, but a path with more passages may be
+    shorter than the upper end. ``sampled``: something was evaluated in points only. ``searched``: the upper end is the
+    best path of local solves; the lower end is proved.
     """
 
     lower: float

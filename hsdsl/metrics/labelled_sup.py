@@ -48,19 +48,7 @@ class Labelled:
 
 
 def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
-    """Return the supremum over the common time span of D between two runs at the same time.
-
-    Parameters
-    ----------
-    a, b : Execution
-    gap : float
-        How far apart lower and upper bound may be, relative to the lower one.
-
-    Raises
-    ------
-    UsageError
-        The runs have no time in common, or one is not finite there.
-    """
+    """Return the supremum over the common time span of D between two runs at the same time, to a relative gap."""
     cells = merged(a, b)
     if cells.same:
         return no_distance(cells, "sup")

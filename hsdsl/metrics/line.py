@@ -32,21 +32,9 @@ def on_line(shape: Shape, offsets: list[Array], numbers: Array) -> tuple[Array, 
 def minimise_on_line(
     matrices: list[Array], offsets: list[Array], low: float, high: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Minimise ``sum_i |matrices[i] s + offsets[i]|`` over ``low <= s <= high``.
+    """Minimise N sums of norms ``|matrices[i] s + offsets[i]|`` over ``low <= s <= high``; offsets are (N, n_i) arrays.
 
-    Parameters
-    ----------
-    matrices : list of (n_i,) arrays
-        Slopes, the same for every problem.
-    offsets : list of (N, n_i) arrays
-        Offsets, a row for each of N problems.
-    low, high : float
-        The interval, which may be unbounded.
-
-    Returns
-    -------
-    (N,) lower bounds, (N,) values attained, (N,) where, (N,) how far from 0 the minimum can be
-        The first two differ by round-off.
+    Returns lower bounds, values attained (more by round-off), where, and how far from 0 the minimum can be.
     """
     count = len(offsets[0])
     slopes = [float(m @ m) for m in matrices]

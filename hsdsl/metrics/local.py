@@ -56,23 +56,16 @@ def search_locally(
                 for number, sequence in enumerate(_sequences(space, start, end, hops)):
                     if found.upper <= enough or (number and budget.spent()):
                         return found
-                    _try(space, sequence, start, end, relaxation, found, budget)
+                    route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
+                    _try(route, start.cost + end.cost + relaxation * len(sequence), found, budget)
     return found
 
 
 def improve(route: Route, guess: Array, relaxation: float, budget: Budget) -> tuple[float, Route, Array] | None:
-    """The shortest path near a guess through a given sequence, None where none is found.
-
-    Returns
-    -------
-    length, route, unknowns
-        With tolls; the route may have bends added.
-    """
-    found = Found(upper=np.inf)
-    ends = End(*route.start), End(*route.end)
+    """The shortest path near a guess through a given sequence: length with tolls, route, unknowns."""
+    found = Found()
     with one_thread():
-        toll = relaxation * sum(c.edge is not None for c in route.sequence)
-        _try_from(route, guess, *ends, toll, found, budget)
+        _try_from(route, guess, relaxation * route.passages, found, budget)
     return None if found.upper == np.inf else (found.upper, found.through, found.unknowns)
 
 
@@ -95,32 +88,19 @@ def _back(sequence: tuple[Crossing, ...], following: Crossing) -> bool:
     return bool(sequence) and sequence[-1].surface is following.surface and sequence[-1].forward != following.forward
 
 
-def _try(
-    space: Space,
-    sequence: tuple[Crossing, ...],
-    start: End,
-    end: End,
-    relaxation: float,
-    found: Found,
-    budget: Budget,
-) -> None:
-    toll = start.cost + end.cost + relaxation * len(sequence)
-    route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
-    if not sequence:
-        verdict = int(segments_inside(space, start.mode, start.x[None], end.x[None])[0])
+def _try(route: Route, toll: float, found: Found, budget: Budget) -> None:
+    p, q = route.start[1], route.end[1]
+    if not route.sequence:
+        verdict = int(segments_inside(route.space, route.start[0], p[None], q[None])[0])
         if verdict != OUTSIDE:
-            _keep(found, float(np.linalg.norm(start.x - end.x)) + toll, route, start, end, np.zeros(0), verdict)
+            _keep(found, float(np.linalg.norm(p - q)) + toll, route, np.zeros(0), verdict)
         else:
-            middle = (start.x + end.x) / 2
-            _try_from(_bent(route, np.zeros(0), [0]), middle, start, end, toll, found, budget, BENDS - 1)
-        return
-    for guess in _guesses(space, sequence, start, end):
-        _try_from(route, guess, start, end, toll, found, budget)
+            _try_from(_bent(route, np.zeros(0), [0]), (p + q) / 2, toll, found, budget, BENDS - 1)
+    for guess in _guesses(route) if route.sequence else ():
+        _try_from(route, guess, toll, found, budget)
 
 
-def _try_from(
-    route: Route, guess: Array, start: End, end: End, toll: float, found: Found, budget: Budget, bends: int = BENDS
-) -> None:
+def _try_from(route: Route, guess: Array, toll: float, found: Found, budget: Budget, bends: int = BENDS) -> None:
     """Solve from a guess; where straight pieces leave their domains, let them bend and solve again."""
     size = FAR * (route.size(guess) or np.inf)
     for margin in MARGINS:
@@ -134,10 +114,10 @@ def _try_from(
         verdicts = route.judged(s)
         outside = [k for k, verdict in enumerate(verdicts) if verdict == OUTSIDE]
         if not outside:
-            _keep(found, value, route, start, end, s, min(verdicts))
+            _keep(found, value, route, s, min(verdicts))
         elif bends:
             bent = _bent(route, s, outside)
-            _try_from(bent, _with_middles(route, s, outside), start, end, toll, found, budget, bends - 1)
+            _try_from(bent, _with_middles(route, s, outside), toll, found, budget, bends - 1)
         return
 
 
@@ -165,28 +145,25 @@ def _with_middles(route: Route, s: Array, legs: Sequence[int]) -> Array:
     return np.concatenate(parts)
 
 
-def _keep(found: Found, value: float, route: Route, start: End, end: End, s: Array, verdict: int) -> None:
-    if value >= found.upper:
-        return
-    found.upper, found.start, found.end, found.unknowns = value, start, end, s
-    found.route = [(c.edge, c.forward) for c in route.sequence]
-    found.legs, found.through = route.legs(s), route
-    found.proved = verdict == CERTAIN
+def _keep(found: Found, value: float, route: Route, s: Array, verdict: int) -> None:
+    if value < found.upper:
+        found.upper, found.unknowns, found.through, found.proved = value, s, route, verdict == CERTAIN
 
 
-def _guesses(space: Space, sequence: tuple[Crossing, ...], start: End, end: End) -> list[Array]:
-    """Guard points between p and q, by the names of their coordinates; then some beside them."""
-    from_p = dict(zip(space.domains[start.mode].coordinates, start.x.tolist(), strict=True))
-    from_q = dict(zip(space.domains[end.mode].coordinates, end.x.tolist(), strict=True))
+def _guesses(route: Route) -> list[Array]:
+    """Guard points between p and q, by the names of their coordinates; then some near them."""
+    domains, (source, p), (target, q) = route.space.domains, route.start, route.end
+    from_p = dict(zip(domains[source].coordinates, p.tolist(), strict=True))
+    from_q = dict(zip(domains[target].coordinates, q.tolist(), strict=True))
     middle: list[float] = []
-    for k, crossing in enumerate(sequence):
-        share = (k + 1) / (len(sequence) + 1)
-        for name in space.domains[crossing.guard_mode].coordinates:
+    for k, crossing in enumerate(route.sequence):
+        share = (k + 1) / (len(route.sequence) + 1)
+        for name in domains[crossing.guard_mode].coordinates:
             a = from_p.get(name, from_q.get(name, 0.0))
             middle.append(a + share * (from_q.get(name, a) - a))
     guess = np.array(middle)
     spread = np.random.default_rng(0).normal(size=((STARTS - 1) * (len(guess) < MANY), len(guess)))
-    ends = np.abs(np.concatenate([start.x, end.x])).max(initial=0.0)
+    ends = np.abs(np.concatenate([p, q])).max(initial=0.0)
     width = 0.1 * (float(np.abs(guess).max(initial=ends)) or 1.0)
     return [guess, *(guess + width * row for row in spread)]
 

@@ -13,20 +13,10 @@ from hsdsl.metrics.trace import Array, Trace
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One curve on n cells.
+    """One curve on n cells, each a part of a piece of ``trace``.
 
-    Attributes
-    ----------
-    pieces : array of int, shape (n,)
-        The piece of ``trace`` that the cell is part of.
-    powers : array, shape (n, p + 1, w)
-        Its polynomial by powers of u in [0, 1] over the cell.
-    depth : array, shape (n, 2)
-        Depth in the strip at the cell's ends, 0 where the state flows.
-    duration : array, shape (n,)
-        Length of the cell in time.
-    doubt : array, shape (n,)
-        How far rounding may have moved any point of the curve, in computing it from the piece.
+    ``powers`` (n, p + 1, w) are its polynomials by powers of u in [0, 1]; ``depth`` (n, 2) is the depth in the strip at
+    the cells' ends, 0 where the state flows; ``doubt`` is how far rounding may have moved any point of the curve.
     """
 
     trace: Trace
@@ -123,13 +113,7 @@ class Cells:
 
 
 def common_span(a: Trace, b: Trace) -> tuple[float, float]:
-    """Return the time span that both curves cover.
-
-    Raises
-    ------
-    UsageError
-        They have no time in common.
-    """
+    """Return the time span that both curves cover; raise :class:`UsageError` without any."""
     begin, end = max(a.start[0], b.start[0]), min(a.end[-1], b.end[-1])
     if begin > end:
         raise UsageError(

@@ -155,7 +155,7 @@ class _Batch:
             holds &= segments_inside(self.owner.space, pieces[0][0], a, b) != OUTSIDE
         for (k, found), good in zip(moved, holds.tolist(), strict=True):
             if good:
-                self._shorter(k, found.route.charged(found.points) + self._toll(found.route), found)
+                self._shorter(k, found.route.charged(found.points) + self.pairs.toll * found.route.passages, found)
 
     def improve(self, k: int, enough: float) -> None:
         """Search from the best guess, or from nothing where there is none, or another way may be much shorter."""
@@ -192,6 +192,3 @@ class _Batch:
     def _shorter(self, k: int, value: float, found: Known) -> None:
         if value < self.pairs.upper[k]:
             self.pairs.upper[k], self.guess[k], self.shortened[k] = value, found, True
-
-    def _toll(self, route: Route) -> float:
-        return self.pairs.toll * sum(c.edge is not None for c in route.sequence)

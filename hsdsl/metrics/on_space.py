@@ -17,21 +17,7 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """n points of one mode.
-
-    Attributes
-    ----------
-    mode : str
-        Name of the mode.
-    x : array, shape (n, d)
-        States in the mode's order.
-    t : array, shape (n,)
-        Time.
-    edge : array of str, shape (n,)
-        The edge whose strip a point is in; empty in the domain.
-    depth : array, shape (n,)
-        How deep in the strip.
-    """
+    """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
 
     mode: str
     x: Array

@@ -9,6 +9,7 @@ import numpy as np
 from hsdsl.metrics.gate_sequence import gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
+from hsdsl.metrics.routes import Route
 from hsdsl.metrics.search import TOLERANCE, End, Found
 
 ROUNDING = 16 * 2.0**-53  # of a few sums, relative to themselves
@@ -68,13 +69,7 @@ class PointDistance:
 
 
 def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) -> list[End]:
-    """The ways a path can end at a place: in its domain, or bound to go on through its strip.
-
-    Raises
-    ------
-    ValueError
-        The place does not fit the space.
-    """
+    """The ways a path can end at a place: in its domain, or bound to go on through its strip."""
     mode, x = coordinates(space, place)
     if place.edge is None or relaxation is None:
         return [End(mode, x)]
@@ -105,13 +100,7 @@ def coordinates(space: Space, place: Place) -> tuple[int, Array]:
 
 
 def answer(space: Space, found: Found, hops: int) -> PointDistance:
-    """The answer to a search.
-
-    Raises
-    ------
-    EndsCross
-        The search contradicts itself.
-    """
+    """The answer to a search."""
     lower, upper = min(found.lower, found.cut) * (1 - ROUNDING), found.upper * (1 + ROUNDING)
     if lower == upper == np.inf and not found.local:
         return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
@@ -143,11 +132,13 @@ def _of_local_solves(found: Found) -> str:
 
 
 def _path(space: Space, found: Found) -> tuple[Piece, ...]:
+    if found.through is not None:
+        route: Route = found.through
+        passed = [(c.edge, c.forward) for c in route.sequence]
+        legs = zip(route.legs(found.unknowns), [*passed, (None, True)], strict=True)
+        return tuple(_piece(space, *leg, *by) for leg, by in legs)
     if found.start is None or found.end is None:
         return ()
-    if found.legs:
-        passed = [*found.route, (None, True)]
-        return tuple(_piece(space, *leg, *by) for leg, by in zip(found.legs, passed, strict=True))
     at, mode = found.start.x, found.start.mode
     pieces: list[Piece] = []
     if found.sequence:

@@ -29,27 +29,14 @@ def distance(
     hops: int | None = None,
     budget: Budget | None = None,
 ) -> PointDistance:
-    """The distance between two points.
+    """The distance between two points of a space, or with a ``relaxation`` (Def. 19) of its relaxed one.
 
-    Parameters
-    ----------
-    space : Space
-        The model's.
-    p, q : Place
-        The points; both of the same kind of space.
-    relaxation : float, optional
-        The relaxed metric's (Def. 19); without it, the quotient metric's (Def. 12), in which a point of a strip counts
-        as its guard point.
-    hops : int, optional
-        The most passages of the paths compared; left out, eight more than the fewest that connect the modes. The lower
-        end holds for paths with more, too.
-    budget : Budget, optional
-        The time that may be spent; then the best that is known is returned.
+    Without it a point of a strip counts as its guard point. ``hops`` caps the passages of the compared paths; by
+    default at eight more than the fewest that connect the modes. The lower end holds for paths with more, too. When the
+    budget is spent, the best that is known is returned.
 
-    Raises
-    ------
-    ValueError
-        A place does not fit the space: unknown mode or edge, wrong number of states, missing time, impossible depth.
+    Raises ValueError for a place that does not fit: unknown mode or edge, wrong number of states, missing time,
+    impossible depth.
     """
     starts, ends = ends_of(space, p, relaxation, False), ends_of(space, q, relaxation, True)
     if p == q:
@@ -77,31 +64,10 @@ def distances(
     hops: int | None = None,
     budget: Budget | None = None,
 ) -> tuple[Array, Array, str]:
-    """The distances of many pairs of points in the same two modes' domains.
+    """Lower and upper bounds of the distances of N pairs, rows of p and q, in two modes' domains; and their status.
 
-    Parameters
-    ----------
-    space : Space
-        The model's.
-    mode_p, mode_q : str
-        The modes.
-    p, q : (N, n) arrays
-        The pairs, a row each; the columns are the mode's states and, where ``space.timed``, time.
-    relaxation : float, optional
-        The relaxed metric's.
-    neighbours : Neighbours, optional
-        Where something is not affine: paths found for earlier pairs, to begin with.
-    enough : float
-        There, bounds of at most this need not be close.
-    hops, budget
-        As for :func:`distance`.
-
-    Returns
-    -------
-    lower, upper : (N,) arrays
-        Bounds.
-    status : str
-        What they rest on, see :class:`hsdsl.metrics.Interval`.
+    Columns are the mode's states and, where ``space.timed``, time. Where something is not affine, ``neighbours`` are
+    paths of earlier pairs to begin with, and bounds of at most ``enough`` need not be close.
     """
     pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
     if space.components[pairs.source] != space.components[pairs.target]:

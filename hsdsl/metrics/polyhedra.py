@@ -37,22 +37,8 @@ def gate_of(
 ) -> Gate | None:
     """A guard as a gate, None where it is empty.
 
-    Parameters
-    ----------
-    edge : str
-        Its name.
-    modes : (int, int)
-        Where it leaves and leads.
-    surface : row
-        ``normal . x = level`` on the guard.
-    inequalities : rows
-        What holds on it besides.
-    reset : matrix and vector
-        Its affine reset.
-    image : rows
-        What holds in the domain it leads into.
-    curved : tuple of callable
-        Conditions that are not affine.
+    ``surface`` is ``normal . x = level`` on it, ``inequalities`` hold besides, ``image`` holds in the domain that the
+    affine reset leads into, and ``curved`` are conditions that are not affine.
     """
     if not any(surface[0]):
         return None

@@ -15,18 +15,9 @@ from hsdsl.metrics.trace import Array, Trace
 class Polyline:
     """n points of a curve, the ends of all its continuous parts among them.
 
-    Attributes
-    ----------
-    times : array, shape (n,)
-    states : array, shape (n, w)
-    label : array of int, shape (n,)
-        Number of the mode, the same for curves made together.
-    jump : array of int, shape (n,)
-        Transitions made before.
-    jumps : array of bool, shape (n - 1,)
-        Whether the curve jumps from a point to the next (at one time) rather than flows.
-    reach : float
-        The longest way, in time plus states, from a point to the next along the flow.
+    ``label`` numbers the modes, alike for curves made together; ``jump`` counts the transitions before each point;
+    ``jumps`` (n - 1,) tells whether the curve jumps to the next point; ``reach`` is the longest way, in time plus
+    states, that it flows to a next point.
     """
 
     times: Array
@@ -55,17 +46,9 @@ class _Parts:
 def polylines(
     curves: Sequence[Trace], spans: Sequence[tuple[float, float]], resolution: int, cuts: float | None = None
 ) -> list[Polyline]:
-    """Choose points of curves, evenly along the way that each goes in time plus states.
+    """Choose about ``resolution`` points of each curve on a span, evenly along its way in time plus states.
 
-    Parameters
-    ----------
-    curves : sequence of Trace
-    spans : sequence of (begin, end)
-        The part of each in time.
-    resolution : int
-        About how many points each, besides the ends of continuous parts.
-    cuts : float, optional
-        A hybrid time t + j at which a point is wanted on each curve.
+    The ends of continuous parts are added, and the point at the hybrid time ``cuts``, if given.
     """
     numbers = {name: k for k, name in enumerate(dict.fromkeys(m for curve in curves for m, _ in curve.modes))}
     return [_polyline(c, span, resolution, cuts, numbers) for c, span in zip(curves, spans, strict=True)]

@@ -87,11 +87,8 @@ class Plane:
 def maximise(cost: Sequence[Fraction], rows: Sequence[Row], start: Sequence[Fraction]) -> tuple[Vector, Vector] | None:
     """Maximise ``cost . x`` where ``normal . x <= level`` for every row, from a point where that holds.
 
-    Returns
-    -------
-    point, weights
-        Where the maximum is attained, and a weight for each row, not negative: their sum is the cost, and rows of
-        positive weight hold as equations wherever the maximum is attained. None where there is no maximum.
+    Returns a maximiser and a weight for each row, None where there is no maximum. Weights are not negative, their sum
+    is the cost, and rows of positive weight hold as equations at every maximiser.
     """
     size = len(start)
     # A line for each basic variable: its value, and its change with each other one. Names: x is 0 to n, then the rows.
@@ -158,12 +155,10 @@ def _replaced(line: list[Fraction], column: int, by: list[Fraction]) -> list[Fra
 
 
 def deepest(rows: Sequence[Row]) -> tuple[Fraction, Vector, Vector]:
-    """The point as far from all inequalities as can be, up to the largest number in them.
+    """The depth of the point farthest inside all rows, that point, and weights of the rows.
 
-    Returns
-    -------
-    depth, point, weights
-        Depth is negative where no point satisfies all rows. Where it is 0, rows of positive weight are equations.
+    Depth is at most their largest number, and negative where no point satisfies all rows. Where it is 0, rows of
+    positive weight are equations.
     """
     size = len(rows[0][0])
     lengths = [about(normal) for normal, _ in rows]

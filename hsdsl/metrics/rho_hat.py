@@ -21,19 +21,8 @@ from hsdsl.names import did_you_mean
 def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None) -> CurveDistance:
     """Return the largest |a(t_k) - b(t_k)| over the times t_k of the first run's rows.
 
-    Where either run jumps, left limits are compared with left limits and values with values.
-
-    Parameters
-    ----------
-    a, b : Execution
-        The sampled run, and what it is compared with (the exact solution, in the paper).
-    coordinates : names, optional
-        The position. Left out: all states that every mode visited has.
-
-    Raises
-    ------
-    UsageError
-        A coordinate that a visited mode lacks, or no time in common.
+    Where either run jumps, left limits are compared with left limits and values with values. ``coordinates`` are the
+    position; by default all states that every visited mode has.
     """
     cells = merged(a, b)
     columns = _columns(cells, coordinates)

@@ -94,6 +94,11 @@ class Route:
     end: tuple[int, Array]
     held: tuple[tuple[int, float], ...] = ()
 
+    @property
+    def passages(self) -> int:
+        """How many guards it passes; bends do not count."""
+        return sum(c.edge is not None for c in self.sequence)
+
     def points(self, unknowns: Array) -> list[Array]:
         """The guard points."""
         return [unknowns[where] for where in self._slices]

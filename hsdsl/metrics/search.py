@@ -57,8 +57,6 @@ class Found:
     ended_early: bool = False
     local: bool = False
     proved: bool = True  # of a path through curved domains: that it stays inside
-    route: list[tuple[str | None, bool]] = field(default_factory=list[tuple[str | None, bool]])
-    legs: list[tuple[int, Array, Array]] = field(default_factory=list[tuple[int, Array, Array]])
     through: Any = None  # the route of a path by local solves, its guard points being ``unknowns``
 
 
@@ -71,18 +69,9 @@ def search(
     limit: float,
     budget: Budget,
 ) -> Found:
-    """Search between any of ``starts`` and any of ``ends``.
+    """Search between any of ``starts`` and any of ``ends``; only paths shorter than ``limit`` matter.
 
-    Parameters
-    ----------
-    relaxation : float
-        What each passage costs.
-    hops : int
-        The most passages on a path; what is cut there is kept apart in ``Found.cut``.
-    limit : float
-        Only paths shorter than this matter (inf: all).
-    budget : Budget
-        The time for it.
+    Each passage costs the relaxation. Paths with more passages than ``hops`` are only bounded, in ``Found.cut``.
     """
     found = Found(upper=limit, lower=limit)
     with one_thread():

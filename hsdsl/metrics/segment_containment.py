@@ -19,12 +19,9 @@ OUTSIDE, UNDECIDED, CERTAIN = 0, 1, 2
 def segments_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
     """Judge the straight pieces from a to b, (B, n) arrays of points of one mode.
 
-    Returns
-    -------
-    (B,) array of int
-        ``CERTAIN`` where every inequality holds all along, ``OUTSIDE`` where one does not, and ``UNDECIDED`` where none
-        was seen broken in ``SAMPLES`` places and enclosures were too wide to prove it. No place has to keep an
-        inequality better than the ends do, which may be beyond it as far as points of the space may.
+    ``CERTAIN`` where every inequality holds all along, ``OUTSIDE`` where one does not, ``UNDECIDED`` where none is
+    broken in ``SAMPLES`` places and enclosures are too wide for a proof. No place has to keep an inequality better than
+    the ends.
     """
     verdict = np.full(len(a), CERTAIN)
     for formula in space.domains[mode].curved:

@@ -25,20 +25,9 @@ RESOLUTION = 1000
 def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> CurveDistance:
     """Return the Skorokhod distance of two runs over their common time span.
 
-    The best coupling of n and m points of the two curves is found exactly by dynamic programming, visit by visit of the
-    modes where both make the same ones, else in O(n m) among points that are near enough; it differs from the distance
-    by no more than the way between neighbouring points.
-
-    Parameters
-    ----------
-    a, b : Execution
-    resolution : int
-        About how many points of each curve are coupled.
-
-    Raises
-    ------
-    UsageError
-        The runs have no time in common, or one is not finite there.
+    The best coupling of about ``resolution`` points of each curve is found exactly by dynamic programming, visit by
+    visit of the modes where both make the same ones, else in O(n m) among points that are near enough. It differs from
+    the distance by no more than the way between neighbouring points.
     """
     cells = merged(a, b)
     span = common_span(cells.a, cells.b)

@@ -40,12 +40,7 @@ def _controller() -> Any:
 def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
     """Minimise B problems of one shape, in at most so many rounds.
 
-    Returns
-    -------
-    lower, upper : (B,) arrays
-        Between which the minima lie; see :mod:`hsdsl.metrics.rounding`.
-    s : (B, N) array
-        Where ``upper`` is attained.
+    Returns lower and upper ends (B,), see :mod:`hsdsl.metrics.rounding`, and where the upper ones are attained, (B, N).
     """
     shape, offsets, numbers = problem.shape, problem.offsets, problem.numbers
     if not shape.matrices:

@@ -82,24 +82,10 @@ class _Frontier:
 
 
 def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int, budget: Budget) -> Supremum:
-    """Find the supremum over all cells.
+    """Find the supremum of a distance over all cells.
 
-    Parameters
-    ----------
-    cells : Cells
-        The common time span.
-    distance : CellDistance
-        What to take the supremum of.
-    gap, floor : float
-        Stop when ``upper - lower <= max(gap * lower, floor)``, or when the bounds at single times allow no less.
-    most : int
-        Evaluate the distance at no more times than about this.
-    budget : Budget
-        The time for it, and whom to tell how far it is.
-
-    Returns
-    -------
-    Supremum
+    Stops when ``upper - lower <= max(gap * lower, floor)``, when bounds at single times allow no less, after about
+    ``most`` evaluations, or when the budget is spent.
     """
     found = Supremum(float(cells.begin[0]))
     search = _Search(distance, found, gap, floor, most, budget)

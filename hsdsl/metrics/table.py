@@ -72,14 +72,7 @@ ON_THE_SPACE = ("rho", "quotient", "relaxed")
 
 
 def between(metric: str, request: Request) -> CurveDistance:
-    """Compute a distance between two executions by its name.
-
-    Raises
-    ------
-    UsageError
-        There is no such distance, it does not take what is asked for, the runs are of different models, or it refuses
-        them.
-    """
+    """Compute a distance between two executions by its name; refuse options that it does not take."""
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
     check_same_model(request.a, request.b)
@@ -93,13 +86,7 @@ def between(metric: str, request: Request) -> CurveDistance:
 
 
 def check_same_model(a: Execution, b: Execution) -> None:
-    """Refuse runs of different models.
-
-    Raises
-    ------
-    UsageError
-        Their digests differ.
-    """
+    """Refuse runs of different models."""
     if a.digest != b.digest:
         raise UsageError(
             f"the runs are of different models ({a.model} and {b.model}, or an edited file): "

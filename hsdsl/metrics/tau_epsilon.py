@@ -24,20 +24,8 @@ def tau_epsilon(a: Execution, b: Execution, tau: float | None = None, resolution
     """Return the infimum of the epsilons for which two runs are (tau, epsilon)-close.
 
     Infinite where one run makes a transition, with t + j <= tau, that the other never makes. Symmetric, but no metric:
-    the cut at tau breaks the triangle inequality.
-
-    Parameters
-    ----------
-    a, b : Execution
-    tau : float, optional
-        Up to which hybrid time t + j; left out, as far as both runs go.
-    resolution : int
-        About how many points of each run are compared; the interval allows for what lies between them.
-
-    Raises
-    ------
-    UsageError
-        A run is not finite.
+    the cut at tau breaks the triangle inequality. About ``resolution`` points of each run are compared; the interval
+    allows for what lies between them. By default tau is as far as both runs go.
     """
     names = names_of((a, b))
     curves = trace(a, names, instants=True), trace(b, names, instants=True)

@@ -23,29 +23,12 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """An execution's n pieces in time order, the last of no length.
+    """An execution's n pieces in time order, the last of no length; each other one starts where the one before it ends.
 
-    Attributes
-    ----------
-    names : tuple of str
-        What the w columns are: states by name, of all modes of all curves that are compared. A state that a mode lacks
-        is 0 there.
-    start, end : array, shape (n,)
-        Time; each piece but the last starts where the one before it ends.
-    mode : array of int, shape (n,)
-        Index into ``modes``.
-    modes : tuple of (str, tuple of int)
-        Name and the columns of its states, in the mode's order.
-    jump : array of int, shape (n,)
-        Transitions made before it.
-    strip : array of int, shape (n,)
-        In a strip: the index of the transition that ends it; -1 where the state flows.
-    edges : tuple of str
-        Edge of each transition.
-    coefficients : array, shape (n, p + 1, w)
-        By power of s in [0, 1], s = 0 at the start.
-    depth : array, shape (n, 2)
-        How deep in the strip at start and end.
+    The w columns are ``names``: states of all modes of all compared curves; 0 where a mode lacks one. ``mode`` indexes
+    ``modes``, each a name and the columns of its states. ``jump`` counts the transitions before a piece. ``strip`` is
+    the index of the transition that ends a strip, -1 where the state flows, and ``edges`` names each transition's edge.
+    ``coefficients`` (n, p + 1, w) are by powers of s in [0, 1]; ``depth`` (n, 2) is that in the strip at start and end.
     """
 
     names: tuple[str, ...]
@@ -78,9 +61,8 @@ class Trace:
     def doubt(self) -> Array:
         """How far rounding may move any point of each piece that is computed from its coefficients.
 
-        To find the share of a piece and shift its polynomial there takes some 8 p roundings of numbers that add up to
-        no more than the coefficients but the first, and p that are added to the first. Where nothing moves nothing is
-        rounded.
+        The share of a piece and the shifted polynomial take some 8 p roundings of numbers that add up to no more than
+        the coefficients but the first, and p that are added to the first. Where nothing moves nothing is rounded.
         """
         first = np.sqrt(np.sum(self.coefficients[:, 0] ** 2, axis=1))
         added = (self.coefficients.shape[1] + 4) * UNIT * first

@@ -7,7 +7,7 @@ import pytest
 
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import Scope, state, symbol
-from hsdsl.metrics.space.formulas import formula
+from hsdsl.metrics.space.expressions import formula
 
 SCOPE = Scope({"x": state("x"), "y": state("y")})
 

@@ -19,29 +19,17 @@ from hsdsl.expression.stack import deep_stack
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
 from hsdsl.metrics.polyhedra import gate_of, unit_rows
-from hsdsl.metrics.space.affine import affine as as_affine
-from hsdsl.metrics.space.conditions import clauses
-from hsdsl.metrics.space.formulas import formula
-from hsdsl.metrics.space.images import equations
+from hsdsl.metrics.space.expressions import affine as as_affine
+from hsdsl.metrics.space.expressions import clauses, equations, formula
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 MOST_SAMPLES = 200  # of an input that a guard depends on
 
 
 def make_space(system: HybridSystem, parameters: Sequence[float]) -> Space:
-    """Make a model's space at given parameter values.
+    """Make a model's space at given parameter values, in file order.
 
-    Parameters
-    ----------
-    system : HybridSystem
-        The model.
-    parameters : sequence of float
-        A value for each parameter, in file order.
-
-    Raises
-    ------
-    UsageError
-        A final mode is entered with different states, or a guard depends on an input of too many samples.
+    Raises :class:`UsageError` for a final mode entered with different states and for an input of too many samples.
     """
     with deep_stack():
         return _Maker(system, parameters).space()
