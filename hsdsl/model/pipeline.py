@@ -23,7 +23,7 @@ from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate import Prepared, prepare
+from hsdsl.simulate import Prepared, Problem, prepare
 from hsdsl.simulate.input_segments import Timeline, make_timeline
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class Pipeline:
             settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
         settings = following_digits(settings, options, values.kernel.arithmetic)
         compiled = engines.choose(engine, settings, precision, self._compile)
-        return prepare(self.program, values.kernel, settings, timeline, mode, states, x, compiled)
+        return prepare(Problem(self.program, values.kernel, settings, timeline, mode, states, x), compiled)
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

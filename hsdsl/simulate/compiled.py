@@ -6,7 +6,6 @@ The loop says where and why it stopped; what it means is said by the same functi
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,19 +15,18 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
 from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
-from hsdsl.integrators.stepper import State
 from hsdsl.interrupts import Noted
-from hsdsl.program import Program
 from hsdsl.runtime import methods, structures
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
 from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
+from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
 from hsdsl.simulate.output_buffers import Sink
-from hsdsl.simulate.run import Run
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
 from hsdsl.simulate.workspace import Workspace, Workspaces
@@ -48,30 +46,22 @@ class CompiledPlan:
         The kinds of arcs; the first is what a run begins with.
     """
 
-    def __init__(
-        self,
-        program: Program,
-        compiled: CompiledModel,
-        settings: Settings,
-        timeline: Timeline,
-        mode: int,
-        states: tuple[str, ...],
-        x: State,
-    ) -> None:
+    def __init__(self, problem: Problem, compiled: CompiledModel) -> None:
+        settings, program = problem.settings, problem.program
         assert settings.method is not None
         method, model = methods.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
-        self.program, self.compiled, self.layouts = program, compiled, StateLayouts(program, states)
+        self.problem, self.compiled, self.layouts = problem, compiled, StateLayouts(program, problem.states)
         scheme = settings.scheme
         key = settings.method, scheme, shape
         self.workspaces: Workspaces = compiled.shared(key, lambda: Workspaces(compiled, method, scheme, shape))
         self._settings = task_settings(settings, program.all_states)
         self._interpolation = _interpolations(settings)
-        self._columns = _Timeline(timeline)
+        self._columns = _Timeline(problem.timeline)
         self.timeline = self._columns.pointer
         self.sampled = Sampled(runtime_of(method, scheme), compiled, self.timeline)
-        self._mode, self._x = mode, np.array(x, np.float64)
-        self._start = len(x), self._x.ctypes.data
+        self._mode, self._x = problem.mode, np.array(problem.x, np.float64)
+        self._start = len(problem.x), self._x.ctypes.data
         self.until, self.memory = settings.until, settings.memory
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
@@ -133,17 +123,16 @@ class CompiledRun:
 
     plan: CompiledPlan
     workspace: Workspace
-    fresh: Callable[[], Run]
     _columns: Columns | None = None
     _accumulated: Stop | None = None
 
     @cached_property
-    def run(self) -> Run:
-        """What has its notes, and what a verdict looks at; most runs are asked for neither."""
-        run = self.fresh()
+    def diagnostics(self) -> Diagnostics:
+        """What the run has noted; most runs note nothing, and nobody asks."""
+        diagnostics = Diagnostics()
         if self._columns is not None:
-            self._note(run, self._columns["note"])
-        return run
+            self._note(self._columns["note"], diagnostics)
+        return diagnostics
 
     @property
     def now(self) -> Number:
@@ -170,13 +159,13 @@ class CompiledRun:
         """Run to the end, handing over every chunk as soon as it is full: why it stopped, and the last chunk."""
 
         def take(chunk: dict[str, Array]) -> None:
-            self._note(self.run, chunk["note"])
+            self._note(chunk["note"], self.diagnostics)
             sink(chunk)
 
         self.workspace.chunks.sink = take
         self._run()
         rest = self.workspace.chunks.rest()
-        self._note(self.run, rest["note"])
+        self._note(rest["note"], self.diagnostics)
         return self._stop(), rest
 
     def _run(self) -> None:
@@ -186,13 +175,13 @@ class CompiledRun:
         if self.workspace.failed:
             raise self.workspace.failed[0]
 
-    def _note(self, run: Run, notes: Array) -> None:
+    def _note(self, notes: Array, diagnostics: Diagnostics) -> None:
         if len(notes):
-            from hsdsl.simulate.messages import told
+            from hsdsl.simulate.messages import Note, add_note
 
-            said: list[tuple[int, int, int, int, float, float]] = notes.tolist()
-            for note in said:
-                self._accumulated = told(run, *note) or self._accumulated
+            listed: list[Note] = notes.tolist()
+            for note in listed:
+                self._accumulated = add_note(diagnostics, self.plan.problem.program, note) or self._accumulated
 
     def _stop(self) -> Stop:
         found = self.workspace.task.stop
@@ -200,14 +189,14 @@ class CompiledRun:
         if reason == "until":
             return stops.reached(found.time)
         if reason == "final":
-            return stops.entered_final(self.plan.program.modes[int(found.mode)].name, found.time)
+            return stops.entered_final(self.plan.problem.program.modes[int(found.mode)].name, found.time)
         if reason == "interrupted" and self.workspace.chunks.full:
             return stops.memory(self.plan.memory, self.now)
         if reason == "interrupted":
             return stops.interrupted(self.now)
         from hsdsl.simulate.messages import stop
 
-        run = self.run
+        _ = self.diagnostics  # they may end the run
         if reason == "accumulated" and self._accumulated is not None:
             return self._accumulated
-        return stop(run, self.workspace, reason, self.made)
+        return stop(self.plan.problem, self.workspace, reason)

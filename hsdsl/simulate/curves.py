@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import Polynomial, State
-from hsdsl.simulate import diagnostics
 from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.surface_polynomials import Piece, affine_curve, interpolated
@@ -51,7 +50,7 @@ def _lose(run: Run, here: ModeState, t: Number, curves: Curves) -> None:
     run.control.lost.add(here.mode.name)
     for k, pieces in enumerate(curves):
         if not all(piece.certain for piece in pieces):
-            diagnostics.unsettled(run.recorder, here.mode.name, k, t)
+            run.diagnostics.unsettled(here.mode.name, k, t)
 
 
 def _affine_curves(here: ModeState, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:

@@ -1,108 +1,149 @@
-"""Which expression has no finite value: asked only when a run cannot go on."""
+"""Where and why a run cannot go on: which expression has no finite value, or what no step leads past."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators import RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import NoSeries, terms
+from hsdsl.program import ModeProgram
 from hsdsl.simulate.chatter import jump_between
+from hsdsl.simulate.input_segments import Segment
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.run import ModeState, Run
-from hsdsl.simulate.stops import show
+from hsdsl.simulate.stops import LEFT, left_domain, show
+from hsdsl.simulate.surfaces import StepFailure
 
 NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is looked for
 
 
-Place = tuple[Number, State]
+@dataclass(frozen=True)
+class Standstill:
+    """A place of a run: mode, input segment, time t, state x and its scales; h is the step to try next."""
 
+    problem: Problem
+    mode: int
+    segment: Segment
+    t: Number
+    x: State
+    scales: Sequence[Number]
+    h: Number
 
-def not_finite(run: Run, here: ModeState, t: Number, places: Iterable[Place]) -> Stop:
-    """Stop at time t, naming the first expression without a finite value at one of ``places``."""
-    for place in places:
-        if found := without_value(run, here, *place):
+    @property
+    def program(self) -> ModeProgram:
+        """The mode."""
+        return self.problem.program.modes[self.mode]
+
+    def not_finite(self, places: Iterable[tuple[Number, State]]) -> Stop:
+        """Stop and name the first expression without a finite value at one of ``places``."""
+        t, name, unit = self.t, self.program.name, self.problem.arithmetic.unit
+        for place in places:
+            if found := self._without_value(*place):
+                return Stop("not_finite", t, found)
+        missing = "Taylor series" if self._has_no_series() else "derivatives" if self._has_no_jacobian() else None
+        if missing:
+            sentence = f"the flow of mode {name} has no {missing} at t = {show(t)}; another method may go on"
+            return Stop("not_finite", t, sentence)
+        grown = any(a * a * unit > 1 for a in self.x)
+        if not grown and (found := self._without_value_later()):
             return Stop("not_finite", t, found)
-    if has_no_series(run, here, t):
-        sentence = f"the flow of mode {here.mode.name} has no Taylor series at t = {show(t)}; another method may go on"
-        return Stop("not_finite", t, sentence)
-    if has_no_jacobian(run, here, t):
-        sentence = f"the flow of mode {here.mode.name} has no derivatives at t = {show(t)}; another method may go on"
-        return Stop("not_finite", t, sentence)
-    grown = any(a * a * run.arithmetic.unit > 1 for a in here.x)
-    if not grown and (found := without_value_later(run, here, t)):
-        return Stop("not_finite", t, found)
-    return Stop("not_finite", t, f"{_largest(here)} grows beyond all numbers at t = {show(t)} in mode {here.mode.name}")
+        return Stop("not_finite", t, f"{self._largest()} grows beyond all numbers at t = {show(t)} in mode {name}")
 
+    def stuck(self, failure: StepFailure, slope: State) -> Stop:
+        """Stop where no step is short enough, and say why; ``slope`` is the flow here."""
+        t, x, h, name = self.t, self.x, self.h, self.program.name
+        if failure.kind == "wall" and failure.surface is not None:
+            return left_domain(self.program, failure.surface, t, LEFT)
+        instant = self.problem.arithmetic.sqrt(self.problem.arithmetic.unit) * t
+        faster_than_time = any(0 < s < instant * abs(f) for s, f in zip(self.scales, slope, strict=True))
+        if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and faster_than_time):
+            ahead = (
+                (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)))
+                for n in range(40, -1, -1)
+            )
+            return self.not_finite(ahead)
+        if failure.kind in ("error", "unsolved", "creeping", "jump") and (jump := self._jump_near(slope)):
+            why = f"{jump}, and the solution is driven back across that"
+            return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {name}: {why}")
+        why = {
+            "unsolved": "the equations of an implicit step are not solved by Newton's method",
+            "error": "the error estimate stays above the tolerance, as where a flow jumps",
+            "creeping": "steps had to be cut below a thousandth thousands of times in a row",
+            "flat": "the gradient of a guard's surface vanishes on it, as that of sign, floor and squares: "
+            "write the guard without them, x >= 1 for floor(x) >= 1",
+        }.get(failure.kind, "a guard can neither be passed within the relaxation nor avoided")
+        return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {name}: {why}")
 
-def without_value(run: Run, here: ModeState, t: Number, x: State) -> str | None:
-    """Name the first expression without a finite value at a place."""
-    for name, routine in run.kernel.expressions(run.program.modes.index(here.mode), here.segment.data):
-        try:
-            finite = all(map(run.arithmetic.isfinite, routine(t, *x)))
-        except DOMAIN_ERRORS:
-            finite = False
-        if not finite:
-            return f"{name}, has no finite value at t = {show(t)} ({_state(here, x)})"
-    return None
+    def _without_value(self, t: Number, x: State) -> str | None:
+        """Name the first expression without a finite value at a place."""
+        for name, routine in self.problem.kernel.expressions(self.mode, self.segment.data):
+            try:
+                finite = all(map(self.problem.arithmetic.isfinite, routine(t, *x)))
+            except DOMAIN_ERRORS:
+                finite = False
+            if not finite:
+                return f"{name}, has no finite value at t = {show(t)} ({self._state(x)})"
+        return None
 
+    def _without_value_later(self) -> str | None:
+        """Name an expression that time alone takes beyond all numbers before the segment ends, and when, by halving."""
+        last, later = self.t, self.segment.end
+        found = self._without_value(later, self.x)
+        while found and last < (middle := (last + later) / 2) < later:
+            if sentence := self._without_value(middle, self.x):
+                later, found = middle, sentence
+            else:
+                last = middle
+        return found
 
-def without_value_later(run: Run, here: ModeState, t: Number) -> str | None:
-    """Name an expression that time alone takes beyond all numbers before the segment ends, and when, by halving."""
-    last, later = t, here.segment.end
-    found = without_value(run, here, later, here.x)
-    while found and last < (middle := (last + later) / 2) < later:
-        if sentence := without_value(run, here, middle, here.x):
-            later, found = middle, sentence
-        else:
-            last = middle
-    return found
-
-
-def jump_near(run: Run, here: ModeState, slope: State) -> str | None:
-    """Name a component of the flow that jumps a few steps ahead of a state or behind it, and the place."""
-    h, flow = run.control.h, here.kernel.flow
-    for n in range(-NEAR, NEAR + 1):
-        for way in (h * 2**n, -h * 2**n):
-            t1, z = here.t + way, tuple(a + way * f for a, f in zip(here.x, slope, strict=True))
-            for k, (state, text) in enumerate(zip(here.mode.states, here.mode.flow_texts, strict=True)):
-                if jump := jump_between(flow, k, here.t, here.x, t1, z):
+    def _jump_near(self, slope: State) -> str | None:
+        """Name a component of the flow that jumps a few steps ahead or behind, and the place."""
+        flow = self.problem.kernel.bind(self.mode, self.segment.data).flow
+        for step in (way * self.h * 2**n for n in range(-NEAR, NEAR + 1) for way in (1, -1)):
+            t1, z = self.t + step, tuple(a + step * f for a, f in zip(self.x, slope, strict=True))
+            for k, (state, text) in enumerate(zip(self.program.states, self.program.flow_texts, strict=True)):
+                if jump := jump_between(flow, k, self.t, self.x, t1, z):
                     point, before, behind = jump
                     values = f"from {show(before)} to {show(behind)}"
-                    return f"the flow of {state}, {text}, jumps {values} at {_state(here, point)}"
-    return None
+                    return f"the flow of {state}, {text}, jumps {values} at {self._state(point)}"
+        return None
 
-
-def has_no_series(run: Run, here: ModeState, t: Number) -> bool:
-    """Whether the method is Taylor's and cannot expand the flow where the run stands."""
-    method = run.settings.method
-    series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
-    if not isinstance(method, TaylorMethod) or series is None:
+    def _has_no_series(self) -> bool:
+        """Whether the method is Taylor's and cannot expand the flow here."""
+        method = self.problem.settings.method
+        series = self.problem.kernel.taylor(self.mode, self.segment.data)
+        if not isinstance(method, TaylorMethod) or series is None:
+            return False
+        try:
+            terms(series, method.order, self.t, self.x)
+        except NoSeries:
+            return True
         return False
-    try:
-        terms(series, method.order, t, here.x)
-    except NoSeries:
-        return True
-    return False
+
+    def _has_no_jacobian(self) -> bool:
+        """Whether the method is implicit and the flow has no derivatives here."""
+        if not isinstance(self.problem.settings.method, RadauMethod):
+            return False
+        try:
+            slopes = self.problem.kernel.jacobian(self.mode, self.segment.data)(self.t, *self.x)
+        except DOMAIN_ERRORS:
+            return True
+        return not all(map(self.problem.arithmetic.isfinite, slopes))
+
+    def _largest(self) -> str:
+        sized = zip(self.x, self.program.states, self.program.flow_texts, strict=True)
+        value, state, text = max(sized, key=lambda entry: abs(entry[0]))
+        return f"{state}, whose flow is {text} and whose value is {show(value)},"
+
+    def _state(self, x: State) -> str:
+        return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.program.states, x, strict=True))
 
 
-def has_no_jacobian(run: Run, here: ModeState, t: Number) -> bool:
-    """Whether the method is implicit and the flow has no derivatives where the run stands."""
-    if not isinstance(run.settings.method, RadauMethod):
-        return False
-    try:
-        slopes = run.kernel.jacobian(run.program.modes.index(here.mode), here.segment.data)(t, *here.x)
-    except DOMAIN_ERRORS:
-        return True
-    return not all(map(run.arithmetic.isfinite, slopes))
-
-
-def _largest(here: ModeState) -> str:
-    sized = zip(here.arc.values[-1], here.arc.states, here.mode.flow_texts, strict=True)
-    value, state, text = max(sized, key=lambda entry: abs(entry[0]))
-    return f"{state}, whose flow is {text} and whose value is {show(value)},"
-
-
-def _state(here: ModeState, x: State) -> str:
-    return ", ".join(f"{name} = {show(value)}" for name, value in zip(here.arc.states, x, strict=True))
+def standstill(run: Run, here: ModeState) -> Standstill:
+    """Where the Python loop stands."""
+    mode = run.program.modes.index(here.mode)
+    return Standstill(run, mode, here.segment, here.t, here.x, here.arc.scales, run.control.h)

@@ -1,13 +1,14 @@
-"""What a run says of itself besides its transitions, in sentences: one place for every loop.
+"""Departures and doubts of a run, in sentences, and how it ends where transitions go on without end.
 
 A departure is where a run left what the theorem is about, a doubt what could not be checked.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
-from hsdsl.simulate.recorder import Recorder
 from hsdsl.simulate.stops import show
 
 LEFT_OUT = "nothing that was asked for, and no guard, condition or domain, depends on them"
@@ -19,33 +20,45 @@ TWO_STEP = (
 )
 
 
-def crowded(recorder: Recorder, free: int, t: Number) -> None:
-    """More transitions than cost no time fell within the relaxation."""
-    sentence = f"more than {free} transitions within the relaxation, from t = {show(t)} on in strips"
-    recorder.depart("crowded", sentence)
+@dataclass
+class Diagnostics:
+    """What a run says of itself besides its transitions; of one kind only the first is kept."""
 
+    departures: list[str] = field(default_factory=list[str])
+    doubts: list[str] = field(default_factory=list[str])
+    _noted: set[object] = field(default_factory=set[object])
 
-def at_rest(recorder: Recorder, edge: str, start: Number, end: Number) -> None:
-    """The state rested on a guard; for less than can be seen, that is no rest."""
-    if show(start) == show(end):
-        return
-    recorder.depart(None, f"at rest on the guard of {edge} from t = {show(start)} to t = {show(end)}")
+    def crowded(self, free: int, t: Number) -> None:
+        """More transitions than cost no time fell within the relaxation."""
+        if "crowded" not in self._noted:
+            self._noted.add("crowded")
+            self.departures.append(
+                f"more than {free} transitions within the relaxation, from t = {show(t)} on in strips"
+            )
 
+    def at_rest(self, edge: str, start: Number, end: Number) -> None:
+        """The state rested on a guard; for less than can be seen, that is no rest."""
+        if show(start) != show(end):
+            self.departures.append(f"at rest on the guard of {edge} from t = {show(start)} to t = {show(end)}")
 
-def replaced(recorder: Recorder, edge: str, number: int, end: Number, left: Number) -> None:
-    """The transitions after ``number`` were replaced by their limit."""
-    recorder.depart(
-        None,
-        f"Zeno at t = {show(end)}: the transitions of {edge} after number {number}, all within {show(left)} "
-        "of each other, are replaced by their limit",
-    )
+    def replaced(self, edge: str, number: int, end: Number, left: Number) -> None:
+        """The transitions after ``number`` were replaced by their limit."""
+        self.departures.append(
+            f"Zeno at t = {show(end)}: the transitions of {edge} after number {number}, all within {show(left)} "
+            "of each other, are replaced by their limit",
+        )
 
+    def accumulates(self, edge: str, end: Number, t: Number) -> Stop:
+        """Transitions accumulate at ``end`` while something else moves on: the run stops at t."""
+        sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
+        self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
+        return Stop("zeno", t, sentence)
 
-def accumulates(recorder: Recorder, edge: str, end: Number, t: Number) -> Stop:
-    """Transitions accumulate at ``end`` while something else moves on: the run stops at t."""
-    sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
-    recorder.depart(None, f"Zeno at t = {show(end)}: {sentence}")
-    return Stop("zeno", t, sentence)
+    def unsettled(self, mode: str, k: int, t: Number) -> None:
+        """A crossing was found on a piece of a surface that is no polynomial."""
+        if (mode, k) not in self._noted:
+            self._noted.add((mode, k))
+            self.doubts.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
 
 
 def slides(edge: str, source: str, target: str, t: Number) -> Stop:
@@ -57,9 +70,3 @@ def slides(edge: str, source: str, target: str, t: Number) -> Stop:
         "flow of each leads into the other"
     )
     return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")
-
-
-def unsettled(recorder: Recorder, mode: str, k: int, t: Number) -> None:
-    """A crossing was found on a piece of a surface that is no polynomial."""
-    sentence = f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}"
-    recorder.doubt((mode, k), sentence)

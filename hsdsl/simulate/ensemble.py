@@ -71,7 +71,7 @@ class CompiledEnsemble:
         self._start = np.ascontiguousarray(instances.start, np.float64)
         self._time = np.ascontiguousarray(instances.time, np.float64)
         self._settings = (structures.Settings * len(instances.settings))(
-            *(task_settings(settings, plan.program.all_states) for settings in instances.settings)
+            *(task_settings(settings, plan.problem.program.all_states) for settings in instances.settings)
         )
         self._timelines, self._numbers = _timelines(instances.timelines)
         self._names, self._layouts = names, plan.layouts

@@ -10,9 +10,9 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
-from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.run import ModeState, Run, reset
-from hsdsl.simulate.stops import endless, entered_final, show
+from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain
 from hsdsl.simulate.surfaces import Crossing
 
 
@@ -47,14 +47,14 @@ def enter(
             finite = all(map(run.arithmetic.isfinite, values))
             outside = here.surfaces.enter(t, x, values, since, inside, reset_at)
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, [(t, x)])
+            return standstill(run, here).not_finite([(t, x)])
         if not finite:
-            return not_finite(run, here, t, [(t, x)])
+            return standstill(run, here).not_finite([(t, x)])
         edges = here.mode.edges
         beyond = [k for k in outside if k < len(edges) and not edges[k].conditional]
         if not beyond:
             walls = [k for k in outside if k >= len(edges)]
-            return left_domain(here, walls[0], t, "was entered outside it") if walls else here
+            return left_domain(here.mode, walls[0], t, ENTERED) if walls else here
         if stop := run.limit_reached(t):
             return stop
         zero = run.arithmetic.zero
@@ -72,14 +72,3 @@ def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tupl
     """Choose among surfaces that the state is beyond: the highest priority, then the file's order."""
     chosen = min(beyond, key=lambda c: (-edges[c.edge].priority, c.edge))
     return chosen, tuple(edges[c.edge].name for c in beyond if c is not chosen)
-
-
-LEFT = "leaves it, and no transition is possible there"
-
-
-def left_domain(here: ModeState, surface: int, t: Number, how: str) -> Stop:
-    """Stop at a wall (the paper's n' = infinity)."""
-    wall = here.mode.walls[surface - len(here.mode.edges)]
-    return Stop(
-        "left_domain", t, f"the domain of mode {here.mode.name} ends at {wall}: at t = {show(t)} the state {how}"
-    )

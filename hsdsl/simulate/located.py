@@ -12,16 +12,16 @@ from collections.abc import Callable
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate import diagnostics
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
-from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import LEFT, enter, left_domain
-from hsdsl.simulate.relaxed import Event, go_on, no_way_on, sizes, standing_on
+from hsdsl.simulate.diagnosis import standstill
+from hsdsl.simulate.diagnostics import slides
+from hsdsl.simulate.entry import enter
+from hsdsl.simulate.relaxed import Event, go_on, sizes, standing_on
 from hsdsl.simulate.rest import rests
 from hsdsl.simulate.root_isolation import stays_below
 from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.sticking import RestSteps, release
-from hsdsl.simulate.stops import reached, reached_in_strip
+from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
@@ -52,7 +52,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
         return follow(run, here, stepping(run, here), here.segment.end)
     still = here.resting(edge)
     outcome = follow(run, still, RestSteps(run, still), until)
-    diagnostics.at_rest(run.recorder, here.mode.edges[edge].name, here.t, here.arc.times[-1])
+    run.diagnostics.at_rest(here.mode.edges[edge].name, here.t, here.arc.times[-1])
     if not isinstance(outcome, ModeState) or not until < here.segment.end:
         return outcome
     mode, surfaces = run.program.modes.index(here.mode), here.surfaces
@@ -71,7 +71,7 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
             if event := first_event(run, here, before, span):
                 return event
         except DOMAIN_ERRORS:
-            return not_finite(run, here.moved(t, x), t, [(t, x), (span.t1, span.z)])
+            return standstill(run, here.moved(t, x)).not_finite([(t, x), (span.t1, span.z)])
         if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
         arc.append(span.t1, span.z, span.piece)
@@ -89,7 +89,7 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
         standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
         if not standing:
             write(here, span, wall)
-            return left_domain(here, wall.edge, wall.time, LEFT)
+            return left_domain(here.mode, wall.edge, wall.time, LEFT)
         guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
     if not guards:
         return None
@@ -126,7 +126,7 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
         theta, time, q = settled(here, span, k, rise)
         if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
             if not rise.certain:
-                diagnostics.unsettled(run.recorder, here.mode.name, k, time)
+                run.diagnostics.unsettled(here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return touched(run, here, span, k, pieces)
 
@@ -176,7 +176,7 @@ def jump(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
         return stop
     outcome, resumed = reset(here, crossing, landing.scale, run), t
     if crowded(run, t):
-        diagnostics.crowded(run.recorder, FREE, t)
+        run.diagnostics.crowded(FREE, t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
@@ -195,7 +195,7 @@ def jump(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
     if isinstance(entered, Stop):
         return entered
     if run.returns(here, crossing, entered):
-        return diagnostics.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return slides(edge.name, here.mode.name, entered.mode.name, entered.t)
     return close_tail(run, entered, crossing.edge)
 
 
@@ -235,5 +235,5 @@ def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:
     try:
         slope = here.kernel.flow(here.t, *here.x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, here.t, [(here.t, here.x)])
-    return no_way_on(run, here, failure, slope)
+        return standstill(run, here).not_finite([(here.t, here.x)])
+    return standstill(run, here).stuck(failure, slope)

@@ -1,4 +1,4 @@
-"""What the compiled loop says of a run, in the Python loop's own words: its notes, and why it stopped.
+"""Notes and stops of the compiled loop, in the Python loop's own words.
 
 Loaded when there is something to say: most runs end at `until` without any.
 """
@@ -6,41 +6,41 @@ Loaded when there is something to say: most runs end at `until` without any.
 from __future__ import annotations
 
 from hsdsl.execution import Stop
+from hsdsl.program import Program
 from hsdsl.runtime import structures
-from hsdsl.simulate import diagnostics, stops
-from hsdsl.simulate.diagnosis import not_finite
-from hsdsl.simulate.entry import LEFT, left_domain
+from hsdsl.simulate import stops
+from hsdsl.simulate.diagnosis import Standstill
+from hsdsl.simulate.diagnostics import Diagnostics, slides
 from hsdsl.simulate.located import FREE
-from hsdsl.simulate.recorder import OpenArc
-from hsdsl.simulate.relaxed import no_way_on
-from hsdsl.simulate.run import ModeState, Run
-from hsdsl.simulate.surfaces import StepFailure, Surfaces
+from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.surfaces import StepFailure
 from hsdsl.simulate.workspace import Workspace
 
+Note = tuple[int, int, int, int, float, float]  # as in `hs_note`
 
-def told(run: Run, number: int, index: int, k: int, count: int, time: float, other: float) -> Stop | None:
-    """Say what the loop has noted; returns a stop where that ends the run."""
-    recorder, mode, kind = run.recorder, run.program.modes[index], structures.NOTICES[number]
+
+def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | None:
+    """Add what the loop has noted; returns a stop where that ends the run."""
+    notice, index, k, count, time, other = note
+    mode, kind = program.modes[index], structures.NOTICES[notice]
     if kind == "unsettled":
-        diagnostics.unsettled(recorder, mode.name, k, time)
-    elif kind == "crowded":
-        diagnostics.crowded(recorder, FREE, time)
-    elif kind == "at rest":
-        diagnostics.at_rest(recorder, mode.edges[k].name, time, other)
-    elif kind == "replaced":
-        diagnostics.replaced(recorder, mode.edges[k].name, count, time, other)
-    elif kind == "slides":
-        source = run.program.modes[count]
-        return diagnostics.slides(source.edges[k].name, source.name, mode.name, time)
-    else:
-        return diagnostics.accumulates(recorder, mode.edges[k].name, time, other)
-    return None
+        return diagnostics.unsettled(mode.name, k, time)
+    if kind == "crowded":
+        return diagnostics.crowded(FREE, time)
+    if kind == "at rest":
+        return diagnostics.at_rest(mode.edges[k].name, time, other)
+    if kind == "replaced":
+        return diagnostics.replaced(mode.edges[k].name, count, time, other)
+    if kind == "slides":
+        return slides(program.modes[count].edges[k].name, program.modes[count].name, mode.name, time)
+    return diagnostics.accumulates(mode.edges[k].name, time, other)
 
 
-def stop(run: Run, workspace: Workspace, reason: str, made: int) -> Stop:
-    """Say why a run stopped, after so many transitions."""
+def stop(problem: Problem, workspace: Workspace, reason: str) -> Stop:
+    """Say why a run stopped."""
     found = workspace.task.stop
-    t, mode = found.time, run.program.modes[int(found.mode)]
+    number, t = int(found.mode), found.time
+    mode, segment = problem.program.modes[number], problem.timeline.segments[int(found.segment)]
     if reason in ("until in strip", "until on guard"):
         return stops.reached_in_strip(t, mode.edges[int(found.edge)].name, reason == "until on guard")
     if reason == "reset not finite":
@@ -48,29 +48,15 @@ def stop(run: Run, workspace: Workspace, reason: str, made: int) -> Stop:
     if reason == "zeno":
         return stops.endless(mode.name, t)
     if reason == "limit":
-        return stops.limit(run.settings.max_transitions, t)
-    here = _here(run, workspace, made)
+        return stops.limit(problem.settings.max_transitions, t)
+    if reason in ("entered outside", "left"):
+        return stops.left_domain(mode, found.surface, t, stops.LEFT if reason == "left" else stops.ENTERED)
+    x, slope, scales = (column[: found.dimension].tolist() for column in workspace.stopped)
+    here = Standstill(problem, number, segment, t, tuple(x), scales, found.h)
     if reason == "here not finite":
-        return not_finite(run, here, t, [(t, here.x)])
-    if reason == "entered outside":
-        return left_domain(here, found.surface, t, "was entered outside it")
-    if reason == "left":
-        return left_domain(here, found.surface, t, LEFT)
-    slope = workspace.slope(found.dimension)
+        return here.not_finite([(t, here.x)])
     if reason == "step not finite":
-        return not_finite(run, here, t, [(t, here.x), (found.h, slope)])
+        return here.not_finite([(t, here.x), (found.h, tuple(slope))])
     assert reason == "stuck", reason
-    run.control.h = found.h
-    surface = None if found.surface < 0 else found.surface
-    return no_way_on(run, here, StepFailure(structures.FAILURES[int(found.failure)], surface), slope)
-
-
-def _here(run: Run, workspace: Workspace, made: int) -> ModeState:
-    """Where the run stopped, as the Python loop would have it."""
-    found = workspace.task.stop
-    mode, segment = run.program.modes[int(found.mode)], run.timeline.segments[int(found.segment)]
-    x, t = workspace.x(found.dimension), found.time
-    kernel = run.kernel.bind(found.mode, segment.data)
-    surfaces = Surfaces(kernel, mode.edges, tuple(0.0 for _ in x), run.arithmetic)
-    arc = OpenArc(mode.name, mode.states, "flow", made, None, [t], [x], [], scales=workspace.scales(len(x)))
-    return ModeState(mode, kernel, surfaces, segment, arc, t, x)
+    surface = None if found.surface < 0 else int(found.surface)
+    return here.stuck(StepFailure(structures.FAILURES[int(found.failure)], surface), tuple(slope))

@@ -20,7 +20,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
-from hsdsl.simulate.diagnosis import not_finite
+from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.recorder import Counted
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.stops import show
@@ -110,7 +110,7 @@ def step_through(
         try:
             force = routines(t).flow(t, *still)[1 - o.position]
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, [(t, still)])
+            return standstill(run, here).not_finite([(t, still)])
         if n == 0:
             z.append(z[0] + h * v + h * h / 2 * (force - 2 * o.damping * v - o.stiffness * z[0]))
         else:

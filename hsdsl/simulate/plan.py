@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,20 +12,16 @@ import numpy as np
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Execution, Stop
-from hsdsl.integrators.stepper import State
-from hsdsl.kernel import Kernel
-from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
-from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.output_buffers import Sink
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.recorder import OutOfRoom, Progress, Recorder, Room
 from hsdsl.simulate.refinement import finer_settings
 from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.run import ModeState, Run
-from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted, memory
 
 
@@ -57,16 +53,9 @@ Watch = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
-    """A program, its numbers, and where it starts; ``plan`` is given where the compiled loop is to run it."""
+class Prepared(Problem):
+    """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
 
-    program: Program
-    kernel: Kernel
-    settings: Settings
-    timeline: Timeline
-    mode: int
-    states: tuple[str, ...]
-    x: State
     plan: CompiledPlan | None
     finer: dict[Number, Prepared] = field(default_factory=dict["Number", "Prepared"])  # by the run's longest step
 
@@ -87,7 +76,7 @@ class Prepared:
         Returns why it stopped, how many transitions it made, and the last chunk.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._fresh)
+        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()))
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)
@@ -97,11 +86,8 @@ class Prepared:
         """Make the same run finer."""
         longest: Number = max(np.diff(execution.times).tolist(), default=self.settings.until) or self.settings.until
         if longest not in self.finer:
-            settings, plan = finer_settings(self.settings, longest, self.kernel.arithmetic), self.plan
-            if plan is not None:
-                start = self.timeline, self.mode, self.states, self.x
-                plan = CompiledPlan(self.program, plan.compiled, settings, *start)
-            self.finer[longest] = replace(self, settings=settings, plan=plan, finer={})
+            problem = self.with_settings(finer_settings(self.settings, longest, self.arithmetic))
+            self.finer[longest] = prepare(problem, self.plan and self.plan.compiled)
         return self.finer[longest].simulate()
 
     @cached_property
@@ -115,7 +101,8 @@ class Prepared:
         outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
         room = Room.of(settings.memory, width, degree, outputs, arithmetic.digits)
         recorder = Recorder(arithmetic, settings.until, degree, outputs, room, scales=dict(settings.scale))
-        return Run(program, self.kernel, self.timeline, settings, make_control(settings, arithmetic), recorder)
+        problem = vars(self.with_settings(settings))
+        return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
         from hsdsl.simulate.entry import enter
@@ -137,7 +124,7 @@ class Prepared:
         return from_recorder(run, stop, spent, self.again)
 
     def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        under_way = CompiledRun(plan, plan.workspaces.take(), self._fresh)
+        under_way = CompiledRun(plan, plan.workspaces.take())
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()
@@ -148,16 +135,6 @@ class Prepared:
         return written(self._about, under_way, whole, stop, spent, self.again)
 
 
-def prepare(
-    program: Program,
-    kernel: Kernel,
-    settings: Settings,
-    timeline: Timeline,
-    mode: int,
-    states: tuple[str, ...],
-    x: State,
-    compiled: CompiledModel | None = None,
-) -> Prepared:
-    """Prepare a run from mode and state ``x`` at t = 0, by the compiled loop where ``compiled`` is given."""
-    plan = None if compiled is None else CompiledPlan(program, compiled, settings, timeline, mode, states, x)
-    return Prepared(program, kernel, settings, timeline, mode, states, x, plan)
+def prepare(problem: Problem, compiled: CompiledModel | None = None) -> Prepared:
+    """Prepare a run, by the compiled loop where ``compiled`` is given."""
+    return Prepared(**vars(problem), plan=None if compiled is None else CompiledPlan(problem, compiled))

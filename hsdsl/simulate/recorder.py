@@ -110,22 +110,7 @@ class Recorder:
     room: Room = field(default_factory=Room)
     arcs: list[OpenArc] = field(default_factory=list[OpenArc])
     transitions: list[Transition] = field(default_factory=list[Transition])
-    departures: list[str] = field(default_factory=list[str])  # where the run left what the theorem is about, and why
-    doubts: list[str] = field(default_factory=list[str])  # what could not be checked, and where
-    noted: set[object] = field(default_factory=set[object])
     scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
-
-    def depart(self, kind: object, sentence: str) -> None:
-        """Note that the run left what the theorem is about; of one ``kind``, unless None, only the first time."""
-        if kind is None or kind not in self.noted:
-            self.noted.add(kind)
-            self.departures.append(sentence)
-
-    def doubt(self, kind: object, sentence: str) -> None:
-        """Note what could not be checked; of one ``kind`` only the first time."""
-        if kind not in self.noted:
-            self.noted.add(kind)
-            self.doubts.append(sentence)
 
     @property
     def now(self) -> Number:

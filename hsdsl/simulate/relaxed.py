@@ -14,15 +14,15 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
-from hsdsl.simulate import diagnostics
 from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.chatter import Chatter
-from hsdsl.simulate.diagnosis import jump_near, not_finite
-from hsdsl.simulate.entry import LEFT, enter, left_domain
+from hsdsl.simulate.diagnosis import standstill
+from hsdsl.simulate.diagnostics import slides
+from hsdsl.simulate.entry import enter
 from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import Patience
-from hsdsl.simulate.stops import reached, reached_in_strip, show
+from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import TIE, Crossing, StepFailure, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
@@ -68,7 +68,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
-        return not_finite(run, here, t, [(t, x)])
+        return standstill(run, here).not_finite([(t, x)])
     control.begin(arc.scales, slope)
     while t < limit:
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
@@ -169,7 +169,7 @@ def through_strip(run: Run, here: ModeState, landing: Event) -> ModeState | Stop
     run.record(here, crossing, resumed, after, landing.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
     if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
-        return diagnostics.slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return slides(edge.name, here.mode.name, entered.mode.name, entered.t)
     return entered
 
 
@@ -207,7 +207,7 @@ def go_on(run: Run, here: ModeState) -> ModeState | Stop:
         try:
             inside = surfaces.inside(t, x)
         except DOMAIN_ERRORS:
-            return not_finite(run, here, t, [(t, x)])
+            return standstill(run, here).not_finite([(t, x)])
         return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside)
     after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
     after.surfaces.emerging.update(surfaces.emerging)
@@ -226,35 +226,7 @@ def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Even
     if shrunk and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
         return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))
-    return no_way_on(run, here, failure, slope)
-
-
-def no_way_on(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Stop:
-    """Stop where no step is short enough, and say why."""
-    t, x = here.t, here.x
-    if failure.kind == "wall" and failure.surface is not None:
-        return left_domain(here, failure.surface, t, LEFT)
-    instant = run.arithmetic.sqrt(run.arithmetic.unit) * t
-    grown = any(
-        0 < s < instant * abs(f) for s, f in zip(here.arc.scales, slope, strict=True)
-    )  # faster than time can follow
-    if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and grown):
-        h = run.control.h
-        ahead = (
-            (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True))) for n in range(40, -1, -1)
-        )
-        return not_finite(run, here, t, ahead)
-    if failure.kind in ("error", "unsolved", "creeping", "jump") and (jump := jump_near(run, here, slope)):
-        why = f"{jump}, and the solution is driven back across that"
-        return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {here.mode.name}: {why}")
-    why = {
-        "unsolved": "the equations of an implicit step are not solved by Newton's method",
-        "error": "the error estimate stays above the tolerance, as where a flow jumps",
-        "creeping": "steps had to be cut below a thousandth thousands of times in a row",
-        "flat": "the gradient of a guard's surface vanishes on it, as that of sign, floor and squares: "
-        "write the guard without them, x >= 1 for floor(x) >= 1",
-    }.get(failure.kind, "a guard can neither be passed within the relaxation nor avoided")
-    return Stop("step_underflow", t, f"no step is short enough at t = {show(t)} in mode {here.mode.name}: {why}")
+    return standstill(run, here).stuck(failure, slope)
 
 
 def sizes(x: State, z: State, here: ModeState) -> State:

@@ -11,13 +11,13 @@ import numpy as np
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
-from hsdsl.integrators.stepper import State
 from hsdsl.program import Program
 from hsdsl.runtime.sampling import Sampler
-from hsdsl.simulate import diagnostics
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.compiled import CompiledRun
+from hsdsl.simulate.diagnostics import LEFT_OUT, TWO_STEP, Diagnostics
 from hsdsl.simulate.output_buffers import arcs_of, transitions_of
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 
@@ -33,8 +33,8 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repeti
         **about(run.program, run.settings, run.arithmetic.digits, "python"),
         stop=stop,
         seconds=seconds,
-        output_function=partial(output_values, run),
-        assessment=partial(_assessment, run),
+        output_function=run.output_values,
+        assessment=partial(_assessment, run, lambda: run.diagnostics),
         repetition=again,
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
@@ -69,8 +69,8 @@ def written(
         stop=stop,
         seconds=seconds,
         states=states,
-        output_function=partial(_output_values, under_way),
-        assessment=partial(_assessed, under_way),
+        output_function=plan.problem.output_values,
+        assessment=partial(_assessment, plan.problem, lambda: under_way.diagnostics),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         _of=_Written(under_way, columns),
@@ -92,18 +92,18 @@ def _of(execution: Execution) -> _Written:
 
 
 def _settings(execution: Execution) -> dict[str, Any]:
-    run = _of(execution).under_way.run
-    return described(run.settings, run.program.left_out)
+    problem = _of(execution).under_way.plan.problem
+    return described(problem.settings, problem.program.left_out)
 
 
 def _transitions(execution: Execution) -> tuple[Transition, ...]:
     of = _of(execution)
-    return tuple(transitions_of(of.columns, of.under_way.plan.program))
+    return tuple(transitions_of(of.columns, of.under_way.plan.problem.program))
 
 
 def _arcs(execution: Execution) -> tuple[Arc, ...]:
     of = _of(execution)
-    return tuple(arcs_of(of.columns, of.under_way.plan.program, of.under_way.plan.layouts))
+    return tuple(arcs_of(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts))
 
 
 def _verdict(execution: Execution) -> Verdict:
@@ -156,18 +156,6 @@ def _final(last: Arc, columns: Columns | Mapping[str, Any], outputs: tuple[str, 
     )
 
 
-def output_values(run: Run, mode: str, t: Number, x: State) -> State:
-    """Outputs at a state of a run, the input taken on the segment that starts at or holds t."""
-    index = [m.name for m in run.program.modes].index(mode)
-    if len(run.program.modes[index].states) != len(x):
-        return (run.arithmetic.functions["nan"],) * len(run.program.outputs)
-    return run.kernel.bind(index, run.timeline.at(t).data).outputs(t, *x)
-
-
-def _output_values(under_way: CompiledRun, mode: str, t: Number, x: State) -> State:
-    return output_values(under_way.run, mode, t, x)
-
-
 def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the settings that governed the run, by the names of the model file, and what was left out of it."""
     samples = settings.samples if isinstance(settings.samples, int | None) else list(settings.samples)
@@ -180,17 +168,13 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
         **({"scale": dict(settings.scale)} if settings.scale else {}),
         **({} if samples is None else {"samples": samples}),
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
-        **({"left_out": {"states": list(left_out), "reason": diagnostics.LEFT_OUT}} if left_out else {}),
+        **({"left_out": {"states": list(left_out), "reason": LEFT_OUT}} if left_out else {}),
     }
 
 
-def _assessment(run: Run, execution: Execution, estimated: bool) -> Verdict:
-    if run.settings.one_stop is not None:
-        return Verdict("unknown", diagnostics.TWO_STEP)
-    from hsdsl.simulate.verdict import RunView, assess  # not every run is asked for it
+def _assessment(problem: Problem, notes: Callable[[], Diagnostics], execution: Execution, estimated: bool) -> Verdict:
+    if problem.settings.one_stop is not None:
+        return Verdict("unknown", TWO_STEP)
+    from hsdsl.simulate.verdict import RunView, assess  # not every run needs one
 
-    return assess(RunView(run, execution, estimated), run.recorder.departures, run.recorder.doubts)
-
-
-def _assessed(under_way: CompiledRun, execution: Execution, estimated: bool) -> Verdict:
-    return _assessment(under_way.run, execution, estimated)
+    return assess(RunView(problem, execution, estimated), notes())

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators import ButcherTableau, RadauMethod
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
-from hsdsl.kernel import Kernel, ModeKernel
-from hsdsl.program import ModeProgram, Program
+from hsdsl.kernel import ModeKernel
+from hsdsl.program import ModeProgram
 from hsdsl.simulate.cascade import Cascade
 from hsdsl.simulate.control import Control
-from hsdsl.simulate.input_segments import Segment, Timeline
+from hsdsl.simulate.diagnostics import Diagnostics
+from hsdsl.simulate.input_segments import Segment
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.recorder import OpenArc, Recorder
-from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import limit, reset_not_finite
-from hsdsl.simulate.surfaces import TIE, Crossing, Surfaces
+from hsdsl.simulate.surfaces import Crossing, Surfaces
 
 
 @dataclass(frozen=True)
@@ -45,22 +46,14 @@ class ModeState:
         return replace(self, surfaces=replace(self.surfaces, resting=edge))
 
 
-@dataclass(frozen=True)
-class Run:
-    """Everything that stays for a whole run, and what it writes to."""
+@dataclass(frozen=True, eq=False)
+class Run(Problem):
+    """A problem under way: everything that stays for a whole run, and what it writes to."""
 
-    program: Program
-    kernel: Kernel
-    timeline: Timeline
-    settings: Settings
     control: Control
     recorder: Recorder
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
     cascade: Cascade = field(default_factory=Cascade)
-
-    @property
-    def arithmetic(self) -> Arithmetic:
-        """The run's number type."""
-        return self.kernel.arithmetic
 
     def stepper(self, here: ModeState) -> Stepper:
         """The method for the mode that the run is in."""
@@ -78,10 +71,6 @@ class Run:
         series = self.kernel.taylor(mode, here.segment.data)
         assert series is not None
         return taylor_stepper(method, series, self.arithmetic)
-
-    def tie(self, t: Number) -> Number:
-        """Times closer than this are the same instant."""
-        return TIE * max(self.settings.until, abs(t))
 
     def place(
         self,

@@ -6,7 +6,9 @@ from typing import Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
-from hsdsl.program import EdgeProgram
+from hsdsl.program import EdgeProgram, ModeProgram
+
+LEFT, ENTERED = "leaves it, and no transition is possible there", "was entered outside it"
 
 
 def show(x: Any) -> str:
@@ -59,3 +61,9 @@ def reset_not_finite(edge: EdgeProgram, t: Number) -> Stop:
 def interrupted(t: Number) -> Stop:
     """Ctrl-C."""
     return Stop("interrupted", t, f"interrupted at t = {show(t)}; what was computed is kept")
+
+
+def left_domain(mode: ModeProgram, surface: int, t: Number, how: str) -> Stop:
+    """A wall (the paper's n' = infinity)."""
+    wall = mode.walls[surface - len(mode.edges)]
+    return Stop("left_domain", t, f"the domain of mode {mode.name} ends at {wall}: at t = {show(t)} the state {how}")

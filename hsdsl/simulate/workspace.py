@@ -12,8 +12,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from hsdsl.arithmetic import Number
-from hsdsl.integrators.stepper import State
+from hsdsl.execution import Array
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel, runtime_of
 from hsdsl.simulate.columns import Shape
@@ -70,17 +69,10 @@ class Workspace:
         """Ctrl-C: the run is to stop."""
         self.pressed = True
 
-    def x(self, dimension: int) -> State:
-        """The state the run stopped at."""
-        return tuple(self._x[:dimension].tolist())
-
-    def slope(self, dimension: int) -> State:
-        """The flow there, where it was stuck."""
-        return tuple(self._slope[:dimension].tolist())
-
-    def scales(self, dimension: int) -> list[Number]:
-        """The scales of the states there."""
-        return self._scales[:dimension].tolist()
+    @property
+    def stopped(self) -> tuple[Array, Array, Array]:
+        """The state that the run stopped at, the flow there, and the scales of the states."""
+        return self._x, self._slope, self._scales
 
     def more_rows(self) -> int:
         """Make room in the chunk; what `flush` answers."""

@@ -12,7 +12,6 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate import diagnostics
 from hsdsl.simulate.rest import is_pushed, moves_alone, stays
 from hsdsl.simulate.run import ModeState, Run
 
@@ -61,8 +60,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return here
     edge = here.mode.edges[k].name
     if not alone:
-        return diagnostics.accumulates(run.recorder, edge, end, here.t)
-    diagnostics.replaced(run.recorder, edge, len(made) - 1, end, left)
+        return run.diagnostics.accumulates(edge, end, here.t)
+    run.diagnostics.replaced(edge, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     mode = run.program.modes.index(here.mode)
     rest = run.place(mode, here.mode.states, end, q, here.surfaces.scale)

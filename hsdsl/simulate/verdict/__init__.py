@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from hsdsl.execution import Stop, Transition, Verdict
+from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations
 from hsdsl.simulate.verdict.commutation import choices
@@ -41,18 +42,18 @@ INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow"
 LEFT = ("left_domain", "zeno")
 
 
-def assess(run: RunView, departures: Sequence[str], doubts: Sequence[str]) -> Verdict:
+def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """Say whether the theorem's hypotheses hold for a run, are left, or cannot be told.
 
     Parameters
     ----------
     run : RunView
         What was recorded.
-    departures, doubts : sequence of str
-        What the loop itself noted: where it left what the theorem is about, and what it could not check.
+    diagnostics : Diagnostics
+        What the loop itself noted.
     """
-    left, unknown, said = [*departures], [*doubts], list[str]()
-    left += [sentence for sentence in accumulations(run) if not departures]
+    left, unknown, said = [*diagnostics.departures], [*diagnostics.doubts], list[str]()
+    left += [sentence for sentence in accumulations(run) if not diagnostics.departures]
     if run.stop.reason in LEFT:
         left.append(run.stop.message)
     if left:

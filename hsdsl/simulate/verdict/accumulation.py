@@ -17,7 +17,7 @@ CROWD = 16  # transitions within the relaxation of flow
 
 def accumulations(run: RunView) -> Iterator[str]:
     """Say where transitions first crowd together, and where they are last seen to."""
-    relaxation, made = run.run.settings.relaxation, run.transitions
+    relaxation, made = run.problem.settings.relaxation, run.transitions
     if len(made) <= CROWD:
         return
     flights = [b.time - (a.resumed if a.resumed is not None else a.time) for a, b in pairwise(made)]

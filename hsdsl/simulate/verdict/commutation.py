@@ -66,7 +66,7 @@ def commute(run: RunView, place: Place, tied: Sequence[int], since: Number = 0) 
 def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
         return False
-    names = run.run.program.modes[run.index(one[0])].states
+    names = run.problem.program.modes[run.index(one[0])].states
     sizes = [run.sizes.get(name, 0.0) for name in names] or [0.0] * len(one[1])
     pairs = zip(one[1], other[1], sizes, strict=True)
     return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)

@@ -18,8 +18,8 @@ TWICE = 2  # as long as it takes to reach a surface: reached together
 
 def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]:
     """Surfaces about to be reached where another is crossed or an input jumps: an error may change their order."""
-    place, until = run.at_row(arc, arc.last), run.run.settings.until
-    if crossed is None and (place.t >= until or not run.run.timeline.at(place.t).jump):
+    place, until = run.at_row(arc, arc.last), run.problem.settings.until
+    if crossed is None and (place.t >= until or not run.problem.timeline.at(place.t).jump):
         return
     if crossed is None:
         place = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)

@@ -36,7 +36,7 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     for steps in steps_of(run):
         with np.errstate(all="ignore"):
             found += _named(run, "a change of the flow", "may not have been seen", *_unseen(run, steps))
-            if any(STEEP.search(text) for text in run.run.program.modes[steps.mode].flow_texts):
+            if any(STEEP.search(text) for text in run.problem.program.modes[steps.mode].flow_texts):
                 found += _named(run, "the slope of the flow", "has no bound", *_steep(run, steps))
     return found, []
 
@@ -51,7 +51,7 @@ def _jumping(modes: Sequence[ModeProgram]) -> Finding:
 def _named(run: RunView, what: str, how: str, parts: Parts, _: Any) -> Iterator[Finding]:
     if len(parts):
         first = float((parts.time + parts.start * parts.length).min())
-        name = run.run.program.modes[parts.mode].name
+        name = run.problem.program.modes[parts.mode].name
         yield Finding("flow", "unknown", f"{what} of mode {name} {how} close to t = {show(first)}")
 
 
@@ -83,7 +83,7 @@ def _steep(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
 
     def decides(parts: Parts) -> NDArray[np.bool_]:
         data = parts.bound_data
-        slopes = run.run.kernel.enclosing.jacobian(parts.mode, data)(parts.times, *parts.states())
+        slopes = run.problem.kernel.enclosing.jacobian(parts.mode, data)(parts.times, *parts.states())
         unbounded = np.zeros((len(parts), 1), dtype=bool)
         for slope in slopes:
             unbounded[:, 0] |= ~(np.isfinite(high(slope, len(parts))) & np.isfinite(low(slope, len(parts))))

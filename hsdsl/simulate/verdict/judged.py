@@ -42,9 +42,9 @@ def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | 
 def _level(run: RunView, place: Place, k: int) -> Number:
     """Below this a surface value is none: round-off, and a strip of the relaxed scheme."""
     level = place.roundoff_bound(k)
-    if run.run.settings.scheme == "relaxed":
+    if run.problem.settings.scheme == "relaxed":
         slopes = place.kernel.gradients[k](place.t, *place.x)
-        level = level + TWICE * run.run.settings.relaxation * sum((abs(g) for g in slopes), level * 0)
+        level = level + TWICE * run.problem.settings.relaxation * sum((abs(g) for g in slopes), level * 0)
     return level
 
 

@@ -131,16 +131,16 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
 
 def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
     """The boundaries of the input segments on either side of a time, and whether an input jumps there."""
-    segment = run.run.timeline.at(t)
+    segment = run.problem.timeline.at(t)
     yield float(segment.start), segment.jump
-    if segment.end < run.run.settings.until:
-        yield float(segment.end), run.run.timeline.at(segment.end).jump
+    if segment.end < run.problem.settings.until:
+        yield float(segment.end), run.problem.timeline.at(segment.end).jump
 
 
 def _spread(run: RunView, place: Place, k: int, error: list[float], late: float) -> list[float]:
     """How far apart the results of a reset may be over a box around a place."""
-    data = [Range(float(v), float(v)) for v in run.run.timeline.at(place.t).data]
-    kernel = run.run.kernel.enclosing.bind(run.index(place.mode.name), data)
+    data = [Range(float(v), float(v)) for v in run.problem.timeline.at(place.t).data]
+    kernel = run.problem.kernel.enclosing.bind(run.index(place.mode.name), data)
     box = [Range(float(a) - e, float(a) + e) for a, e in zip(place.x, error, strict=True)]
     results = kernel.resets[k](Range(float(place.t) - late, float(place.t) + late), *box)
     return [float(r.high - r.low) if isinstance(r, Range) else 0.0 for r in results]

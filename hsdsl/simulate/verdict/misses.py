@@ -76,7 +76,7 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
 
 def _turning(run: RunView, steps: Parts) -> list[Open]:
     """Where surfaces may turn close to zero, by the enclosures."""
-    mode = run.run.program.modes[steps.mode]
+    mode = run.problem.program.modes[steps.mode]
     count = len(mode.edges) + len(mode.walls)
     if not count:
         return []
@@ -142,7 +142,7 @@ def _shares(each: Open) -> list[float]:
 
 def _nearest(run: RunView, steps: Parts) -> Miss | None:
     """The turning point that comes closest to its surface, measured in errors."""
-    mode = run.run.program.modes[steps.mode]
+    mode = run.problem.program.modes[steps.mode]
     count, best = len(mode.edges) + len(mode.walls), None
     with np.errstate(all="ignore"):
         kernel, (first, last), n = steps.bound(run), steps.ends(), len(steps)

@@ -47,8 +47,8 @@ def _roundoff(run: RunView) -> dict[str, float]:
         found = dict(moved)
         for arc, row in rows[:: max(1, len(rows) // PLACES)]:
             place = run.at_row(arc, row)
-            data = [Range(float(v), float(v)) for v in run.run.timeline.at(place.t).data]
-            kernel = run.run.kernel.enclosing.bind(run.index(arc.mode), data)
+            data = [Range(float(v), float(v)) for v in run.problem.timeline.at(place.t).data]
+            kernel = run.problem.kernel.enclosing.bind(run.index(arc.mode), data)
             t, x = float(place.t), [float(a) for a in place.x]
             wide = [unit * abs(a) + moved.get(name, 0.0) for name, a in zip(arc.states, x, strict=True)]
             box = [Range(a - e, a + e) for a, e in zip(x, wide, strict=True)]

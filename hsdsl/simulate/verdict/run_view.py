@@ -15,7 +15,7 @@ from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
-from hsdsl.simulate.run import Run
+from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
@@ -31,7 +31,7 @@ class RunView:
         Whether the run is held against a finer one although its steps are fixed.
     """
 
-    run: Run
+    problem: Problem
     execution: Execution
     estimated: bool = False
 
@@ -48,7 +48,7 @@ class RunView:
     @property
     def arithmetic(self) -> Arithmetic:
         """The run's number type."""
-        return self.run.arithmetic
+        return self.problem.arithmetic
 
     @cached_property
     def times(self) -> list[Number]:
@@ -64,7 +64,7 @@ class RunView:
     @cached_property
     def errors(self) -> Errors | None:
         """How wrong the run is, by a finer one; None where steps are fixed and nobody asked for an estimate."""
-        tolerance = self.run.settings.tolerance
+        tolerance = self.problem.settings.tolerance
         finer = self.execution.finer if tolerance is not None or self.estimated else None
         if finer is None or finer.stop.reason == "interrupted":
             return None
@@ -120,7 +120,7 @@ class RunView:
 
     def edges(self, mode: str) -> list[str]:
         """The names of a mode's edges."""
-        return [edge.name for edge in self.run.program.modes[self.index(mode)].edges]
+        return [edge.name for edge in self.problem.program.modes[self.index(mode)].edges]
 
     def index(self, mode: str) -> int:
         """The number of a mode."""
@@ -128,7 +128,7 @@ class RunView:
 
     @cached_property
     def _indices(self) -> dict[str, int]:
-        return {mode.name: k for k, mode in enumerate(self.run.program.modes)}
+        return {mode.name: k for k, mode in enumerate(self.problem.program.modes)}
 
     @cached_property
     def _bound(self) -> dict[tuple[int, Number], ModeKernel]:
@@ -137,11 +137,11 @@ class RunView:
     def place(self, mode: str | int, t: Number, x: State) -> Place:
         """Look at a state of a mode."""
         index = self._indices[mode] if isinstance(mode, str) else mode
-        segment = self.run.timeline.at(t)
+        segment = self.problem.timeline.at(t)
         key = index, segment.start
         if key not in self._bound:
-            self._bound[key] = self.run.kernel.bind(index, segment.data)
-        program, kernel = self.run.program.modes[index], self._bound[key]
+            self._bound[key] = self.problem.kernel.bind(index, segment.data)
+        program, kernel = self.problem.program.modes[index], self._bound[key]
         scale = tuple(abs(a) for a in x)
         return Place(program, kernel, Surfaces(kernel, program.edges, scale, self.arithmetic), t, x)
 
@@ -211,10 +211,10 @@ class RunView:
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are the same instant."""
-        return self.run.tie(t)
+        return self.problem.tie(t)
 
 
 def visited(run: RunView) -> list[ModeProgram]:
     """The modes that a run flowed in."""
     names = {arc.mode for arc in run.flows}
-    return [mode for mode in run.run.program.modes if mode.name in names]
+    return [mode for mode in run.problem.program.modes if mode.name in names]

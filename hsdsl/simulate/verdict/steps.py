@@ -109,7 +109,7 @@ class Parts:
 
     def bound(self, run: RunView) -> ModeKernel:
         """The mode's routines over intervals, with the data of these parts."""
-        return run.run.kernel.enclosing.bind(self.mode, self.bound_data)
+        return run.problem.kernel.enclosing.bind(self.mode, self.bound_data)
 
 
 def steps_of(run: RunView) -> Iterator[Parts]:
@@ -117,10 +117,10 @@ def steps_of(run: RunView) -> Iterator[Parts]:
     times = np.asarray(run.execution.times, dtype=float)
     ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
     for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
-        if states != run.run.program.modes[mode].states:
+        if states != run.problem.program.modes[mode].states:
             continue  # a final mode flows as the one before it
         rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
-        rows = rows[(times[rows + 1] > times[rows]) & (times[rows + 1] <= run.upto)]
+        rows = rows[(times[rows + 1] > times[rows]) & (times[rows] <= run.upto)]
         for first in range(0, len(rows), MOST_PARTS):
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
@@ -143,7 +143,7 @@ def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int6
 
 
 def _data(run: RunView, times: Array) -> Array:
-    segments = run.run.timeline.segments
+    segments = run.problem.timeline.segments
     if len(segments) == 1:
         return np.array([segments[0].data], dtype=float)
     starts = np.array([float(s.start) for s in segments])

@@ -17,7 +17,7 @@ from hsdsl.simulate.verdict.steps import Parts, high, low
 
 def transparent(run: RunView, steps: Parts, passed: dict[str, list[Number]]) -> Iterator[Finding]:
     """Surfaces passed where their condition does not hold: does it all around? Notes in ``passed`` where it does."""
-    edges = run.run.program.modes[steps.mode].edges
+    edges = run.problem.program.modes[steps.mode].edges
     if not any(edge.conditional for edge in edges):
         return
     with np.errstate(all="ignore"):
