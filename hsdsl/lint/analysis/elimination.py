@@ -1,8 +1,8 @@
 # pyright: basic
 """First step of a decision: elimination of linear equations between polynomials.
 
-Equations that are linear in a name are solved for it and put into the rest. The rest is compared with the bounds that the
-constraints give (`bound_propagation`). There is no search and no general solver.
+Equations that are linear in a name are solved for it and put into the rest. The rest is compared with the bounds that
+the constraints give (`bound_propagation`). There is no search and no general solver.
 """
 
 from __future__ import annotations
