@@ -88,7 +88,10 @@ def _candidates(program: Program) -> Iterator[Execution]:
     modes = {mode.name: mode.states for mode in program.modes}
     for folder in (Path(program.path).parent / "references", STORED):
         for path in sorted(folder.glob("*.npz")):
-            run = load(path)
+            try:
+                run = load(path)
+            except UsageError:  # some other file
+                continue
             if run.arcs[0].states == modes.get(run.arcs[0].mode):
                 yield run
 

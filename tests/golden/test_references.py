@@ -142,6 +142,7 @@ def test_a_model_edited_in_its_words_keeps_its_reference(tmp_path: Path) -> None
 def test_a_run_stored_next_to_a_model_is_its_reference(tmp_path: Path) -> None:
     mine = edited(tmp_path, ("rate: 0.1", "rate: 0.2"), name="thermostat")
     (tmp_path / "references").mkdir()
+    (tmp_path / "references" / "another-file.npz").write_bytes(b"no execution")
     hsdsl.exact.precise(mine, 6, until=3).save(tmp_path / "references" / "any-name.npz")
     assert "refined" in reference(mine).engine
 
