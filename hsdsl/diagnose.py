@@ -21,7 +21,7 @@ COMMANDS = {"error": "error", "warning": "warning", "note": "notice"}  # of GitH
 def render(diagnostic: Diagnostic) -> str:
     """``path:line:column: error HS012: sentence``, the source line, a caret under the place, and the hint.
 
-    A finding that is known by bounds or from samples says so.
+    A finding decided by bounds or samples is marked.
     """
     span = diagnostic.span
     where = f"{visible(span.path)}:{span.line}:{span.column}: " if span else ""

@@ -146,7 +146,7 @@ def _watch(show: Callable[[Text], None], lower: float, upper: float) -> None:
 
 
 def _run(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | Path | None]:
-    """A run, and its model where that is not where the run says."""
+    """A run, and its model where its path is not the recorded one."""
     if path.suffix.lower() == ".npz":
         from hsdsl.store import load
 

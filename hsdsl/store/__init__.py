@@ -1,9 +1,8 @@
 """Executions in files: ``.npz`` without loss, ``.csv`` and ``.parquet`` as tables with a JSON sidecar.
 
-The sidecar of ``run.csv`` is ``run.csv.json``: the name keeps its suffix so that the sidecar never takes the place of a
-``run.json`` that somebody else writes. It holds the checksum of its table, and never outlives or precedes it: both are
-written aside and brought to the disk, the old sidecar is removed, and then the table and its sidecar take their places.
-At worst a table is without one.
+The sidecar of ``run.csv`` is ``run.csv.json``: it never replaces the ``run.json`` of another program. It holds the
+checksum of its table, and never outlives or precedes it: both are written to the disk under other names, the old
+sidecar is removed, and then the table and its sidecar are renamed into place. At worst a table is without one.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.store.atomic import alone, beside, replacing
+from hsdsl.store.atomic import locked, replacing, unplaced
 from hsdsl.store.npz import load, save_npz
 from hsdsl.store.sidecar import forget_sidecar, read_sidecar, sidecar_of, write_sidecar
 from hsdsl.store.table import at_samples, write_csv, write_parquet
@@ -41,17 +40,17 @@ def save(
             save_npz(execution, file)
         return (target,)
     if suffix not in _TABLES:
-        raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix says what to write")
+        raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix gives the format")
     rows = execution.rows() if samples is None else at_samples(execution, samples)
     rows = rows.only(columns)
     description = sidecar_of(target)
-    with beside(target) as table:
+    with unplaced(target) as table:
         _TABLES[suffix](rows, table.file)
         table.finish()
-        with beside(description) as sidecar:
+        with unplaced(description) as sidecar:
             write_sidecar(execution, rows, target.name, table.part, sidecar.file)
             sidecar.finish()
-            with alone(table.target.parent):
+            with locked(table.target.parent):
                 sidecar.target.unlink(missing_ok=True)
                 table.place()
                 sidecar.place()

@@ -1,4 +1,4 @@
-"""Files written beside their place and renamed into it, so that nobody ever sees half of one."""
+"""Files written under another name and renamed into place, so that readers see whole files only."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from hsdsl.unfinished import part_in
 
 @dataclass(frozen=True)
 class New:
-    """A file that is written at ``part`` and is to take the place of ``target``."""
+    """A file written at ``part`` that replaces ``target``."""
 
     file: BinaryIO
     part: Path
     target: Path
 
     def finish(self) -> None:
-        """Bring it to the disk, where it shows whether there is room, with the permissions of what it replaces."""
+        """Write it to the disk, with the permissions of the file that it replaces; a full disk raises here."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
@@ -31,12 +31,12 @@ class New:
             os.chmod(self.part, stat.S_IMODE(self.target.stat().st_mode))
 
     def place(self) -> None:
-        """Put it where it belongs."""
+        """Rename it into place."""
         os.replace(self.part, self.target)
 
 
 @contextmanager
-def beside(path: str | os.PathLike[str]) -> Generator[New]:
+def unplaced(path: str | os.PathLike[str]) -> Generator[New]:
     """Open a new file in the folder of ``path``; it vanishes unless it is finished and placed. A link is followed.
 
     Raises
@@ -60,16 +60,16 @@ def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO]:
     Raises
     ------
     UsageError
-        As for :func:`beside`.
+        As for :func:`unplaced`.
     """
-    with beside(path) as new:
+    with unplaced(path) as new:
         yield new.file
         new.finish()
         new.place()
 
 
 @contextmanager
-def alone(folder: Path) -> Generator[None]:
+def locked(folder: Path) -> Generator[None]:
     """Let no other writer rename several files in a folder at once, on systems and disks that have such locks."""
     descriptor = None
     with suppress(ImportError, OSError):

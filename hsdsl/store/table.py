@@ -1,4 +1,4 @@
-"""An execution as a table: which rows, which columns, and how they are written."""
+"""An execution as a table: its rows, its columns, and their text."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
 
     Samples outside the run are left out: a run may stop before the last one.
     """
-    asked, inside = within(execution, samples)
-    rows, times = find(execution, asked[inside], "right")
+    instants, inside = within(execution, samples)
+    rows, times = find(execution, instants[inside], "right")
     ends = [
         row
         for before, after in zip(execution.arcs, execution.arcs[1:], strict=False)
@@ -32,16 +32,15 @@ def at_samples(execution: Execution, samples: Any) -> Samples:
     ]
     points = {(int(row), execution.times[row]) for row in ends} | set(zip(rows.tolist(), times, strict=True))
     ordered = sorted(points)
-    instants = np.array([time for _, time in ordered], dtype=execution.times.dtype)
-    return evaluate(execution, np.array([row for row, _ in ordered], dtype=int), instants)
+    ordered_times = np.array([time for _, time in ordered], dtype=execution.times.dtype)
+    return evaluate(execution, np.array([row for row, _ in ordered], dtype=int), ordered_times)
 
 
 def write_csv(samples: Samples, file: BinaryIO, header: bool = True) -> None:
     """Write CSV (UTF-8): ``time,mode,j``, states, outputs; numbers such that they read back exactly.
 
-    A text that a spreadsheet would take for a formula (a mode may be called ``=1+1``) stands behind an apostrophe. A
-    cell is empty where the mode lacks the state or does not define the output; a state that is not a number
-    is ``nan``.
+    A text that a spreadsheet reads as a formula (a mode may be called ``=1+1``) follows an apostrophe. A cell is empty
+    where the mode lacks the state or does not define the output; a state that is not a number is ``nan``.
     """
     text = io.TextIOWrapper(file, encoding="utf-8", newline="")
     writer = csv.writer(text, lineterminator="\n")

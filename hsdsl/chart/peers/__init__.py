@@ -1,7 +1,7 @@
 """Other tools, each run in the way its own documentation shows. A peer is a module with ``prepare(scene)``.
 
 ``prepare`` translates the scene once and returns ``run(tolerance) -> Result``; it raises `Refused` where the tool
-cannot run the model. What an installed tool gets wrong is charted as wrong.
+cannot run the model. Wrong results of an installed tool are charted as wrong.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def prepare(name: str, scene: Scene) -> Callable[[float], Result]:
 
 
 def _guarded(run: Callable[[float], Result], scene: Scene) -> Callable[[float], Result]:
-    """Turn whatever a tool raises into a failed result: a chart shows it, and goes on."""
+    """Turn an exception of a tool into a failed result, which the chart shows."""
     import numpy as np
 
     def guarded(tolerance: float) -> Result:
