@@ -65,6 +65,15 @@ class ModePoint:
         size = max(np.abs(terms).sum(), np.nansum(np.abs(slopes)))
         return 0 if abs(value) <= NEAR * size else 1 if value > 0 else -1
 
+    def changes_sign_nearby(self, expr: Any) -> bool:
+        """Whether an expression changes its sign within the error of a point where a derivative vanishes doubly."""
+        names = sorted(expr.free_symbols, key=str)
+        ranges = [self.dynamics.ranges(self.mode)[s].search for s in names]
+        here = np.array([float(self.point[s]) for s in names])
+        steps = NEAR**0.5 * np.diag([high - low for low, high in ranges])
+        values = StraightLine([expr], names).at(np.vstack([here + steps, here - steps]))
+        return not ((values > 0).all() or (values < 0).all())
+
     def size(self, name: Any) -> float:
         """How large a name's values are: what is known of them is known to a part of that."""
         low, high = self.dynamics.ranges(self.mode)[name].search

@@ -50,7 +50,8 @@ def _touches(dynamics: Dynamics, mode: Mode, edge: EdgePart) -> tuple[Answer, st
         surface = (zero(piece.residual), zero(rate), *piece.inside)
         inside = [(*surface, *strict(domain), *clause) for clause in conditions]
         answer = dynamics.ask_any(mode, inside, negative(bend))
-        if answer.somewhere and _contact(ModePoint(dynamics, mode, answer.point), residual) == _GRAZES:
+        here = ModePoint(dynamics, mode, answer.point)
+        if answer.somewhere and not here.changes_sign_nearby(bend) and _contact(here, residual) == _GRAZES:
             return answer, _GRAZES
     answer = dynamics.ask_any(mode, dynamics.guard(edge.edge), zero(dynamics.rate(mode, residual)))
     return answer, _contact(ModePoint(dynamics, mode, answer.point), residual) if answer.somewhere else ""
