@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import comb
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.bernstein import from_powers
 from hsdsl.metrics.rounding import UNIT
 
 Array = npt.NDArray[Any]
@@ -31,15 +31,7 @@ def restrict(coefficients: Array, begin: Array, end: Array) -> Array:
 
 def bernstein(coefficients: Array) -> Array:
     """Turn powers (n, p + 1, w) into Bernstein coefficients of the same shape."""
-    degree = coefficients.shape[1] - 1
-    weights = np.array([[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
-    result = np.empty_like(coefficients)
-    for i in range(degree + 1):
-        row = coefficients[:, 0].copy()
-        for k in range(1, i + 1):
-            row += weights[i, k] * coefficients[:, k]
-        result[:, i] = row
-    return result
+    return from_powers(coefficients.shape[1] - 1).T @ coefficients
 
 
 def degree_raised(coefficients: Array, degree: int) -> Array:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import groupby
-from math import comb
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hsdsl.bernstein import from_powers, halving
 from hsdsl.enclosures import Range, as_range
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.verdict.run_view import RunView
@@ -67,7 +66,7 @@ class Parts:
 
     def halves(self) -> Parts:
         """Both halves of each, the first ones before the second ones."""
-        left, right = _halving(self.bernstein.shape[2] - 1)
+        left, right = halving(self.bernstein.shape[2] - 1)
         both = replace(self, bernstein=self.bernstein @ left, width=self.width / 2)
         other = replace(both, bernstein=self.bernstein @ right, start=self.start + both.width)
         return _joined([both, other])
@@ -139,7 +138,7 @@ def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int6
     one = np.ones(len(rows))
     data = _data(run, times[rows])
     length = times[rows + 1] - times[rows]
-    return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ _to_bernstein(whole.shape[2] - 1), error, data)
+    return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ from_powers(whole.shape[2] - 1), error, data)
 
 
 def _data(run: RunView, times: Array) -> Array:
@@ -156,19 +155,6 @@ def _joined(parts: Sequence[Parts]) -> Parts:
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     data = first.data if len(first.data) == 1 else np.concatenate([part.data for part in parts])
     return Parts(mode=first.mode, **joined, data=data)
-
-
-@cache
-def _to_bernstein(degree: int) -> Array:
-    """From coefficients of powers to Bernstein coefficients: b_i = sum_k C(i, k)/C(n, k) c_k."""
-    return np.array([[comb(i, k) / comb(degree, k) for i in range(degree + 1)] for k in range(degree + 1)])
-
-
-@cache
-def _halving(degree: int) -> tuple[Array, Array]:
-    """From Bernstein coefficients to those of both halves (de Casteljau)."""
-    left = np.array([[comb(i, k) / 2.0**i for i in range(degree + 1)] for k in range(degree + 1)])
-    return left, left[::-1, ::-1]
 
 
 def undecided(
