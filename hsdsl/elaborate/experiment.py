@@ -37,7 +37,8 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
     for key in given:
         if key not in symbols.states[mode]:
             message = f"the mode '{mode}' has no state '{shown(key)}'"
-            symbols.report(key.place, "HS308", message, did_you_mean(key, lacking) or _without_flow(mode, key))
+            hint = f"under `flow` of '{mode}' write {shown(key)}: and its derivative, or remove it here"
+            symbols.report(key.place, "HS308", message, did_you_mean(key, lacking) or hint)
             meant = closest(key, lacking)
             lacking = [s for s in lacking if s != meant]
     if lacking:
@@ -46,10 +47,6 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
         message = f"the {noun} {names} of the mode '{mode}' {verb} no initial value"
         hint = "add " + ", ".join(f"{s}: ..." for s in lacking)
         symbols.report(symbols.document.initial.mode.place, "HS308", message, hint)
-
-
-def _without_flow(mode: str, key: str) -> str:
-    return f"under `flow` of '{mode}' write {shown(key)}: and its derivative, or remove it here"
 
 
 def elaborate_experiment(symbols: SymbolTable) -> Experiment:

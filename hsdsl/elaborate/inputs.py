@@ -32,20 +32,14 @@ def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
             continue
         symbols.values[name] = Value(symbol(name))
         in_file = isinstance(entry, InputFile)
-        sampled = _file(symbols, name, entry) if in_file else _inline(symbols, name, entry, constant)
-        if sampled is not None:
-            inputs.append(sampled)
+        samples = read_samples(symbols, name, entry.file) if in_file else _inline(symbols, name, entry, constant)
+        if samples is not None:
+            unit = symbols.text(symbols.document.units.get(name))
+            inputs.append(SampledInput(str(name), entry.hold, samples[0], samples[1], unit))
     return tuple(inputs)
 
 
-def _file(symbols: SymbolTable, name: Key, entry: InputFile) -> SampledInput | None:
-    samples = read_samples(symbols, name, entry.file)
-    if samples is None:
-        return None
-    return SampledInput(name, entry.hold, *samples, unit=symbols.text(symbols.document.units.get(name)))
-
-
-def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) -> SampledInput | None:
+def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) -> Any:
     times = symbols.numbers(entry.times, scope, finite_now=True)
     values = symbols.numbers(entry.values, scope, finite_now=True)
     if len(entry.times) != len(entry.values):
@@ -61,8 +55,7 @@ def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) 
         if before.constant and after.constant and not before.number < after.number:
             message = f"the times of the input '{name}' do not increase here"
             symbols.report(scalar.place, "HS310", message, "give each time once, the earliest first")
-    unit = symbols.text(symbols.document.units.get(name))
-    return SampledInput(name, entry.hold, tuple(map(_exact, times)), tuple(map(_exact, values)), unit)
+    return tuple(map(_exact, times)), tuple(map(_exact, values))
 
 
 def _exact(value: Value) -> Any:

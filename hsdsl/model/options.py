@@ -92,7 +92,9 @@ def resolve(sources: Mapping[str, Mapping[str, Any]]) -> Options:
     if "step" not in values:
         values.setdefault("tolerance", Option(DEFAULT_TOLERANCE, DEFAULT))
     size = "step" if "step" in values else "tolerance"
-    scheme = _scheme(values["scheme"])
+    scheme, origin = values["scheme"].value, values["scheme"].origin
+    if scheme not in SCHEMES:
+        raise UsageError(f"there is no scheme '{scheme}' ({origin})", did_you_mean(str(scheme), [*SCHEMES]))
     if scheme in OWN_FORMULA:
         _own_formula(scheme, values)
         return Options(scheme, None, size, values)
@@ -117,13 +119,6 @@ def _own_formula(scheme: str, values: Mapping[str, Option]) -> None:
             raise UsageError(f"scheme '{scheme}' has its own formula and no {key} ({values[key].origin})")
     if "step" not in values:
         raise UsageError(f"scheme '{scheme}' needs a step, and keeps no tolerance", "give a step, for example 1e-3")
-
-
-def _scheme(option: Option) -> str:
-    if option.value in SCHEMES:
-        return option.value
-    hint = did_you_mean(str(option.value), [*SCHEMES])
-    raise UsageError(f"there is no scheme '{option.value}' ({option.origin})", hint)
 
 
 def _method(option: Option, size: str, size_origin: str) -> Method | None:

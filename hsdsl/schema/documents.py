@@ -242,22 +242,22 @@ class ModelDocument(Document):
     )
 
 
-# the document of each kind of mapping, by its path; `*` is any key or index
-SHAPES: dict[tuple[str, ...], type[Document]] = {
-    (): ModelDocument,
-    ("parameters", "*"): ParameterEntry,
-    ("inputs", "*", "<samples>"): InputSamples,
-    ("inputs", "*", "<file>"): InputFile,
-    ("modes", "*"): ModeDocument,
-    ("modes", "*", "transitions", "*"): TransitionDocument,
-    ("initial",): InitialDocument,
-    ("experiment",): ExperimentDocument,
-    ("reference", "*"): ReferenceDocument,
-    ("reference", "*", "transitions", "*"): ReferenceTransitionDocument,
-    ("reference", "*", "states", "*"): ReferenceStateDocument,
+# the document of each kind of mapping by its path, and a phrase for it; `*` is any key or index
+SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
+    (): (ModelDocument, "a model"),
+    ("parameters", "*"): (ParameterEntry, "a parameter"),
+    ("inputs", "*", "<samples>"): (InputSamples, "an input"),
+    ("inputs", "*", "<file>"): (InputFile, "an input"),
+    ("modes", "*"): (ModeDocument, "a mode"),
+    ("modes", "*", "transitions", "*"): (TransitionDocument, "a transition"),
+    ("initial",): (InitialDocument, "`initial`"),
+    ("experiment",): (ExperimentDocument, "`experiment`"),
+    ("reference", "*"): (ReferenceDocument, "a reference"),
+    ("reference", "*", "transitions", "*"): (ReferenceTransitionDocument, "a transition of a reference"),
+    ("reference", "*", "states", "*"): (ReferenceStateDocument, "a state of a reference"),
 }
 
 
 def keys_of(*pattern: str) -> list[str]:
     """The keys of a kind of mapping, as they are written in a file."""
-    return [field.alias or name for name, field in SHAPES[pattern].model_fields.items()]
+    return [field.alias or name for name, field in SHAPES[pattern][0].model_fields.items()]

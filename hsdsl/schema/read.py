@@ -22,18 +22,6 @@ from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange,
 
 _MOST_READINGS = 8
 _TAG = re.compile(r"<(?:expression|mapping|list|samples|file)>|function-\w+\[.*")  # of a union; no key in the file
-_DESCRIPTIONS: dict[tuple[str, ...], str] = {
-    (): "a model",
-    ("parameters", "*"): "a parameter",
-    ("inputs", "*"): "an input",
-    ("modes", "*"): "a mode",
-    ("modes", "*", "transitions", "*"): "a transition",
-    ("initial",): "`initial`",
-    ("experiment",): "`experiment`",
-    ("reference", "*"): "a reference",
-    ("reference", "*", "transitions", "*"): "a transition of a reference",
-    ("reference", "*", "states", "*"): "a state of a reference",
-}
 
 
 def read(root: Node, findings: Findings) -> ModelDocument:
@@ -132,7 +120,7 @@ def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:
 def _unknown_key(root: Node, path: NodePath) -> Diagnostic:
     key, fields = str(path[-1]), keys_of(*_pattern(path[:-1]))
     meant = key_meant(key, fields, descend(root, _untagged(path[:-1])))
-    message = f"unknown key '{shown(key)}' in {_description(path[:-1])}"
+    message = f"unknown key '{shown(key)}' in {SHAPES[_pattern(path[:-1])][1]}"
     hint = unknown_key_hint(key, meant, fields, descend(root, _untagged(path)))
     return _find(root, path, key=True).diagnostic("HS201", message, hint)
 
@@ -152,7 +140,7 @@ def _missing_key(root: Node, path: NodePath) -> Diagnostic:
                 hint = "remove the dash here, which begins another transition"
         case _:
             pass
-    message = f"the key '{path[-1]}' is missing in {_description(path[:-1])}"
+    message = f"the key '{path[-1]}' is missing in {SHAPES[_pattern(path[:-1])][1]}"
     return place.text.diagnostic("HS202", message, span, hint)
 
 
@@ -160,22 +148,14 @@ def _untagged(path: NodePath) -> NodePath:
     return tuple(step for step in path if isinstance(step, int) or not _TAG.fullmatch(step))
 
 
-def _trimmed(pattern: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(step for step in pattern if not step.startswith("<"))
-
-
-def _description(path: NodePath) -> str:
-    return _DESCRIPTIONS[_trimmed(_pattern(path))]
-
-
 def _pattern(path: NodePath) -> tuple[str, ...]:
     """The kind of mapping at a path: a key of :data:`SHAPES`."""
     names = _untagged(path)
     exact = (pattern for pattern in SHAPES if _fits(pattern, path))
-    return next(exact, None) or next((pattern for pattern in SHAPES if _fits(_trimmed(pattern), names)), ())
+    return next(exact, None) or next((pattern for pattern in SHAPES if _fits(_untagged(pattern), names)), ())
 
 
-def _fits(pattern: tuple[str, ...], path: NodePath) -> bool:
+def _fits(pattern: NodePath, path: NodePath) -> bool:
     return len(pattern) == len(path) and all(p in ("*", step) for p, step in zip(pattern, path, strict=True))
 
 

@@ -26,6 +26,7 @@ _OF_OTHERS = {
     "relaxation": "epsilon eps",
     "tolerance": "tol tolerances rtol atol reltol abstol precision",
     "method": "integrator solver algorithm",
+    "scale": "scales nominal nominals",
     "experiment": "simulation settings options config run",
     "title": "name",
     "about": "description comment doc",

@@ -95,10 +95,8 @@ def _one(run: list[Scalar] | list[Node], findings: Findings) -> Node:
     whole = _joined(run)
     if whole is run[0] or not isinstance(whole, Scalar):
         return run[0]
-    message, hint = (
-        "inside braces or brackets YAML ends a value at its comma",
-        f'quote this expression: "{whole.value}"',
-    )
+    message = "inside braces or brackets YAML ends a value at its comma"
+    hint = f'quote this expression: "{whole.value}"'
     if _decimal(list(run)):
         whole = Scalar(whole.value.replace(",", "."), True, whole.place)
         hint = f"write {whole.value}"

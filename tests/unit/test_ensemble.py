@@ -161,3 +161,8 @@ def test_nothing_varied_is_one_run():
     ensemble = hsdsl.load(OSCILLATOR).ensemble(**FAST)
     assert ensemble.shape == () and ensemble.run().final.state["x"] == float(ensemble.state["x"])
     assert "shape ()" in repr(ensemble)
+
+
+def test_instances_of_short_runs_have_their_own_default_relaxation():
+    ensemble = hsdsl.load(OSCILLATOR).ensemble(parameters={"c": [0.5, 0.6]}, until=0.5, scheme="relaxed")
+    assert_as_single_runs(ensemble)
