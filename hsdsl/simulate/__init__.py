@@ -16,7 +16,7 @@
 `paoli_schatzman`        the rival: a two-step formula for one mass and one stop
 `problem`, `run`         an initial value problem with its settings; the same under way
 `recorder`               rows, arcs and transitions, and the execution's columns
-`stops`, `diagnostics`   how runs end, and what else they say of themselves; `diagnosis` finds why one cannot go on
+`stops`, `diagnostics`   how runs end, and what else they say of themselves; `standstill` says why one cannot go on
 `plan`                   a problem ready to run; the two engines
 `refinement`             the settings of the finer run that errors are measured by
 `result`                 what was recorded or written, as an execution

@@ -17,14 +17,13 @@ from hsdsl.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.integrators.taylor import proposed_step
 from hsdsl.kernel import Series, Taylor
 from hsdsl.simulate.chatter import Chatter
-from hsdsl.simulate.curves import Curves, curves_along
 from hsdsl.simulate.interpolation import UNKNOWN_TOLERANCE
 from hsdsl.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED
 from hsdsl.simulate.root_isolation import value
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import CREEPING, MOST_CREEPING
-from hsdsl.simulate.surface_polynomials import Piece, TooFast, settles, without_zeros
+from hsdsl.simulate.surface_polynomials import Curves, Piece, TooFast, curves_along, settles, without_zeros
 from hsdsl.simulate.surfaces import StepFailure, at, shortened
 
 TOO_FAST = StepFailure("not finite")  # a surface, for one step

@@ -10,8 +10,8 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
-from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.run import ModeState, Run, reset
+from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain
 from hsdsl.simulate.surfaces import Crossing
 

@@ -13,14 +13,13 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
-from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.relaxed import Event, go_on, sizes, standing_on
-from hsdsl.simulate.rest import rests
 from hsdsl.simulate.root_isolation import stays_below
 from hsdsl.simulate.run import ModeState, Run, choose, reset
-from hsdsl.simulate.sticking import RestSteps, release
+from hsdsl.simulate.standstill import standstill
+from hsdsl.simulate.sticking import RestSteps, release, rests
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket

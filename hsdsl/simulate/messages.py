@@ -9,10 +9,10 @@ from hsdsl.execution import Stop
 from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.simulate import stops
-from hsdsl.simulate.diagnosis import Standstill
 from hsdsl.simulate.diagnostics import Diagnostics, slides
 from hsdsl.simulate.located import FREE
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.standstill import Standstill
 from hsdsl.simulate.surfaces import StepFailure
 from hsdsl.simulate.workspace import Workspace
 

@@ -20,9 +20,9 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
-from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.recorder import Counted
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
 

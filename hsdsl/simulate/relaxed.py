@@ -16,12 +16,12 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.chatter import Chatter
-from hsdsl.simulate.diagnosis import standstill
 from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import Patience
+from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import TIE, Crossing, StepFailure, Trial
 

@@ -12,12 +12,17 @@ from dataclasses import dataclass, replace
 
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators.stepper import Polynomial, State
-from hsdsl.simulate.interpolation import interpolation
+from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.root_isolation import ROUNDING, Coefficients, last_root, rises, total, value
+from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.surfaces import at
 
 MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_FIRST = 3  # of a step's first piece, before the step is made shorter
 MOST_PIECES = 1000  # before what is left is taken as it is, or it is refused
+IN_A_STEP = 64  # pieces of a surface, at most
+SHORTEST = 2**16  # in a run: steps that are still made shorter where surfaces vary too fast along them
+LOST_IN_A_STEP, LOST_SHORTEST = 16, 2**9  # the same in a mode whose surfaces even such steps cannot follow
 Function = Callable[[Number], Number]
 
 
@@ -99,6 +104,9 @@ def slope_of(c: Coefficients, s: Number) -> Number:
     return slope
 
 
+Curves = list[list[Piece]]  # of each surface
+
+
 def affine_curve(start: Number, slopes: State, h: Number, piece: Polynomial, share: Number) -> list[Piece]:
     """A surface that is affine, with these slopes by time and the states, along a piece over ``h``.
 
@@ -176,3 +184,47 @@ def settles(off: Number, enough: Number, allowed: Callable[[int], Number], k: in
 def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number]) -> Number:
     """How far a polynomial is off the values it should have at some points."""
     return max(abs(value(c, s) - w) for s, w in zip(tests, wanted, strict=True))
+
+
+def curves_along(run: Run, here: ModeState, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:
+    """Give the pieces of each surface along ``piece``, a step's interpolant from (t, x) to (t + h, z).
+
+    Raises
+    ------
+    TooFast
+        A surface varies too fast for one step.
+    ValueError
+        One has no value.
+    """
+    degree, share = along_steps(run.settings)
+    if here.mode.affine:
+        return _affine_curves(here, t, h, x, piece, share + interpolation(degree, run.arithmetic).rounding)
+    surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
+
+    def values(s: Number) -> State:
+        return surfaces(t + s * h, *at(x, piece, s))
+
+    def allowed(k: int) -> Number:
+        return max(here.surfaces.roundoff_bound(k, t, x), here.surfaces.roundoff_bound(k, t + h, z))
+
+    lost = here.mode.name in run.control.lost
+    most, shortest = (LOST_IN_A_STEP, LOST_SHORTEST) if lost else (IN_A_STEP, SHORTEST)
+    refuse = h * shortest > run.settings.until
+    curves = interpolated(values, count, degree, allowed, share, run.arithmetic, most=most, may_refuse=refuse)
+    if not refuse and curves and len(curves[0]) >= most:
+        _lose(run, here, t, curves)
+    return curves
+
+
+def _lose(run: Run, here: ModeState, t: Number, curves: Curves) -> None:
+    """Give up following a mode's surfaces: visits beyond them may be missed from here on."""
+    run.control.lost.add(here.mode.name)
+    for k, pieces in enumerate(curves):
+        if not all(piece.certain for piece in pieces):
+            run.diagnostics.unsettled(here.mode.name, k, t)
+
+
+def _affine_curves(here: ModeState, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:
+    slopes = [gradient(t, *x) for gradient in here.kernel.gradients]
+    starts = here.kernel.surfaces(t, *x)
+    return [affine_curve(start, row, h, piece, share) for start, row in zip(starts, slopes, strict=True)]

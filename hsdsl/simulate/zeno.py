@@ -12,8 +12,8 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.rest import is_pushed, moves_alone, stays
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.sticking import is_pushed, moves_alone, stays
 
 LEAST_FLIGHTS = 3
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point

@@ -1,5 +1,5 @@
 /* All surfaces of a mode along one step, by the interpolant of its states: exactly where they are affine.
-   See hsdsl/simulate/curves.py. */
+   See hsdsl/simulate/surface_polynomials.py. */
 
 #define IN_A_STEP 64
 #define SHORTEST 0x1p16

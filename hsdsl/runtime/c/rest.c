@@ -1,5 +1,5 @@
 /* Rest on a guard: a state that its own reset keeps in place while the flow pushes it out (M11).
-   See hsdsl/simulate/rest.py. Functions answer 1 or 0, or RAISED where a routine has no value. */
+   See hsdsl/simulate/sticking.py. Functions answer 1 or 0, or RAISED where a routine has no value. */
 
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
