@@ -82,7 +82,7 @@ class EnsembleRequest:
     @property
     def sample_count(self) -> int:
         """The number of samples of each instance."""
-        return self.times(np.zeros(1)).shape[1]
+        return self.samples if isinstance(self.samples, int) else 0 if self.samples is None else len(self.samples)
 
     def times(self, until: Array) -> Array:
         """The sample times of every instance, shape (instances, samples)."""
