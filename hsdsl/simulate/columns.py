@@ -46,7 +46,7 @@ class Counts(NamedTuple):
 
 
 class Where(NamedTuple):
-    """What C is told of columns: how many, and the addresses of the first elements."""
+    """Numbers of rows and arcs, sizes of a row, and addresses of columns, for C."""
 
     rows: int
     arcs: int
@@ -82,7 +82,7 @@ class Gathered:
 
 
 class Packed:
-    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them; arrays are made when asked for.
+    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them; arrays are made on first use.
 
     A dozen arrays take longer to make than many a run.
 

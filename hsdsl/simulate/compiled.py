@@ -1,6 +1,6 @@
 """The compiled loop: hsdsl/runtime/c run on what the Python loop would run on.
 
-The loop says where and why it stopped; what it means is said by the same functions as for the Python loop.
+The loop returns codes; the functions of the Python loop turn them into sentences.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ class CompiledRun:
 
     @cached_property
     def diagnostics(self) -> Diagnostics:
-        """What the run has noted; most runs note nothing, and nobody asks."""
+        """What the run has noted; most runs note nothing."""
         diagnostics = Diagnostics()
         if self._columns is not None:
             self._note(self._columns["note"], diagnostics)

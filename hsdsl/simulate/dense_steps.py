@@ -1,6 +1,6 @@
 """One accepted step of the located scheme, with what happens along it: states and surfaces as polynomials.
 
-A step is bounded by its error alone; where surfaces are crossed inside is asked afterwards.
+A step is bounded by its error alone; crossings inside it are located afterwards.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Stepping(Protocol):
     """What makes steps in one mode, on one segment of the inputs."""
 
     def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
-        """Make one step that the error allows, not beyond ``limit``; or say what stands in the way."""
+        """Make one step that the error allows, not beyond ``limit``; or return what is in the way."""
         ...
 
 
@@ -293,7 +293,7 @@ class SeriesSteps:
     ) -> bool:
         """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step.
 
-        One of a surface that is linear in the states need not run out: it is told by giving the surface to round-off.
+        That of a surface linear in the states need not run out: it converges if it gives the surface to round-off.
         """
         given, largest = self.run.control.tolerance, max(abs(a) for a in c)
         tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)

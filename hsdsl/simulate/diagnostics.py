@@ -11,7 +11,7 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
 from hsdsl.simulate.stops import show
 
-LEFT_OUT = "nothing that was asked for, and no guard, condition or domain, depends on them"
+LEFT_OUT = "no requested output and no guard, condition or domain depends on them"
 TWO_STEP = (
     "the theorem says nothing of the scheme paoli-schatzman",
     "only positions at the steps are the scheme's: velocities are difference quotients of them, and a last row between "

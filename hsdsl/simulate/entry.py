@@ -28,7 +28,7 @@ def enter(
     inside: frozenset[int] = frozenset(),
     reset_at: Number = None,
 ) -> ModeState | Stop:
-    """Enter a mode and make the transitions that fire at once; return where the run then stands, or why it stops.
+    """Enter a mode and make the transitions that fire at once; return the mode entered last, or why the run stops.
 
     A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. So
     does one that moved past the state while it waited in a strip, since it was reset at ``reset_at``. One of an edge in

@@ -227,7 +227,7 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
 
 
 def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:
-    """No step is short enough: take a guard that the state stands on, or stop and say why."""
+    """No step is short enough: take a guard that the state is on, or stop with the reason."""
     if failure.kind in ("not finite", "unsolved") and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
         return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))

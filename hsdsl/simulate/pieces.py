@@ -57,7 +57,7 @@ def isolated(changes: Changes, parts: Sequence[Part]) -> tuple[Found, Found]:
     return monotone, list(_joined(unsure))
 
 
-def told(changes: Changes, places: Sequence[tuple[Part, Number]]) -> list[bool]:
+def decided(changes: Changes, places: Sequence[tuple[Part, Number]]) -> list[bool]:
     """Whether the argument is off its levels by more than round-off at times, or stays on one."""
     enclosed = _Enclosed.of(changes, [part.data for part, _ in places])
     times = np.array([float(t) for _, t in places])

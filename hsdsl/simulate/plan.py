@@ -26,7 +26,7 @@ from hsdsl.simulate.stops import interrupted, memory
 
 
 def _relaxed(run: Run, here: ModeState | Stop) -> Stop:
-    """The loop, loaded when it is asked for: the compiled ones need nothing of it."""
+    """The loop, imported on first use: the compiled one needs nothing of it."""
     from hsdsl.simulate.relaxed import relaxed
 
     return relaxed(run, here)

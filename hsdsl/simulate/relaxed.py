@@ -2,7 +2,7 @@
 
 Each guard carries a strip of depth epsilon. A step may end in the domain or in a strip; otherwise it is halved. In the
 strip the state waits at the point q where the step crossed the guard, until epsilon has passed, and is reset. No event
-is located on the flow: only the step's own interpolant is asked where it crossed.
+is located on the flow, only on the step's own interpolant.
 """
 
 from __future__ import annotations
@@ -215,7 +215,7 @@ def go_on(run: Run, here: ModeState) -> ModeState | Stop:
 
 
 def standing_on(run: Run, here: ModeState) -> list[Crossing]:
-    """Guards that the state stands on, to round-off or a tie relative to the time passed."""
+    """Guards that the state is on, to round-off or a tie relative to the time passed."""
     t, x, zero = here.t, here.x, run.arithmetic.zero
     return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, TIE * t)]
 

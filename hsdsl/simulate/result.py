@@ -55,7 +55,7 @@ def written(
 ) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 
-    Arrays and objects are made when they are first asked for: of a short run they would take longer than the run.
+    Arrays and objects are made on first use: for a short run they would take longer than the run.
     """
     plan = under_way.plan
     layouts, found = plan.layouts, None

@@ -1,4 +1,4 @@
-"""A run under way: what it was asked, what it has recorded, and where it is."""
+"""A problem under way: what it has recorded, and the state of its mode."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hsdsl.simulate.surfaces import Crossing, Surfaces
 
 @dataclass(frozen=True)
 class ModeState:
-    """Where a run stands, ready to flow: mode, input segment, time and state.
+    """Mode, input segment, time and state of a run, ready to flow.
 
     ``scale`` is the size of the numbers each state was computed from when the mode was entered.
     """
@@ -144,7 +144,7 @@ class Run(Problem):
 def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
     """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
 
-    Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. Returns the
+    Tied are also guards that the earliest crossing's point is on. The chosen edge goes from that point. Returns the
     crossing and the names of those tied with it.
     """
     edges, first = here.mode.edges, min(crossings, key=lambda c: c.time)

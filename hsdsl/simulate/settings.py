@@ -1,4 +1,4 @@
-"""What a run is asked to do, in numbers."""
+"""Settings of one run, in numbers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Settings:
     spaced times, or the times) says what tables of the execution are written at; it does not change the run.
     ``scale`` has the given sizes of states: the scale of a state is this size until the state has been larger.
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
-    ``overrides`` is what was asked beyond the model's file, as it was written, by the names of `--set`.
+    ``overrides`` are the values given beyond the model's file, as written, by the names of `--set`.
     ``memory`` is how many bytes of rows a run may keep.
     ``longest_step`` bounds the steps of an adaptive method further.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.

@@ -12,7 +12,7 @@ from hsdsl.simulate.surfaces import StepFailure
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
 CREEPING = 10  # halvings; steps below a thousandth of the full one
-MOST_CREEPING = 2000  # in a row: the run would take a thousand times what it was asked to
+MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
 
 
 @dataclass

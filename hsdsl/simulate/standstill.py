@@ -144,6 +144,6 @@ class Standstill:
 
 
 def standstill(run: Run, here: ModeState) -> Standstill:
-    """Where the Python loop stands."""
+    """The present place of the Python loop."""
     mode = run.program.modes.index(here.mode)
     return Standstill(run, mode, here.segment, here.t, here.x, here.arc.scales, run.control.h)

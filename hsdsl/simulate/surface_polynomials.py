@@ -55,7 +55,7 @@ class Rise:
 
 
 def deflated(pieces: list[Piece]) -> list[Piece]:
-    """Take the first piece to begin at zero: the state stands on the surface, to round-off."""
+    """Take the first piece to begin at zero: the state is on the surface, to round-off."""
     first = pieces[0]
     zero = first.coefficients[0] * 0
     return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
@@ -177,13 +177,13 @@ def interpolated(
 
 
 def settles(off: Number, enough: Number, allowed: Callable[[int], Number], k: int) -> bool:
-    """Whether a residual of function k is small enough; what is allowed beyond that is asked where it matters."""
+    """Whether a residual of function k is small enough; ``allowed`` is evaluated only beyond ``enough``."""
     return off <= enough or off <= allowed(k) + enough
 
 
-def residual(c: Coefficients, tests: Sequence[Number], wanted: Sequence[Number]) -> Number:
+def residual(c: Coefficients, tests: Sequence[Number], values: Sequence[Number]) -> Number:
     """How far a polynomial is off the values it should have at some points."""
-    return max(abs(value(c, s) - w) for s, w in zip(tests, wanted, strict=True))
+    return max(abs(value(c, s) - w) for s, w in zip(tests, values, strict=True))
 
 
 def curves_along(run: Run, here: ModeState, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:

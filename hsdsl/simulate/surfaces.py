@@ -77,7 +77,7 @@ class Trial:
         return self.stepper.piece(self.flow, self.t, self.h, self.x, self.z, self.stages, self.slope, self.end)
 
     def cubic(self) -> Polynomial:
-        """The cubic Hermite interpolant, whatever the method."""
+        """The cubic Hermite interpolant, for any method."""
         return self.piece if self.end is None else hermite(self.h, self.x, self.z, self.slope, self.end)
 
 
@@ -150,7 +150,7 @@ class Surfaces:
         inside: frozenset[int] = frozenset(),
         reset_at: Number = None,
     ) -> list[int]:
-        """Look at the surfaces on entry: return those the state is beyond, and note those it stands on.
+        """Look at the surfaces on entry: return those the state is beyond, and note those it is on.
 
         A surface that the flow passes within the time ``since`` counts as stood on. So does one that the state was not
         beyond when it was reset, before it waited in a strip. On one ``inside`` counts as beyond.
@@ -199,7 +199,7 @@ class Surfaces:
         return self.arithmetic.sqrt(total)
 
     def standing(self, t: Number, x: State, since: Number) -> list[int]:
-        """Edges on whose guards the state stands, with the flow pointing out and `if` true.
+        """Edges on whose guards the state is, with the flow pointing out and `if` true.
 
         On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that. Of a
         state at rest only time goes on.
@@ -221,7 +221,7 @@ class Surfaces:
     def excursion(self, trial: Trial) -> StepFailure | None:
         """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
 
-        Only where the flow points out of a surface at the step's start and back in at its end; asked of adaptive steps,
+        Only where the flow points out of a surface at the step's start and back in at its end; for adaptive steps,
         whose length nobody chose.
         """
         if trial.end is None:
@@ -327,7 +327,7 @@ class Surfaces:
         return back if back > noise else self.arithmetic.zero
 
     def _smallest(self, trial: Trial, k: int) -> Number:
-        """How close to zero a crossing of this step can be told: round-off of its own numbers, no older ones."""
+        """How close to zero a crossing of this step can be located: round-off of its own numbers, no older ones."""
         sizes = tuple(max(abs(a), abs(b)) for a, b in zip(trial.x, trial.z, strict=True))
         return self.roundoff_bound(k, trial.t1, sizes) * ROOT_SHARE
 

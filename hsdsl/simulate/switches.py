@@ -37,7 +37,7 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a part, a time in it at which its number can be told, and its number; None where it cannot."""
+    """A part of a part, a time in it at which its number is certain, and its number; None where there is none."""
 
     part: Part
     start: Number
@@ -70,8 +70,8 @@ class Changes:
             for part, (inside, unsure) in zip(parts, cuts, strict=True)
             for a, b in pairwise((part.start, *self._apart(part, inside), part.end))
         ]
-        told = [True] * len(cut) if linear else self._told(cut)
-        sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, told, strict=True))
+        decided = [True] * len(cut) if linear else self._decided(cut)
+        sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, decided, strict=True))
         return list(self._merged(sure))
 
     def _merged(self, pieces: Iterator[Piece]) -> Iterator[Piece]:
@@ -156,10 +156,10 @@ class Changes:
             found[owner][1].append((low, high))
         return found
 
-    def _told(self, pieces: Sequence[Piece]) -> list[bool]:
-        from hsdsl.simulate.pieces import told
+    def _decided(self, pieces: Sequence[Piece]) -> list[bool]:
+        from hsdsl.simulate.pieces import decided
 
-        return told(self, [(piece.part, piece.at) for piece in pieces])
+        return decided(self, [(piece.part, piece.at) for piece in pieces])
 
     def _roots(self, part: Part, a: Number, b: Number) -> list[Number]:
         """Where an argument that is monotone on [a, b] meets its levels, solved to round-off."""

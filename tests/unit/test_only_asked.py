@@ -112,4 +112,4 @@ def test_the_command_line_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
     found = json.loads(said[True])
     assert found["left_out"]["states"] == ["y"] and "depends on them" in found["left_out"]["reason"]
     assert set(found["final"]["state"]) == {"h", "v"}
-    assert "left out  y: nothing that was asked for" in said[False]
+    assert "left out  y: no requested output" in said[False]

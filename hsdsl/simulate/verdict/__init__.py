@@ -43,7 +43,7 @@ LEFT = ("left_domain", "zeno")
 
 
 def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
-    """Say whether the theorem's hypotheses hold for a run, are left, or cannot be told.
+    """Decide whether the theorem's hypotheses hold for a run, are left, or are unknown.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
-    left, unknown, said = [*diagnostics.departures], [*diagnostics.doubts], list[str]()
+    left, unknown, margins = [*diagnostics.departures], [*diagnostics.doubts], list[str]()
     left += [sentence for sentence in accumulations(run) if not diagnostics.departures]
     if run.stop.reason in LEFT:
         left.append(run.stop.message)
@@ -62,13 +62,13 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     for look in (reliability, crossings, choices, landings, misses, flows):
         findings, reasons = look(run)
         found += findings
-        said += reasons
+        margins += reasons
     left += _named(found, "left")
     unknown += _named(found, "unknown")
     unknown += _unchecked(run, run.stop, run.transitions)
     if left:
         return Verdict("left", _once(left, unknown))
-    return Verdict("unknown", _once(unknown, said)) if unknown else Verdict("holds", _once(said))
+    return Verdict("unknown", _once(unknown, margins)) if unknown else Verdict("holds", _once(margins))
 
 
 def _once(*sentences: Sequence[str]) -> tuple[str, ...]:

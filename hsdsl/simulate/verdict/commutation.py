@@ -1,6 +1,6 @@
 """Do transitions that are reached together commute?
 
-Each of them is taken first in turn, then whatever fires at the same instant; where all orders lead to the same point
+Each of them is taken first in turn, then all that fire at the same instant; where all orders lead to the same point
 the choice does not matter.
 """
 
@@ -87,7 +87,7 @@ def settle(run: RunView, place: Place, k: int, since: Number) -> Landed | None:
 
 
 def _next(place: Place, since: Number) -> int | None:
-    """The edge that goes at once from where a state stands."""
+    """The edge that goes at once from a state."""
     surfaces, edges = place.surfaces, place.mode.edges
     beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), since)
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]

@@ -66,12 +66,12 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
         except DOMAIN_ERRORS:
             sentence = f"a surface of {arc.mode} has no value close to t = {show(run.times[arc.last])}"
             found.append(Finding("no value", "unknown", sentence))
-    said = (
+    margins = (
         [f"the nearest miss is of {nearest.name} at t = {show(nearest.time)}, by {times(nearest.margin)} the error"]
         if nearest and not found
         else []
     )
-    return [*found, *at_the_end(run)], [*said, *(passed_at(name, at) for name, at in passed.items())]
+    return [*found, *at_the_end(run)], [*margins, *(passed_at(name, at) for name, at in passed.items())]
 
 
 def _turning(run: RunView, steps: Parts) -> list[Open]:

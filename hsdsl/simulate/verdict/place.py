@@ -1,4 +1,4 @@
-"""One state of a mode at a time, and what can be asked of it."""
+"""One state of a mode at a time: its surfaces, rates and conditions."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class RunView:
 
     @cached_property
     def errors(self) -> Errors | None:
-        """How wrong the run is, by a finer one; None where steps are fixed and nobody asked for an estimate."""
+        """How wrong the run is, by a finer one; None where steps are fixed and no estimate is requested."""
         tolerance = self.problem.settings.tolerance
         finer = self.execution.finer if tolerance is not None or self.estimated else None
         if finer is None or finer.stop.reason == "interrupted":

@@ -171,8 +171,8 @@ def undecided(
         if not left.any() or left.sum() > MOST_PARTS // 2:
             break
         parts = parts.take(left).halves()
-        asked = np.concatenate([open_[left]] * 2)
-        open_ = asked & decides(parts)
+        open_before = np.concatenate([open_[left]] * 2)
+        open_ = open_before & decides(parts)
     left = open_.any(axis=1)
     return parts.take(left), open_[left]
 
