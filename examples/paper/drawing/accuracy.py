@@ -21,33 +21,45 @@ CEILING = 300  # larger errors are those of an unstable method and are not drawn
 
 
 def draw_rho(points: Sequence[Point]) -> Figure:
-    """Draw rho against the step, a line for each relaxation over step, and what a reversed velocity makes of it."""
-    figure = Figure(figsize=(10.0, 4.4), layout="constrained")
-    for axis, example in zip(figure.subplots(1, 2), (1, 2), strict=True):
-        loglog(axis, "step $h$", r"$\rho^\varepsilon_{[0,\,t_{max}]}$" if example == 1 else "")
-        _lines(axis, [p for p in points if p.example == example], lambda p: p.rho_upper)
-        mine = [p for p in points if p.example == example and p.ratio == RATIOS[-1] and p.rho_reversed < CEILING]
-        mine = mine or [p for p in points if p.example == example and p.ratio == RATIOS[0] and p.rho_reversed < CEILING]
-        axis.plot([p.step for p in mine], [p.rho_reversed for p in mine], ":", color=ALARM, linewidth=1.8,
+    """Draw rho against the step, a line for each relaxation over step, and the effect of a reversed velocity."""
+
+    def reversed_velocity(axis: Axes, mine: Sequence[Point]) -> None:
+        drawn = [p for p in mine if p.rho_reversed < CEILING]
+        drawn = [p for p in drawn if p.ratio == RATIOS[-1]] or [p for p in drawn if p.ratio == RATIOS[0]]
+        axis.plot([p.step for p in drawn], [p.rho_reversed for p in drawn], ":", color=ALARM, linewidth=1.8,
                   label="velocity reversed\nin each step")  # fmt: skip
-        letter(axis, _title(points, example))
-        if example == 1:
-            axis.legend(frameon=False, fontsize=8, loc="upper left")
-        _triangles(axis)
-    return figure
+
+    label = r"$\rho^\varepsilon_{[0,\,t_{max}]}$"
+    return _figure(points, label, lambda p: p.rho_upper, reversed_velocity, legend_in=1)
 
 
 def draw_rho_hat(points: Sequence[Point], rivals: Sequence[Rival]) -> Figure:
-    """Draw rho-hat against the step, beside Paoli and Schatzman's scheme."""
+    """Draw rho-hat against the step, with Paoli and Schatzman's scheme."""
+
+    def rival(axis: Axes, mine: Sequence[Point]) -> None:
+        drawn = [r for r in rivals if r.example == mine[0].example]
+        axis.plot([r.step for r in drawn], [r.rho_hat for r in drawn], "--", marker="x", markersize=4, color="#000000",
+                  label="Paoli-Schatzman")  # fmt: skip
+
+    return _figure(points, r"$\hat\rho$", lambda p: p.rho_hat, rival, legend_in=2)
+
+
+def _figure(
+    points: Sequence[Point],
+    label: str,
+    value: Callable[[Point], float],
+    other: Callable[[Axes, Sequence[Point]], None],
+    legend_in: int,
+) -> Figure:
+    """Draw a panel for each example: our lines, and another one."""
     figure = Figure(figsize=(10.0, 4.4), layout="constrained")
     for axis, example in zip(figure.subplots(1, 2), (1, 2), strict=True):
-        loglog(axis, "step $h$", r"$\hat\rho$" if example == 1 else "")
-        _lines(axis, [p for p in points if p.example == example], lambda p: p.rho_hat)
-        mine = [r for r in rivals if r.example == example]
-        axis.plot([r.step for r in mine], [r.rho_hat for r in mine], "--", marker="x", markersize=4, color="#000000",
-                  label="Paoli-Schatzman")  # fmt: skip
+        mine = [p for p in points if p.example == example]
+        loglog(axis, "step $h$", label if example == 1 else "")
+        _lines(axis, mine, value)
+        other(axis, mine)
         letter(axis, _title(points, example))
-        if example == 2:
+        if example == legend_in:
             axis.legend(frameon=False, fontsize=8, loc="upper left")
         _triangles(axis)
     return figure
