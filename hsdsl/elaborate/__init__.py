@@ -12,8 +12,7 @@ from hsdsl import limits
 from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.inputs import define_inputs
-from hsdsl.elaborate.modes import elaborate_modes
-from hsdsl.elaborate.outputs import elaborate_outputs
+from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
 from hsdsl.elaborate.symbols import SymbolTable

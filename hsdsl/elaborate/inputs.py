@@ -1,18 +1,29 @@
 # pyright: basic
-"""Inputs: expressions of time, which are substituted, and samples, which stay symbols."""
+"""Inputs: expressions of time, which are substituted, and samples, which stay symbols.
+
+Samples of a CSV file are exact numbers; its faults have their row and column.
+"""
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.elaborate.samples import read_samples
 from hsdsl.elaborate.symbols import Meanings, SymbolTable
+from hsdsl.errors import Diagnostic, Span
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
+from hsdsl.files import DataRefused
+from hsdsl.names import did_you_mean, shown
 from hsdsl.schema import InputFile, InputSamples
-from hsdsl.source import Key, Scalar
+from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import SampledInput
+
+_MOST_FAULTS = 10  # of one file: a wrong column would bury everything else
+_NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE][+-]?[0-9]{1,3})?")
+
+Samples = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 
 
 def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
@@ -61,3 +72,93 @@ def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) 
 def _exact(value: Value) -> Any:
     """An exact number where there is one."""
     return Fraction(int(value.expr.p), int(value.expr.q)) if value.expr.is_Rational else value.expr
+
+
+def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | None:
+    """Times and values of the column ``name``; None where the file has faults, which are reported."""
+    if file.value == ABSENT:
+        return None
+    try:
+        data = symbols.content(file.value)
+        lines = data.decode("utf-8-sig").splitlines()
+    except DataRefused as refusal:
+        symbols.report(file.place, refusal.code, refusal.message, refusal.hint)
+        return None
+    except UnicodeDecodeError:
+        symbols.report(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
+        return None
+    table = _Table(str(symbols.files.folder / file.value), lines)
+    table.read(name)
+    for diagnostic in table.faults:
+        symbols.resolver.findings.add(diagnostic)
+    return None if table.faults else (tuple(table.times), tuple(table.values))
+
+
+def _hint(name: str, columns: list[str]) -> str | None:
+    """The hint for a wrong header."""
+    if any(mark in column for column in columns for mark in ";\t"):
+        return "columns are separated by commas, and numbers have decimal points"
+    if name in columns:
+        return "the column of times is called `time`"
+    return did_you_mean(name, columns)
+
+
+class _Table:
+    """The samples of a comma-separated table, and its faults."""
+
+    def __init__(self, path: str, lines: list[str]) -> None:
+        self.path, self.lines = path, lines
+        self.times: list[Fraction] = []
+        self.values: list[Fraction] = []
+        self.faults: list[Diagnostic] = []
+
+    def read(self, name: str) -> None:
+        """Read the columns ``time`` and ``name``."""
+        header = self.lines[0] if self.lines else ""
+        columns = [cell.strip().strip('"') for cell in header.split(",")] if self.lines else []
+        if "time" not in columns or name not in columns:
+            present = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
+            message = f"the header must be `time,{name}`, and has {present}"
+            self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns))
+            return
+        for number, line in enumerate(self.lines[1:], start=2):
+            if line.strip() and len(self.faults) < _MOST_FAULTS:
+                self.row(number, line, len(columns), columns.index("time"), columns.index(name))
+        if not self.times and not self.faults:
+            self.fault(1, 1, len(header), "the file has no rows below its header")
+
+    def row(self, number: int, line: str, width: int, at: int, own: int) -> None:
+        """Read one sample: its time and its value are in these columns."""
+        cells = line.split(",")
+        if len(cells) != width:
+            self.fault(number, 1, len(line), f"this row has {len(cells)} columns and the header {width}")
+            return
+        time, value = self.cell(number, cells, at), self.cell(number, cells, own)
+        if time is None or value is None:
+            return
+        if self.times and time <= self.times[-1]:
+            self.fault(number, _start(cells, at), len(cells[at]), "the times do not increase here")
+            return
+        self.times.append(time)
+        self.values.append(value)
+
+    def cell(self, number: int, cells: list[str], column: int) -> Fraction | None:
+        """Read one number, exactly."""
+        text = cells[column].strip().strip('"').strip()
+        if _NUMBER.fullmatch(text):
+            value = Fraction(text)
+            if abs(value) < 2**1024:
+                return value
+        message = f"'{shown(text, 40)}' in column {column + 1} is not a finite number"
+        self.fault(number, _start(cells, column), len(cells[column]), message)
+        return None
+
+    def fault(self, line: int, column: int, length: int, message: str, hint: str | None = None) -> None:
+        """Report something at a place of the table."""
+        text = self.lines[line - 1] if line <= len(self.lines) else ""
+        self.faults.append(Diagnostic("HS312", message, Span(self.path, line, column, max(1, length)), hint, text))
+
+
+def _start(cells: list[str], column: int) -> int:
+    """The place of a cell in its line, from 1."""
+    return 1 + sum(len(cell) + 1 for cell in cells[:column])

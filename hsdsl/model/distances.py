@@ -20,7 +20,7 @@ from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.points import Place
 from hsdsl.metrics.table import Request, between, check_same_model
-from hsdsl.model.overrides import parameters_of
+from hsdsl.model.options import parameters_of
 from hsdsl.simulate.stops import show
 
 if TYPE_CHECKING:

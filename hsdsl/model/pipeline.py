@@ -16,8 +16,7 @@ from hsdsl.files import ModelFiles
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
 from hsdsl.model import automatic, engines, program_cache
-from hsdsl.model.options import FILE, KEYS, Options, overrides_of, resolve
-from hsdsl.model.overrides import recorded
+from hsdsl.model.options import FILE, KEYS, Options, overrides_of, recorded, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.program import Program
