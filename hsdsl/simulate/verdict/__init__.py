@@ -58,8 +58,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         left.append(run.stop.message)
     if left:
         return Verdict("left", _once(left, unknown))
-    found: list[Finding] = []
-    for look in (reliability, crossings, choices, landings, misses, flows):
+    found = list(reliability(run))
+    for look in (crossings, choices, landings, misses, flows):
         findings, reasons = look(run)
         found += findings
         margins += reasons

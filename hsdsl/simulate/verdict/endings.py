@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution import Arc
@@ -46,7 +47,7 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
 
 def at_the_end(run: RunView) -> Iterator[Finding]:
     """Surfaces that would be reached just behind the end, and a transition just before it."""
-    if run.errors is None or run.unreliable or run.stop.reason != "until" or not run.flows:
+    if run.errors is None or run.upto < inf or run.stop.reason != "until" or not run.flows:
         return
     arc, until = run.flows[-1], run.times[-1]
     place = run.at_row(arc, arc.last)

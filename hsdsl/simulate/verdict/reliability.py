@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from hsdsl.enclosures import Range, as_range
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS, SAFE
@@ -12,15 +14,14 @@ PLACES = 64  # of a run where the round-off of its flow is looked at
 ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
 
 
-def reliability(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Say from when on the run and its finer repetition differ in more than digits."""
-    if run.unreliable is None:
-        return [], []
-    time, why = run.unreliable
-    return [Finding("reliability", "unknown", f"the run is unreliable from t = {show(time)} on: {why}")], []
+def reliability(run: RunView) -> Iterator[Finding]:
+    """From when on the run and its finer repetition differ in more than digits; sets ``run.upto``."""
+    if unreliable := _unreliable(run):
+        run.upto, why = unreliable
+        yield Finding("reliability", "unknown", f"the run is unreliable from t = {show(run.upto)} on: {why}")
 
 
-def unreliable(run: RunView) -> tuple[float, str] | None:
+def _unreliable(run: RunView) -> tuple[float, str] | None:
     """From when on the run is unreliable, and why; None where it is not."""
     if run.errors is None:
         return None

@@ -21,7 +21,7 @@ from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class RunView:
     """What a run recorded.
 
@@ -29,11 +29,14 @@ class RunView:
     ----------
     estimated : bool
         Whether the run is held against a finer one although its steps are fixed.
+    upto : float
+        Until when the run can be relied on.
     """
 
     problem: Problem
     execution: Execution
     estimated: bool = False
+    upto: float = inf
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -80,18 +83,6 @@ class RunView:
             for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
                 found[name] = max(found.get(name, 0.0), size)
         return found
-
-    @cached_property
-    def unreliable(self) -> tuple[float, str] | None:
-        """From when on the run cannot be relied on, and why; None where it can."""
-        from hsdsl.simulate.verdict.reliability import unreliable
-
-        return unreliable(self)
-
-    @property
-    def upto(self) -> float:
-        """Until when the run can be relied on."""
-        return self.unreliable[0] if self.unreliable else inf
 
     @property
     def relied_flows(self) -> list[Arc]:
