@@ -139,47 +139,29 @@ class CurvedGate:
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A gate passed in one direction: entered at ``enter`` and left at ``leave``, both affine in s."""
+    """A gate passed in one direction, from a source mode into a target.
+
+    ``enter`` and ``leave`` are base and frame, affine in s, of the sides where it is entered and left. ``across`` are
+    unit vectors and levels of the planes that hold the two sides, and ``exact`` both sides in rational numbers.
+    """
 
     index: int
     gate: Gate
     forward: bool
+    source: int
+    target: int
+    enter: tuple[Array, Array]
+    leave: tuple[Array, Array]
+    across: tuple[tuple[Array, Array], tuple[Array, Array]]
+    exact: tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]
 
-    @property
-    def source(self) -> int:
-        """The mode it is entered from."""
-        return self.gate.source if self.forward else self.gate.target
-
-    @property
-    def target(self) -> int:
-        """The mode it leads into."""
-        return self.gate.target if self.forward else self.gate.source
-
-    @property
-    def enter(self) -> tuple[Array, Array]:
-        """Base and frame of the side it is entered at."""
-        return self._side(self.forward)
-
-    @property
-    def leave(self) -> tuple[Array, Array]:
-        """Base and frame of the side it is left at."""
-        return self._side(not self.forward)
-
-    @property
-    def across(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Unit vectors and levels of the planes that hold the side it is entered at, and the one it is left at."""
-        guard, image = self.gate.across
-        return (guard, image) if self.forward else (image, guard)
-
-    @property
-    def exact(self) -> tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]:
-        """Base and frame of both sides in rational numbers: where it is entered, and where it is left."""
-        guard, image = self.gate.exact.sides
-        return (guard, image) if self.forward else (image, guard)
-
-    def _side(self, guard: bool) -> tuple[Array, Array]:
-        gate = self.gate
-        return (gate.base, gate.frame) if guard else (gate.image_base, gate.image_frame)
+    @classmethod
+    def through(cls, gate: Gate, index: int) -> Passage:
+        """Forwards for even indices, else backwards."""
+        guard = gate.source, (gate.base, gate.frame), gate.across[0], gate.exact.sides[0]
+        image = gate.target, (gate.image_base, gate.image_frame), gate.across[1], gate.exact.sides[1]
+        a, b = (image, guard) if index % 2 else (guard, image)
+        return cls(index, gate, index % 2 == 0, a[0], b[0], a[1], b[1], (a[2], b[2]), (a[3], b[3]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,41 +191,25 @@ class Space:
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """Every gate in both directions; gate i forwards is 2 i, backwards 2 i + 1."""
-        both = [(gate, forward) for gate in self.gates for forward in (True, False)]
-        return tuple(Passage(i, gate, forward) for i, (gate, forward) in enumerate(both))
+        return tuple(Passage.through(gate, 2 * i + k) for i, gate in enumerate(self.gates) for k in (0, 1))
 
     @cached_property
     def planes(self) -> tuple[Passage, ...]:
         """The passages without the inequalities of their gates."""
-        return tuple(replace(passage, gate=passage.gate.plane) for passage in self.passages)
+        return tuple(Passage.through(passage.gate.plane, passage.index) for passage in self.passages)
 
-    def fewest(self, source: int) -> tuple[int, ...]:
-        """For each mode the fewest passages that lead there from another; 0 where none do."""
-        key = ("fewest", source)
-        found: tuple[int, ...] | None = self.cache.get(key)
-        if found is None:
-            beside: dict[int, set[int]] = {}
+    def fewest(self, source: int) -> dict[int, int]:
+        """The fewest passages to each mode that is connected with one."""
+        steps, reached = {source: 0}, [source]
+        for mode in reached:
             for gate in (*self.gates, *self.curved_gates):
-                beside.setdefault(gate.source, set()).add(gate.target)
-                beside.setdefault(gate.target, set()).add(gate.source)
-            steps, reached = {source: 0}, [source]
-            for mode in reached:
-                new = sorted(beside.get(mode, set()) - steps.keys())
-                steps |= dict.fromkeys(new, steps[mode] + 1)
-                reached += new
-            found = self.cache[key] = tuple(steps.get(mode, 0) for mode in range(len(self.modes)))
-        return found
+                for here, there in ((gate.source, gate.target), (gate.target, gate.source)):
+                    if here == mode and there not in steps:
+                        steps[there] = steps[mode] + 1
+                        reached.append(there)
+        return steps
 
     @cached_property
     def affine(self) -> bool:
         """Whether everything is affine, so that both ends of a distance are certified."""
         return not self.curved_gates and all(d.convex for d in self.domains) and not any(g.curved for g in self.gates)
-
-    @cached_property
-    def components(self) -> tuple[int, ...]:
-        """For each mode the connected part of the mode graph it lies in, edges taken both ways."""
-        part = list(range(len(self.modes)))
-        for gate in (*self.gates, *self.curved_gates):
-            old, new = part[gate.source], part[gate.target]
-            part = [new if p == old else p for p in part]
-        return tuple(part)

@@ -84,14 +84,6 @@ class Ways:
             return np.full(len(indices), np.inf)
         return np.min(between[rows, None] + self.leaves[np.ix_(rows, indices)], axis=0) * (1 - ROUNDING)
 
-    def around_guards(self) -> Array:
-        """What paths with passages are at least: to a guard, between guards, from one."""
-        everything, best = np.arange(len(self.p)), np.full(len(self.p), np.inf)
-        for g in self.space.passages:
-            if g.source == self.source:
-                best = np.minimum(best, self.enters[g.index] + self.toll + self.rest(g.index, everything))
-        return best * (1 - ROUNDING)
-
     def through(self, sequence: tuple[int, ...], rows: Indices, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
         """Bounds on the paths through exactly a sequence, tolls included, and their unknowns."""
         problem = gate_sequence(self.space, sequence).problem(self.p[rows], self.q[rows])

@@ -18,7 +18,7 @@ from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.paths import Piece, Place, PointDistance, answer, coordinates, ends_of
 from hsdsl.metrics.search import End, most_hops, search
 
-__all__ = ["Piece", "Place", "PointDistance", "coordinates", "distance", "distances", "quick_bounds"]
+__all__ = ["Piece", "Place", "PointDistance", "coordinates", "distance", "distances"]
 
 
 def distance(
@@ -42,7 +42,7 @@ def distance(
     if p == q:
         return PointDistance(ZERO, (), "certified")
     a, b = starts[0], ends[0]
-    if space.components[a.mode] != space.components[b.mode]:
+    if b.mode not in space.fewest(a.mode):
         return PointDistance(INFINITE, (), "certified: no edges connect the modes")
     strip = _along_strip(p, q, a, b, relaxation)
     most, toll, budget = most_hops(space, a.mode, b.mode, hops), relaxation or 0.0, budget or Budget()
@@ -70,31 +70,13 @@ def distances(
     paths of earlier pairs to begin with, and bounds of at most ``enough`` need not be close.
     """
     pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
-    if space.components[pairs.source] != space.components[pairs.target]:
+    if pairs.target not in space.fewest(pairs.source):
         pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
     elif space.affine:
         search_batch(pairs, most_hops(space, pairs.source, pairs.target, hops), budget or Budget())
     else:
         (neighbours or Neighbours(space, relaxation, budget or Budget(), hops)).bound(pairs, enough)
     return pairs.bounds()
-
-
-def quick_bounds(
-    space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None = None
-) -> tuple[Array, Array]:
-    """Cheap valid bounds on :func:`distances`, with the same parameters.
-
-    Above: the straight line in a convex domain. Below: what no passage changes, and the way to the nearest guards.
-    """
-    pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
-    if space.components[pairs.source] != space.components[pairs.target]:
-        pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
-        return pairs.lower, pairs.upper
-    passing = pairs.ways(Budget()).around_guards() if not space.curved_gates else 0.0
-    pairs.lower = np.maximum(pairs.least(), np.minimum(pairs.lower, passing))
-    if not space.domains[pairs.source].convex:
-        pairs.upper = np.full(len(pairs.p), np.inf)
-    return pairs.bounds()[:2]
 
 
 def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None) -> Pairs:
@@ -106,7 +88,7 @@ def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxatio
     for values, mode in ((p, source), (q, target)):
         names = space.domains[mode].coordinates
         if values.shape != (len(p), len(names)):
-            raise ValueError(f"mode {space.modes[mode]}: rows of {', '.join(names)} are wanted, not {values.shape}")
+            raise ValueError(f"mode {space.modes[mode]}: expected rows of {', '.join(names)}, got shape {values.shape}")
     return Pairs.of(space, source, p, target, q, relaxation)
 
 
