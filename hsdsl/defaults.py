@@ -1,4 +1,4 @@
-"""What an experiment is where nobody says anything."""
+"""Defaults of an experiment."""
 
 from __future__ import annotations
 

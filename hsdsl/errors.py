@@ -58,11 +58,11 @@ class Diagnostic:
 
 
 class ModelError(Exception):
-    """The model has errors (exit code 1). Carries every diagnostic found, in source order."""
+    """The model has errors (exit code 1). Carries every diagnostic, in source order."""
 
     def __init__(self, diagnostics: list[Diagnostic] | tuple[Diagnostic, ...]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__(self.diagnostics)  # what it is made from again, in another process
+        super().__init__(self.diagnostics)  # its arguments when it is unpickled in another process
 
     def __str__(self) -> str:
         return "\n".join(f"{d}" + (f" ({d.hint})" if d.hint else "") for d in self.diagnostics)
@@ -101,7 +101,7 @@ class Findings:
             self.raise_if_any()
 
     def raise_if_any(self) -> None:
-        """Raise everything found so far, in source order, other files last.
+        """Raise all diagnostics so far, in source order, other files last.
 
         Raises
         ------

@@ -122,7 +122,7 @@ class Jacobian:
 
 @dataclass(frozen=True)
 class ModeProgram:
-    """A mode: what is known of it without numbers, and its routines.
+    """A mode: its data without numbers, and its routines.
 
     Surfaces are numbered edges first (file order), then walls. With n states, m surfaces and k outputs the routines,
     called as ``name(t, x0, ..., x{n-1})``, are

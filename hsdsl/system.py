@@ -123,7 +123,7 @@ class Initial:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What the file asks of a run; None where it says nothing. Numbers are expressions of parameters.
+    """The options of the file; None for one that it does not give. Numbers are expressions of parameters.
 
     ``samples`` is an expression (how many equally spaced samples) or a tuple of expressions (their times).
     ``scale`` has the states with a given size, each with its expression.

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Documents to mathematics: names resolved, everything substituted, every error found."""
+"""Documents to mathematics: names resolved, everything substituted, every error reported."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
     Raises
     ------
     ModelError
-        The model has errors; all that were found are carried, in source order.
+        The model has errors; all of them are carried, in source order.
     UsageError
         The file cannot be read.
     """
@@ -65,7 +65,7 @@ def elaborate_files(files: ModelFiles) -> Elaboration:
     Raises
     ------
     ModelError
-        The model has errors; all that were found are carried, in source order.
+        The model has errors; all of them are carried, in source order.
     """
     with limits.applied(files.limits):
         findings = Findings(files.path)

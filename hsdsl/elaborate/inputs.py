@@ -27,7 +27,7 @@ Samples = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 
 
 def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
-    """The sampled inputs; what the name of every input means goes to ``symbols.values``."""
+    """The sampled inputs; the meaning of every input goes to ``symbols.values``."""
     feedback = "write expressions of states under `let`, or in `flow` itself"
     names, hint = symbols.document.inputs, "combine them under `let`"
     refusals: Meanings = {

@@ -70,7 +70,7 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
 
 
 def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
-    """What each output of the whole model is; None where its expression is broken.
+    """The value of each output of the whole model; None where its expression is broken.
 
     A `let` name that some mode defines means itself, like a state, until the mode is known.
     """

@@ -42,7 +42,7 @@ def all_of(parts: Iterable[T | None]) -> list[T] | None:
 
 @dataclass
 class ExpressionResolver:
-    """Reads expressions; what is wrong with them goes to ``findings``, and the answer is then None.
+    """Resolver of expressions: their faults go to ``findings``, and the answer is then None.
 
     ``box`` bounds the time that each of them takes, and ``at`` is the one that was begun last.
     """
@@ -76,7 +76,7 @@ class ExpressionResolver:
     def _built(
         self, scalar: Scalar, scope: Scope, expected: Expected, build: Callable[[Tree], T], key: str = ""
     ) -> T | None:
-        """What is built of an expression; None where it has faults, which are reported."""
+        """An object built of an expression; None where it has faults, which are reported."""
         try:
             tree = self._resolved(scalar, scope, expected, key)
             return build(tree) if tree else None

@@ -53,7 +53,7 @@ def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
 
 
 def _apart(tree: Tree, key: str, text: str) -> str:
-    """What to write instead of several inequalities in one."""
+    """The hint for several inequalities in one."""
     if key != "when":
         return "write each inequality as an item of its own"
     if not (isinstance(tree, Logic) and all(isinstance(operand, Comparison) for operand in tree.operands)):

@@ -207,7 +207,7 @@ class _Parser:
         return ExpressionError("HS104", message, before.start, token.end, _joined(before, token, left, right))
 
     def power_of_function(self) -> bool:
-        """Whether what was just read is ``sin**2``."""
+        """Whether the last tokens are ``sin**2``."""
         function, power = self.tokens[max(0, self.at - 3)], self.tokens[max(0, self.at - 2)]
         return function.text in FUNCTIONS and power.text == "**"
 

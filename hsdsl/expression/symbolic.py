@@ -93,7 +93,7 @@ class _Builder:
         raise AssertionError(tree)
 
     def name(self, tree: syntax.Name) -> Value:
-        """A constant, or what the scope has."""
+        """A constant, or a name of the scope."""
         if tree.name in CONSTANTS:
             return Value(CONSTANTS[tree.name], numeric.PI, True)
         value = self.scope.values[tree.name]
@@ -129,7 +129,7 @@ class _Builder:
         return self.value(tree, self.made(tree, sp.Mul, *factors), number, values)
 
     def power(self, tree: syntax.Power) -> Value:
-        """A power; what it would make SymPy compute is measured first."""
+        """A power; the work that it gives SymPy is measured first."""
         base, exponent = self.number(tree.base), self.number(tree.exponent)
         if bounds.large_exponent(exponent.expr):
             text = self.text_of(tree.exponent)
@@ -273,7 +273,7 @@ def _bits_within(tree: Tree, parts: list[Value]) -> int:
 
 
 def _not_real(expr: Any) -> bool:
-    """Whether SymPy has found infinity, or that there is no real value."""
+    """Whether an expression is infinite for SymPy, or not real."""
     parts = expr.args if expr.is_Mul or expr.is_Add else (expr,)
     return any(p in _NOT_REAL or (p.is_Pow and _root_of_negative(*p.args)) for p in (expr, *parts))
 

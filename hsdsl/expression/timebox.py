@@ -25,7 +25,7 @@ class OutOfTime(BaseException):
 
 
 class Box:
-    """What is left of the time: for the whole, and for the part that was begun last."""
+    """The remaining time: for the whole, and for the part that was begun last."""
 
     def __init__(self, seconds: float, parts: int) -> None:
         self._part = seconds / parts

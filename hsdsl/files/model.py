@@ -64,7 +64,7 @@ def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
 
 
 def is_piped(path: str | os.PathLike[str]) -> bool:
-    """Whether what is read there can be read once only."""
+    """Whether the content there can be read once only."""
     return os.fspath(path) in STANDARD_INPUT or Path(path).is_fifo()
 
 

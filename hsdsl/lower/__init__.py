@@ -153,7 +153,7 @@ class _Mode:
         return tuple(replaced(sp.sympify(e), self._mapping, self._done) for e in expressions)
 
     def program(self, indices: dict[str, int]) -> lowered.ModeProgram:
-        """The mode's routines, and what a loop must know about it."""
+        """The mode's routines, and its data for a loop."""
         mode, data = self.mode, self.names.data
         texts, expressions = zip(*_labelled(mode), strict=True) if mode.states or mode.surfaces else ((), ())
         return lowered.ModeProgram(

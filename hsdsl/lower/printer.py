@@ -38,7 +38,7 @@ def constant_name(value: Fraction) -> str:
 
 
 class KernelPrinter(PythonCodePrinter):
-    """Prints what a kernel computes; refuses what no kernel has."""
+    """Printer of the operations of a kernel; it refuses all others."""
 
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})

@@ -53,7 +53,7 @@ def _body(results: tuple, statements: tuple[Statement, ...]) -> str:
 
 
 def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:
-    """Cut down statements and results, and take out what is common to them."""
+    """Cut down statements and results, and take out their common parts."""
     cut = Cut("v", powers=True)
     given = [(symbol, cut.down(expr)) for symbol, expr in statements]
     small = [cut.down(expr) for expr in map(sp.sympify, results)]

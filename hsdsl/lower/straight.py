@@ -59,7 +59,7 @@ class Cut:
         return symbol
 
     def down(self, expr: sp.Basic) -> sp.Basic:
-        """Return the same expression with names for what is too large to be written out."""
+        """Return the same expression with names for parts that are too large to be written out."""
         return self._cut(expr)[0]
 
     def _cut(self, expr: sp.Basic) -> tuple[sp.Basic, int]:
@@ -87,7 +87,7 @@ class Cut:
         return rebuilt(expr, args), 1 + sum(size for _, size in parts)
 
     def _narrow(self, operation: type, parts: list[tuple[sp.Basic, int]]) -> list[tuple[sp.Basic, int]]:
-        """Name the first operands together, as often as what is left is too wide or too large."""
+        """Name the first operands together, as long as the rest is too wide or too large."""
         while len(parts) > WIDEST or (len(parts) > 2 and sum(size for _, size in parts) > LARGEST):
             sizes = accumulate(size for _, size in parts[:WIDEST])
             fit = max(2, sum(size < LARGEST for size in sizes))

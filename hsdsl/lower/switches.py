@@ -120,7 +120,7 @@ def _edge(edge: Edge, out_of: Callable[[Any], Any]) -> Edge:
 
 
 def switch_programs(switches: Switches) -> tuple[Switch, ...]:
-    """What a simulator knows of the switches without numbers."""
+    """The switches without numbers, for a simulator."""
     return tuple(Switch(kind, switch in switches.jumping) for (kind, _), switch in switches.arguments.items())
 
 

@@ -99,8 +99,8 @@ def distance_of_runs(
     watch : callable, optional
         Called now and then with the bounds so far, for those three.
 
-    Raises UsageError: runs of different models, no time in common, an unknown metric, or a model that cannot be found
-    or was edited since.
+    Raises UsageError: runs of different models, no time in common, an unknown metric, or a model that is missing or was
+    edited since.
     """
     check_hops(hops)
     source = _RunSpace(run, other, model, parameters, budget_of(seconds, watch), hops)

@@ -64,7 +64,7 @@ class Rows:
         self.written = self.steps = 0
 
     def take(self, chunk: dict[str, Array], at_end: bool = False) -> Samples | None:
-        """Write what is due of a chunk; at the end of the run returns its last row."""
+        """Write the due rows of a chunk; at the end of the run returns its last row."""
         rows = self._rows(chunk)
         if self._held is not None:
             rows = {name: np.concatenate([self._held[name], column]) for name, column in rows.items()}

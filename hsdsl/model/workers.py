@@ -25,7 +25,7 @@ def run_compiled(
     threads: int,
     progress: Progress | None,
 ) -> None:
-    """Run all instances on so many threads; at Ctrl-C what is done is kept."""
+    """Run all instances on so many threads; at Ctrl-C finished ones are kept."""
     ensemble, count = CompiledEnsemble(plan, instances, kept, names), len(instances.settings)
     firsts, failed = iter(range(0, count, SLICE)), list[BaseException]()
 

@@ -193,7 +193,7 @@ class ReferenceStateDocument(Document):
 
 
 class ReferenceDocument(Document):
-    """What is known exactly of a run. Numbers are expressions of parameters."""
+    """Exact knowledge of a run. Numbers are expressions of parameters."""
 
     settings: OpenTable[Expression] = mapping(
         "What differs from the file, as for `--set`: `initial.w: -0.4`.", {"initial.w": "-0.4"}, alias="set"
@@ -238,7 +238,7 @@ class ModelDocument(Document):
     )
     experiment: ExperimentDocument = required("How to run the model by default.", {"until": 12})
     reference: Annotated[list[ReferenceDocument], BeforeValidator(_one_or_many)] = items(
-        "What is known exactly: one mapping, or a list of them.", {"trust": "1e-12", "transitions": ["1.428"]}
+        "Exact knowledge: one mapping, or a list of them.", {"trust": "1e-12", "transitions": ["1.428"]}
     )
 
 

@@ -13,7 +13,7 @@ _MOST_PIECES = 100  # of one expression
 
 
 def rejoined_items(items: list[Node], findings: Findings) -> list[Node]:
-    """The items of a list in brackets, with what a comma inside parentheses cut apart in one piece."""
+    """The items of a list in brackets, with parts that a comma inside parentheses cut apart joined."""
     joined: list[Node] = []
     at = 0
     while at < len(items):
@@ -24,7 +24,7 @@ def rejoined_items(items: list[Node], findings: Findings) -> list[Node]:
 
 
 def rejoined_entries(entries: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
-    """The entries of a mapping in braces, with what a comma inside parentheses cut apart in one piece."""
+    """The entries of a mapping in braces, with parts that a comma inside parentheses cut apart joined."""
     joined: list[tuple[Node, Node]] = []
     at = 0
     while at < len(entries):
