@@ -40,7 +40,6 @@ class Scene:
 
     name: str
     model: Model
-    parameters: Mapping[str, Any]
     initial: Mapping[str, Any]
     exact: Execution
     states: tuple[str, ...]
@@ -60,8 +59,6 @@ class Scene:
         clearance: float = 1e-4,
         digits: int = DIGITS,
         exact: Execution | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        initial: Mapping[str, Any] | None = None,
     ) -> Scene:
         """Make the scene of a model with `hsdsl.exact.reference`, or `hsdsl.exact.precise` where there is none.
 
@@ -78,7 +75,7 @@ class Scene:
         digits : int
             Of a refined reference, 4 to 14; errors below its last digit mean nothing.
         exact : Execution, optional
-            Replaces the reference; ``parameters`` and ``initial`` are its overrides.
+            Replaces the reference.
 
         Raises
         ------
@@ -87,6 +84,7 @@ class Scene:
         """
         if samples < 2:
             raise UsageError(f"a chart takes at least 2 samples, not {samples}")
+        initial: dict[str, float] = {}
         if exact is None:
             exact, initial = _exact(model, block, digits)
         for name in states:
@@ -101,8 +99,7 @@ class Scene:
         return Scene(
             Path(model.program.path).stem + (f"-{block}" if block else ""),
             model,
-            dict(parameters or {}),
-            dict(initial or {}),
+            initial,
             exact,
             chosen,
             grid,
@@ -140,7 +137,7 @@ def _countable(exact: Execution, jumps: Array, nearly_end: float) -> tuple[float
     return int(np.count_nonzero(jumps <= nearly_end)), len(jumps)
 
 
-def _exact(model: Model, block: int, digits: int) -> tuple[Execution, dict[str, Any]]:
+def _exact(model: Model, block: int, digits: int) -> tuple[Execution, dict[str, float]]:
     try:
         exact = reference(model, block)
     except UsageError:
