@@ -11,7 +11,7 @@ import references.digital_control as exact
 
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import rho
-from hsdsl.metrics.points import Place
+from hsdsl.metrics.points import SpacePoint
 from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.space import make_space
 from hsdsl.model import Model
@@ -73,7 +73,7 @@ def measured(
             found |= {metric: distance(runs[a], runs[b], metric, model=model) for metric in RIVALS}
         for metric, d in found.items():
             rows.append((kind, float(delta), f"{a} {b}", metric, d.lower, d.upper, d.time))
-    ends = [Place(run.final.mode, tuple(run.final.state.values())) for run in (runs["y"], runs["z"])]
+    ends = [SpacePoint(run.final.mode, tuple(run.final.state.values())) for run in (runs["y"], runs["z"])]
     point = model.distance(*ends).interval
     rows.append((kind, float(delta), "y(2) z(2)", "quotient", point.lower, point.upper, 2.0))
     return rows

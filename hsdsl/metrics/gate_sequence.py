@@ -19,7 +19,7 @@ from hsdsl.metrics.rounding import UNIT, norm
 
 
 @dataclass(eq=False)
-class Shape:
+class ConeShape:
     """What problems share: minimise the sum of ``|matrices[i] @ s + offsets[i]|`` over unit ``normals @ s <= levels``.
 
     ``inner`` is a point at which every inequality holds with some ``room``, if one is known, and ``gates`` are those
@@ -89,10 +89,10 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class ConeProblem:
     """B problems of one shape: offsets (B, n_i), and the size (B,) of the numbers that they are made of."""
 
-    shape: Shape
+    shape: ConeShape
     offsets: list[Array]
     numbers: Array
 
@@ -124,7 +124,7 @@ class GateSequence:
         between = list(zip(self.leaves, self.enters[1:], strict=False))
         self.inner_legs = [(into[1] - out[1], into[0] - out[0]) for out, into in between]
         self.numbers = sum(float(np.linalg.norm(base)) for side in between for base, _ in side)
-        self.shapes: dict[tuple[bool, bool, bool], Shape] = {}
+        self.shapes: dict[tuple[bool, bool, bool], ConeShape] = {}
 
     def _wide(self, side: tuple[Array, Array], where: slice) -> tuple[Array, Array]:
         base, frame = side
@@ -132,7 +132,7 @@ class GateSequence:
         wide[:, where] = frame
         return base, wide
 
-    def problem(self, p: Array | None, q: Array | None, kept: bool = False) -> Problem:
+    def problem(self, p: Array | None, q: Array | None, kept: bool = False) -> ConeProblem:
         """The problems between pairs, rows of p and q; without a first or last leg where they are None.
 
         With ``kept`` the last leg measures only the coordinates that no passage changes, to a q in any mode given by
@@ -150,16 +150,16 @@ class GateSequence:
             base = self._last(kept)[0]
             offsets.append(base - q)
             numbers += float(np.linalg.norm(base)) + norm(q)
-        return Problem(self.shape(p is not None, q is not None, kept), offsets, numbers)
+        return ConeProblem(self.shape(p is not None, q is not None, kept), offsets, numbers)
 
-    def shape(self, first: bool, last: bool, kept: bool = False) -> Shape:
+    def shape(self, first: bool, last: bool, kept: bool = False) -> ConeShape:
         """What problems with or without a first and a last leg share."""
         found = self.shapes.get((first, last, kept))
         if found is None:
             legs = [self.enters[0][1]] * first + [matrix for matrix, _ in self.inner_legs]
             legs += [self._last(kept)[1]] * last
             gates = tuple(p.gate for p in self.passages)
-            found = Shape(tuple(legs), self.normals, self.levels, self.inner, self.room, gates)
+            found = ConeShape(tuple(legs), self.normals, self.levels, self.inner, self.room, gates)
             self.shapes[first, last, kept] = found
         return found
 

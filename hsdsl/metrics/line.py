@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.gate_sequence import Shape
+from hsdsl.metrics.gate_sequence import ConeShape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.rounding import UNIT, charge, lengths
 
 ITERATIONS = 100
 
 
-def on_line(shape: Shape, offsets: list[Array], numbers: Array) -> tuple[Array, Array, Array]:
+def on_line(shape: ConeShape, offsets: list[Array], numbers: Array) -> tuple[Array, Array, Array]:
     """Minimise a shape's problems of at most one unknown, both ends charged with rounding; s is (N, 0) or (N, 1).
 
     Rounding moves the interval's ends by less than the legs are charged for.

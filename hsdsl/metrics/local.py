@@ -18,7 +18,7 @@ import numpy as np
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
-from hsdsl.metrics.search import End, Found
+from hsdsl.metrics.search import End, SearchResult
 from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.socp import one_thread
 
@@ -47,9 +47,9 @@ def search_locally(
     limit: float,
     enough: float,
     budget: Budget,
-) -> Found:
+) -> SearchResult:
     """The best path found between any of ``starts`` and ``ends``; stops where it is as short as ``enough``."""
-    found = Found(upper=limit, lower=0.0)
+    found = SearchResult(upper=limit, lower=0.0)
     with one_thread():
         for start in starts:
             for end in ends:
@@ -63,7 +63,7 @@ def search_locally(
 
 def improve(route: Route, guess: Array, relaxation: float, budget: Budget) -> tuple[float, Route, Array] | None:
     """The shortest path near a guess through a given sequence: length with tolls, route, unknowns."""
-    found = Found()
+    found = SearchResult()
     with one_thread():
         _try_from(route, guess, relaxation * route.passages, found, budget)
     return None if found.upper == np.inf else (found.upper, found.through, found.unknowns)
@@ -88,7 +88,7 @@ def _back(sequence: tuple[Crossing, ...], following: Crossing) -> bool:
     return bool(sequence) and sequence[-1].surface is following.surface and sequence[-1].forward != following.forward
 
 
-def _try(route: Route, toll: float, found: Found, budget: Budget) -> None:
+def _try(route: Route, toll: float, found: SearchResult, budget: Budget) -> None:
     p, q = route.start[1], route.end[1]
     if not route.sequence:
         verdict = int(segments_inside(route.space, route.start[0], p[None], q[None])[0])
@@ -100,7 +100,7 @@ def _try(route: Route, toll: float, found: Found, budget: Budget) -> None:
         _try_from(route, guess, toll, found, budget)
 
 
-def _try_from(route: Route, guess: Array, toll: float, found: Found, budget: Budget, bends: int = BENDS) -> None:
+def _try_from(route: Route, guess: Array, toll: float, found: SearchResult, budget: Budget, bends: int = BENDS) -> None:
     """Solve from a guess; where straight pieces leave their domains, let them bend and solve again."""
     size = FAR * (route.size(guess) or np.inf)
     for margin in MARGINS:
@@ -145,7 +145,7 @@ def _with_middles(route: Route, s: Array, legs: Sequence[int]) -> Array:
     return np.concatenate(parts)
 
 
-def _keep(found: Found, value: float, route: Route, s: Array, verdict: int) -> None:
+def _keep(found: SearchResult, value: float, route: Route, s: Array, verdict: int) -> None:
     if value < found.upper:
         found.upper, found.unknowns, found.through, found.proved = value, s, route, verdict == CERTAIN
 

@@ -32,7 +32,7 @@ Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownPath:
     """A path that was found: its ends as one vector, the route, and its guard points."""
 
     at: Array
@@ -53,7 +53,7 @@ class Neighbours:
     relaxation: float | None
     budget: Budget
     hops: int | None = None
-    known: dict[tuple[int, int], list[Known]] = field(default_factory=dict[tuple[int, int], list[Known]])
+    known: dict[tuple[int, int], list[KnownPath]] = field(default_factory=dict[tuple[int, int], list[KnownPath]])
 
     def bound(self, pairs: Pairs, enough: float) -> None:
         """Bound the distances of pairs; those at most ``enough`` are not looked at more closely."""
@@ -80,10 +80,10 @@ class Neighbours:
 class _Batch:
     """One call's pairs: which are done, and the best guess for each that is not."""
 
-    def __init__(self, owner: Neighbours, pairs: Pairs, pool: list[Known]) -> None:
+    def __init__(self, owner: Neighbours, pairs: Pairs, pool: list[KnownPath]) -> None:
         self.owner, self.pairs, self.pool = owner, pairs, pool
         self.done, self.shortened = np.zeros((2, len(pairs.p)), dtype=bool)
-        self.guess: dict[int, Known] = {}
+        self.guess: dict[int, KnownPath] = {}
         self.at = np.hstack([pairs.p, pairs.q])
         self._quick()
 
@@ -119,7 +119,7 @@ class _Batch:
 
     def carry(self, chosen: Indices) -> None:
         """Give pairs upper bounds by the paths of known pairs nearby."""
-        by_route: dict[tuple[tuple[str | None, bool], ...], list[Known]] = {}
+        by_route: dict[tuple[tuple[str | None, bool], ...], list[KnownPath]] = {}
         for known in self.pool:
             by_route.setdefault(known.passed, []).append(known)
         for alike in by_route.values():
@@ -127,7 +127,7 @@ class _Batch:
             moved = [(k, found) for k in chosen.tolist() if (found := self._moved(k, alike, places)) is not None]
             self._judge(moved)
 
-    def _moved(self, k: int, alike: list[Known], places: Array) -> Known | None:
+    def _moved(self, k: int, alike: list[KnownPath], places: Array) -> KnownPath | None:
         apart = np.linalg.norm(places - self.at[k], axis=1)
         nearest: list[int] = np.argsort(apart, kind="stable")[:2].tolist()
         first, others = nearest[0], nearest[1:]
@@ -141,10 +141,10 @@ class _Batch:
             if not np.all(np.isfinite(points)):
                 return None
             if k not in self.guess:
-                self.guess[k] = Known(self.at[k], route, points)
-            return Known(self.at[k], route, points) if route.allowed(points) else None
+                self.guess[k] = KnownPath(self.at[k], route, points)
+            return KnownPath(self.at[k], route, points) if route.allowed(points) else None
 
-    def _judge(self, moved: list[tuple[int, Known]]) -> None:
+    def _judge(self, moved: list[tuple[int, KnownPath]]) -> None:
         """Keep the paths whose straight pieces stay in their domains, where they are shorter."""
         if not moved:
             return
@@ -163,7 +163,7 @@ class _Batch:
         found = None if guess is None else improve(guess.route, guess.points, self.pairs.toll, self.owner.budget)
         if found is not None:
             value, route, points = found
-            known = Known(self.at[k], route, points)
+            known = KnownPath(self.at[k], route, points)
             self.pool.append(known)
             self._shorter(k, value, known)
             self.done[k] = True
@@ -183,12 +183,12 @@ class _Batch:
         pairs.upper[k] = min(pairs.upper[k], found.upper)
         self.done[k] = True
         if found.through is not None and found.through.sequence:
-            self.pool.append(Known(self.at[k], found.through, found.unknowns))
+            self.pool.append(KnownPath(self.at[k], found.through, found.unknowns))
 
     def _route(self, route: Route, k: int) -> Route:
         pairs = self.pairs
         return replace(route, start=(pairs.source, pairs.p[k]), end=(pairs.target, pairs.q[k]))
 
-    def _shorter(self, k: int, value: float, found: Known) -> None:
+    def _shorter(self, k: int, value: float, found: KnownPath) -> None:
         if value < self.pairs.upper[k]:
             self.pairs.upper[k], self.guess[k], self.shortened[k] = value, found, True

@@ -8,7 +8,7 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.guard_clearance import to_passages
 from hsdsl.metrics.local import search_locally
-from hsdsl.metrics.search import End, Found
+from hsdsl.metrics.search import End, SearchResult
 
 CLOSE = 1e-9  # relative: a path so near to the lower end is not improved
 
@@ -20,10 +20,10 @@ def search_nonaffine(
     toll: float,
     hops: int,
     limit: float,
-    outer: Found,
+    outer: SearchResult,
     budget: Budget,
     enough: float = 0.0,
-) -> Found:
+) -> SearchResult:
     """Keep what the affine part bounds from below, and find a path.
 
     The search through polyhedra is a relaxation of every path without a curved guard. Every path with one goes from its

@@ -16,7 +16,7 @@ Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class ModePoints:
     """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
 
     mode: str
@@ -53,7 +53,7 @@ class PointMetric(Protocol):
         """Whether boxes, (n, d) lower and upper corners, are known to lie in a mode's domain, or that to be convex."""
         ...
 
-    def between(self, p: Points, q: Points, enough: float) -> tuple[Array, Array]:
+    def between(self, p: ModePoints, q: ModePoints, enough: float) -> tuple[Array, Array]:
         """Bound the distances of pairs from below and above, each of shape (n,).
 
         Upper bounds of at most ``enough`` need not be improved.
@@ -100,11 +100,11 @@ class OnSpace:
             way += np.abs(side.depth[:, 1] - side.depth[:, 0])
         return way + side.duration if self.metric.timed else way
 
-    def _points(self, side: Side, mode: int, x: Array, times: Array, end: int) -> Points:
+    def _points(self, side: Side, mode: int, x: Array, times: Array, end: int) -> ModePoints:
         name, columns = side.trace.modes[mode]
         edge = side.edge if self.strips else np.full(len(times), "")
         depth = side.depth[:, end] if self.strips else np.zeros(len(times))
-        return Points(name, x[:, list(columns)], times, edge, depth)
+        return ModePoints(name, x[:, list(columns)], times, edge, depth)
 
     def _in_one_domain(self, a: Side, b: Side) -> Array:
         inside = np.zeros(len(a.pieces), dtype=bool)

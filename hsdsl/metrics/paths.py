@@ -10,14 +10,14 @@ from hsdsl.metrics.gate_sequence import gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
 from hsdsl.metrics.routes import Route
-from hsdsl.metrics.search import TOLERANCE, End, Found
+from hsdsl.metrics.search import TOLERANCE, End, SearchResult
 
 ROUNDING = 16 * 2.0**-53  # of a few sums, relative to themselves
 CLOSED = 1e-9  # relative: such a gap counts as none
 
 
 @dataclass(frozen=True)
-class Place:
+class SpacePoint:
     """A point: of a mode's domain or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.
 
     ``x`` are the mode's states in file order; in a strip, the guard point's. ``t`` where time is a coordinate.
@@ -31,7 +31,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Piece:
+class PathPiece:
     """A straight piece of a path in one mode, and the passage after it (``edge``; None at the end and at a bend)."""
 
     mode: str
@@ -46,7 +46,7 @@ class PointDistance:
     """A distance with the path that attains its upper end, and what is certified of it, in words."""
 
     interval: Interval
-    path: tuple[Piece, ...]
+    path: tuple[PathPiece, ...]
     certified: str
 
     @property
@@ -68,7 +68,7 @@ class PointDistance:
         return "\n".join(lines)
 
 
-def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) -> list[End]:
+def ends_of(space: Space, place: SpacePoint, relaxation: float | None, is_end: bool) -> list[End]:
     """The ways a path can end at a place: in its domain, or bound to go on through its strip."""
     mode, x = coordinates(space, place)
     if place.edge is None or relaxation is None:
@@ -82,7 +82,7 @@ def ends_of(space: Space, place: Place, relaxation: float | None, is_end: bool) 
     return [End(mode, x, place.depth), *on]
 
 
-def coordinates(space: Space, place: Place) -> tuple[int, Array]:
+def coordinates(space: Space, place: SpacePoint) -> tuple[int, Array]:
     """A place's mode and coordinates."""
     try:
         mode = space.mode_index(place.mode)
@@ -99,7 +99,7 @@ def coordinates(space: Space, place: Place) -> tuple[int, Array]:
     return mode, np.array(values, dtype=float)
 
 
-def answer(space: Space, found: Found, hops: int) -> PointDistance:
+def answer(space: Space, found: SearchResult, hops: int) -> PointDistance:
     """The answer to a search."""
     lower, upper = min(found.lower, found.cut) * (1 - ROUNDING), found.upper * (1 + ROUNDING)
     if lower == upper == np.inf and not found.local:
@@ -114,14 +114,14 @@ def answer(space: Space, found: Found, hops: int) -> PointDistance:
     return PointDistance(Interval(lower, upper, status), _path(space, found), _sentence(found, status))
 
 
-def _sentence(found: Found, status: str) -> str:
+def _sentence(found: SearchResult, status: str) -> str:
     if found.local:
         return _of_local_solves(found)
     early = ", with a wide gap: the search ended early" if found.ended_early else ""
     return f"certified{early}" if status == CERTIFIED else f"certified {status}{early}"
 
 
-def _of_local_solves(found: Found) -> str:
+def _of_local_solves(found: SearchResult) -> str:
     if found.upper == np.inf:
         return "lower end certified; no path was found, though one may exist"
     unproved = "" if found.proved else "; that it stays in its domains was looked at in points, not proved"
@@ -131,7 +131,7 @@ def _of_local_solves(found: Found) -> str:
     return f"certified{unproved}"
 
 
-def _path(space: Space, found: Found) -> tuple[Piece, ...]:
+def _path(space: Space, found: SearchResult) -> tuple[PathPiece, ...]:
     if found.through is not None:
         route: Route = found.through
         passed = [(c.edge, c.forward) for c in route.sequence]
@@ -140,7 +140,7 @@ def _path(space: Space, found: Found) -> tuple[Piece, ...]:
     if found.start is None or found.end is None:
         return ()
     at, mode = found.start.x, found.start.mode
-    pieces: list[Piece] = []
+    pieces: list[PathPiece] = []
     if found.sequence:
         chain = gate_sequence(space, found.sequence)
         for passage, (enter, leave) in zip(chain.passages, chain.sides(found.unknowns), strict=True):
@@ -149,5 +149,7 @@ def _path(space: Space, found: Found) -> tuple[Piece, ...]:
     return (*pieces, _piece(space, mode, at, found.end.x))
 
 
-def _piece(space: Space, mode: int, start: Array, end: Array, edge: str | None = None, forward: bool = True) -> Piece:
-    return Piece(space.modes[mode], tuple(start.tolist()), tuple(end.tolist()), edge, forward)
+def _piece(
+    space: Space, mode: int, start: Array, end: Array, edge: str | None = None, forward: bool = True
+) -> PathPiece:
+    return PathPiece(space.modes[mode], tuple(start.tolist()), tuple(end.tolist()), edge, forward)

@@ -15,16 +15,16 @@ from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import INFINITE, ZERO
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.nonaffine import search_nonaffine
-from hsdsl.metrics.paths import Piece, Place, PointDistance, answer, coordinates, ends_of
+from hsdsl.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of
 from hsdsl.metrics.search import End, most_hops, search
 
-__all__ = ["Piece", "Place", "PointDistance", "coordinates", "distance", "distances"]
+__all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
 
 
 def distance(
     space: Space,
-    p: Place,
-    q: Place,
+    p: SpacePoint,
+    q: SpacePoint,
     relaxation: float | None = None,
     hops: int | None = None,
     budget: Budget | None = None,
@@ -92,7 +92,7 @@ def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxatio
     return Pairs.of(space, source, p, target, q, relaxation)
 
 
-def _along_strip(p: Place, q: Place, a: End, b: End, relaxation: float | None) -> float:
+def _along_strip(p: SpacePoint, q: SpacePoint, a: End, b: End, relaxation: float | None) -> float:
     """The distance inside one strip (Def. 15), inf where the two are not in one."""
     if relaxation is None or p.edge is None or (p.edge, p.mode) != (q.edge, q.mode):
         return np.inf

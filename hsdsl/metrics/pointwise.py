@@ -13,8 +13,8 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.interval import weakest
 from hsdsl.metrics.neighbours import Neighbours
-from hsdsl.metrics.on_space import Points
-from hsdsl.metrics.points import Place, distance, distances
+from hsdsl.metrics.on_space import ModePoints
+from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.segment_containment import highest
 
 QUICK, SLOW = 50_000, 20_000
@@ -57,7 +57,7 @@ class SpaceMetric:
             inside &= highest(formula, low, high) <= 0
         return inside
 
-    def between(self, p: Points, q: Points, enough: float = 0.0) -> tuple[Array, Array]:
+    def between(self, p: ModePoints, q: ModePoints, enough: float = 0.0) -> tuple[Array, Array]:
         """Bound the distances of pairs from below and above; bounds of at most ``enough`` need not be close."""
         lower, upper = np.zeros(len(p.t)), np.full(len(p.t), np.inf)
         waits = (p.edge != "") | (q.edge != "")
@@ -71,7 +71,7 @@ class SpaceMetric:
             self._statuses.add(found.status)
         return lower, upper
 
-    def _flowing(self, p: Points, q: Points, chosen: Array, enough: float) -> tuple[Array, Array]:
+    def _flowing(self, p: ModePoints, q: ModePoints, chosen: Array, enough: float) -> tuple[Array, Array]:
         x, y = self._coordinates(p, chosen), self._coordinates(q, chosen)
         for points in (p, q):
             self._index(points.mode)
@@ -87,11 +87,11 @@ class SpaceMetric:
         except KeyError:
             raise UsageError(f"the model has no mode '{mode}', which a run is in") from None
 
-    def _coordinates(self, points: Points, chosen: Array) -> Array:
+    def _coordinates(self, points: ModePoints, chosen: Array) -> Array:
         x = points.x[chosen]
         return np.column_stack([x, points.t[chosen]]) if self.timed else x
 
-    def _place(self, points: Points, k: int) -> Place:
+    def _place(self, points: ModePoints, k: int) -> SpacePoint:
         x, edge = tuple(points.x[k].tolist()), str(points.edge[k]) or None
         depth = min(float(points.depth[k]), self.relaxation or 0.0)
-        return Place(points.mode, x, edge, depth, float(points.t[k]) if self.timed else None)
+        return SpacePoint(points.mode, x, edge, depth, float(points.t[k]) if self.timed else None)

@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hsdsl.enclosures import Array
-    from hsdsl.metrics.gate_sequence import Shape
+    from hsdsl.metrics.gate_sequence import ConeShape
 
 UNIT = 2.0**-53
 ROUNDS = 20  # of moving points onto the inequality that is broken most
@@ -26,18 +26,18 @@ def norm(rows: Array) -> Array:
     return np.sqrt(np.einsum("bi,bi->b", rows, rows))
 
 
-def lengths(shape: Shape, offsets: list[Array], s: Array) -> Array:
+def lengths(shape: ConeShape, offsets: list[Array], s: Array) -> Array:
     """The lengths of B paths at unknowns s, shape (B, N), to rounding."""
     legs = zip(shape.matrices, offsets, strict=True)
     return sum((norm(s @ m.T + o) for m, o in legs), np.zeros(len(s)))
 
 
-def charge(shape: Shape, numbers: Array, far: Array) -> Array:
+def charge(shape: ConeShape, numbers: Array, far: Array) -> Array:
     """What the legs' rounding amounts to, for unknowns whose vectors are as long as ``far``."""
     return shape.operations * UNIT * (numbers + shape.spread * far)
 
 
-def brought_inside(shape: Shape, s: Array) -> tuple[Array, Array]:
+def brought_inside(shape: ConeShape, s: Array) -> tuple[Array, Array]:
     """Move points to where all exact inequalities hold, and say which got there.
 
     First onto the inequality that is broken most, again and again; what is left goes towards the inner point.
@@ -65,22 +65,24 @@ def brought_inside(shape: Shape, s: Array) -> tuple[Array, Array]:
     return s, beyond.max(axis=1) <= 0
 
 
-def _beyond(shape: Shape, s: Array) -> Array:
+def _beyond(shape: ConeShape, s: Array) -> Array:
     return s @ shape.normals.T - shape.levels + _margin(shape, s)
 
 
-def _margin(shape: Shape, s: Array) -> Array:
+def _margin(shape: ConeShape, s: Array) -> Array:
     return shape.operations * UNIT * (norm(s)[:, None] + np.abs(shape.levels))
 
 
-def proved_above(shape: Shape, offsets: list[Array], numbers: Array, s: Array, inside: Array) -> Array:
+def proved_above(shape: ConeShape, offsets: list[Array], numbers: Array, s: Array, inside: Array) -> Array:
     """The lengths of paths, charged; infinite for those that are not inside."""
     value = lengths(shape, offsets, s)
     above = value * (1 + shape.operations * UNIT) + charge(shape, numbers, norm(s))
     return np.where(inside, above, np.inf)
 
 
-def proved_below(shape: Shape, offsets: list[Array], numbers: Array, s: Array, vectors: Array, weights: Array) -> Array:
+def proved_below(
+    shape: ConeShape, offsets: list[Array], numbers: Array, s: Array, vectors: Array, weights: Array
+) -> Array:
     """Lower bounds on the minima from proposals for a dual: a unit vector y for each leg, a weight w for each row.
 
     For any unknowns s' of a path no longer than that at s, with the legs u at s and the residual ``r = M'y + C'w``,
@@ -112,7 +114,7 @@ def proved_below(shape: Shape, offsets: list[Array], numbers: Array, s: Array, v
     return np.maximum(0.0, np.minimum(value, longest_path * (1 - shape.operations * UNIT)))
 
 
-def _reach(shape: Shape, numbers: Array, length: Array, far: Array) -> Array:
+def _reach(shape: ConeShape, numbers: Array, length: Array, far: Array) -> Array:
     """How far from s the unknowns of a path can be that is no longer than the one at s."""
     if shape.least > 0:
         return (2 * length + charge(shape, numbers, far)) * (1 + 1e-9) / shape.least

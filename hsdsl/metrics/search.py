@@ -40,7 +40,7 @@ class End:
 
 
 @dataclass
-class Found:
+class SearchResult:
     """What a search knows: the best path, and the least that anything else can have.
 
     ``lower`` is the least of what was looked at or left out as too long, ``cut`` that of paths with more passages than
@@ -68,12 +68,12 @@ def search(
     hops: int,
     limit: float,
     budget: Budget,
-) -> Found:
+) -> SearchResult:
     """Search between any of ``starts`` and any of ``ends``; only paths shorter than ``limit`` matter.
 
-    Each passage costs the relaxation. Paths with more passages than ``hops`` are only bounded, in ``Found.cut``.
+    Each passage costs the relaxation. Paths with more passages than ``hops`` are only bounded, in ``SearchResult.cut``.
     """
-    found = Found(upper=limit, lower=limit)
+    found = SearchResult(upper=limit, lower=limit)
     with one_thread():
         for end in ends:
             for start in starts:
@@ -85,7 +85,7 @@ class _Search:
     """One pair of ends."""
 
     def __init__(
-        self, space: Space, start: End, end: End, relaxation: float, hops: int, found: Found, budget: Budget
+        self, space: Space, start: End, end: End, relaxation: float, hops: int, found: SearchResult, budget: Budget
     ) -> None:
         self.space, self.start, self.end, self.budget = space, start, end, budget
         self.hops, self.found = hops, found

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.gate_sequence import Problem, Shape
+from hsdsl.metrics.gate_sequence import ConeProblem, ConeShape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.line import on_line
 from hsdsl.metrics.rounding import brought_inside, charge, lengths, norm, proved_above, proved_below
@@ -37,7 +37,7 @@ def _controller() -> Any:
     return import_module("threadpoolctl").ThreadpoolController()
 
 
-def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
+def solve(problem: ConeProblem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
     """Minimise B problems of one shape, in at most so many rounds.
 
     Returns lower and upper ends (B,), see :mod:`hsdsl.metrics.rounding`, and where the upper ones are attained, (B, N).
@@ -68,7 +68,7 @@ def solve(problem: Problem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
 
 
 def _proposals(
-    shape: Shape, offsets: list[Array], centers: Array, units: Array, tolerance: float
+    shape: ConeShape, offsets: list[Array], centers: Array, units: Array, tolerance: float
 ) -> tuple[Array, Array, Array]:
     """Solve each problem for ``s = center + unit * sigma``: proposed unknowns, the legs' vectors, and weights."""
     clarabel: Any = import_module("clarabel")  # heavy, so not before it is needed
@@ -96,7 +96,7 @@ def _proposals(
     return s, vectors, weights
 
 
-def _cone(shape: Shape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
+def _cone(shape: ConeShape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:
     """What the solver takes that offsets do not change: a bound for each leg is one more unknown."""
     sparse: Any = import_module("scipy.sparse")
     size, legs = shape.size, len(shape.matrices)

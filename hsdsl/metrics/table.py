@@ -19,7 +19,7 @@ SpaceMaker = Callable[[float | None], PointMetric]  # the model's, relaxed or no
 
 
 @dataclass(frozen=True)
-class Request:
+class CurvePair:
     """Two runs and what else a distance may need; ``space`` is asked for only by those that measure on it."""
 
     a: Execution
@@ -35,14 +35,14 @@ class CurveMetric:
     """One distance between executions."""
 
     summary: str
-    compute: Callable[[Request], CurveDistance]
+    compute: Callable[[CurvePair], CurveDistance]
 
 
-def _quotient(request: Request) -> CurveDistance:
+def _quotient(request: CurvePair) -> CurveDistance:
     return rho(request.a, request.b, request.space(None))
 
 
-def _relaxed(request: Request) -> CurveDistance:
+def _relaxed(request: CurvePair) -> CurveDistance:
     relaxation = request.relaxation
     if relaxation is None:
         relaxation = max(float(run.settings.get("relaxation") or 0.0) for run in (request.a, request.b))
@@ -51,7 +51,7 @@ def _relaxed(request: Request) -> CurveDistance:
     return rho(request.a, request.b, request.space(relaxation), relaxation=relaxation)
 
 
-def _rho(request: Request) -> CurveDistance:
+def _rho(request: CurvePair) -> CurveDistance:
     return _quotient(request) if request.relaxation is None else _relaxed(request)
 
 
@@ -71,7 +71,7 @@ RELAXED = ("rho", "relaxed")
 ON_THE_SPACE = ("rho", "quotient", "relaxed")
 
 
-def between(metric: str, request: Request) -> CurveDistance:
+def between(metric: str, request: CurvePair) -> CurveDistance:
     """Compute a distance between two executions by its name; refuse options that it does not take."""
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))

@@ -18,8 +18,8 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.on_space import PointMetric
-from hsdsl.metrics.points import Place
-from hsdsl.metrics.table import Request, between, check_same_model
+from hsdsl.metrics.points import SpacePoint
+from hsdsl.metrics.table import CurvePair, between, check_same_model
 from hsdsl.model.options import parameters_of
 from hsdsl.simulate.stops import show
 
@@ -38,7 +38,7 @@ def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> In
     first, second : Execution
         Two runs of one model; further arguments as :func:`distance_of_runs` (``metric``, ``relaxation``, ``model``,
         ``parameters``, ``coordinates``).
-    first : Model or path; second, third : str or Place
+    first : Model or path; second, third : str or SpacePoint
         A model and two of its points, as ``"free x=13 v=5"``; further arguments as :meth:`hsdsl.Model.distance`
         (``metric``, ``relaxation``, ``parameters``, ``hops``).
 
@@ -52,7 +52,7 @@ def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> In
     if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
         return distance_of_runs(first, second, **arguments).interval
     model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
-    if isinstance(model, Model) and isinstance(second, (str, Place)) and isinstance(third, (str, Place)):
+    if isinstance(model, Model) and isinstance(second, (str, SpacePoint)) and isinstance(third, (str, SpacePoint)):
         return model.distance(second, third, **arguments).interval
     raise UsageError(
         "distance takes two runs, or a model and two of its points",
@@ -105,7 +105,7 @@ def distance_of_runs(
     check_hops(hops)
     source = _RunSpace(run, other, model, parameters, budget_of(seconds, watch), hops)
     depth = None if relaxation is None else source.depth(relaxation)
-    result = between(metric, Request(run, other, source.space, depth, coordinates, hops))
+    result = between(metric, CurvePair(run, other, source.space, depth, coordinates, hops))
     return replace(result, note="\n".join(filter(None, (result.note, source.note))))
 
 

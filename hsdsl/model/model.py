@@ -21,7 +21,7 @@ from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
 
 if TYPE_CHECKING:
-    from hsdsl.metrics.points import Place, PointDistance
+    from hsdsl.metrics.points import PointDistance, SpacePoint
     from hsdsl.model.estimate import Estimate
     from hsdsl.model.stream import Streamed
     from hsdsl.system import HybridSystem
@@ -282,8 +282,8 @@ class Model:
 
     def distance(
         self,
-        p: str | Place,
-        q: str | Place,
+        p: str | SpacePoint,
+        q: str | SpacePoint,
         *,
         metric: str = "quotient",
         relaxation: Any = None,
@@ -296,7 +296,7 @@ class Model:
 
         Parameters
         ----------
-        p, q : str or Place
+        p, q : str or SpacePoint
             A mode and all its states, as ``"free x=13 v=5"``; values are expressions of parameters.
         metric : {"quotient", "relaxed"}
             The paper's d_M (Def. 12), or that of the relaxed space (Def. 19).

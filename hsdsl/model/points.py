@@ -12,7 +12,7 @@ from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import TOLERANCE, Space
-from hsdsl.metrics.points import Place, PointDistance, coordinates, distance
+from hsdsl.metrics.points import PointDistance, SpacePoint, coordinates, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.metrics.table import CURVE_METRICS
 from hsdsl.model.distances import check_hops
@@ -26,8 +26,8 @@ _ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 def distance_of_points(
     values: Values,
-    p: str | Place,
-    q: str | Place,
+    p: str | SpacePoint,
+    q: str | SpacePoint,
     metric: str,
     relaxation: Any,
     hops: int | None,
@@ -60,7 +60,7 @@ def distance_of_points(
     return result
 
 
-def read_point(values: Values, space: Space, text: str) -> Place:
+def read_point(values: Values, space: Space, text: str) -> SpacePoint:
     """Read ``MODE STATE=VALUE ...``; values are expressions of parameters.
 
     Raises UsageError: it is not of that form, names no mode, or does not give every state once.
@@ -86,7 +86,7 @@ def read_point(values: Values, space: Space, text: str) -> Place:
     if missing := [name for name in names if name not in given]:
         raise UsageError(f"'{text}': no value is given for {', '.join(missing)}", example)
     numbers = [float(values.number(given[name], f"{mode} {name}")) for name in names]
-    return Place(mode, tuple(numbers[:-1]), t=numbers[-1]) if space.timed else Place(mode, tuple(numbers))
+    return SpacePoint(mode, tuple(numbers[:-1]), t=numbers[-1]) if space.timed else SpacePoint(mode, tuple(numbers))
 
 
 def _relaxation(values: Values, given: Any) -> float:
@@ -100,7 +100,7 @@ def _relaxation(values: Values, given: Any) -> float:
     return number
 
 
-def _check_inside(space: Space, *places: Place) -> None:
+def _check_inside(space: Space, *places: SpacePoint) -> None:
     """Refuse points that are in no domain: the distance is between points of the space."""
     points = [coordinates(space, place) for place in places]
     size = max(float(np.linalg.norm(x)) for _, x in points)

@@ -14,7 +14,7 @@ from hsdsl.errors import UsageError
 from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Array, Domain, Gate, Space
 from hsdsl.metrics.line import interval_of
-from hsdsl.metrics.paths import Piece
+from hsdsl.metrics.paths import PathPiece
 from hsdsl.plot.style import ALARM, FAINT, INK, save
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ GRID = 160  # points of a panel's side at which domains and curved guards are ev
 MARGIN = 0.25  # of a path's extent, around it
 
 
-def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece], title: str) -> None:
+def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[PathPiece], title: str) -> None:
     """Draw domains, guards, their images and the pieces of a path.
 
     Raises
@@ -51,7 +51,7 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[Piece
     save(draw, path)
 
 
-def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:
+def _visited(space: Space, pieces: Sequence[PathPiece]) -> list[int]:
     if not pieces:
         raise UsageError("there is no path to draw: either none was found or the points are the same")
     modes = [space.mode_index(name) for name in dict.fromkeys(piece.mode for piece in pieces)]
@@ -63,7 +63,7 @@ def _visited(space: Space, pieces: Sequence[Piece]) -> list[int]:
     return modes
 
 
-def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[Piece]) -> None:
+def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> None:
     domain = space.domains[mode]
     own: Array = np.array([x for piece in pieces if piece.mode == domain.mode for x in (piece.start, piece.end)])
     extent = max(float(np.max(own.max(axis=0) - own.min(axis=0))), 1e-9 * (1 + float(np.abs(own).max())))
@@ -129,7 +129,7 @@ def _curve(axis: Any, x: Array, y: Array, surface: Formula, conditions: Formula 
         axis.contour(x, y, values.reshape(len(y), len(x)), levels=[0], colors=[FAINT], linestyles=[style])
 
 
-def _pieces(axis: Any, mode: str, pieces: Sequence[Piece]) -> None:
+def _pieces(axis: Any, mode: str, pieces: Sequence[PathPiece]) -> None:
     """The straight pieces in one mode, with the numbers of the passages they end at and come from."""
     number = 0
     for k, piece in enumerate(pieces):

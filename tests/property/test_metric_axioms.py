@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.metrics.points import Place, distance
+from hsdsl.metrics.points import SpacePoint, distance
 from hsdsl.metrics.space import make_space
 
 STRETCHES = ("contracting", "isometric", "expanding")
@@ -35,7 +35,7 @@ def random_point(rng, modes):
 
 
 def place(point):
-    return Place(f"m{point[0]}", point[1:])
+    return SpacePoint(f"m{point[0]}", point[1:])
 
 
 @pytest.mark.parametrize("stretch", STRETCHES)
@@ -90,8 +90,8 @@ def test_related_points_are_one_point(drawn, which, share, other, toll):
     glues, space = drawn
     glue = glues[which]
     y = glue.low + share * (glue.high - glue.low)
-    guard = Place(f"m{glue.source}", (REACH, y))
-    image = Place(f"m{glue.target}", (glue.position, glue.factor * y + glue.shift))
+    guard = SpacePoint(f"m{glue.source}", (REACH, y))
+    image = SpacePoint(f"m{glue.target}", (glue.position, glue.factor * y + glue.shift))
     apart = distance(space, guard, image, toll).interval
     assert apart.lower <= (toll or 0.0)
     assert apart.upper <= (toll or 0.0) + 1e-12

@@ -19,7 +19,7 @@ from hsdsl.metrics.labelled_sup import sup_norm
 from hsdsl.metrics.profile import profiles
 from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
-from hsdsl.metrics.table import CURVE_METRICS, Request, between
+from hsdsl.metrics.table import CURVE_METRICS, CurvePair, between
 from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.store import load
 
@@ -231,7 +231,7 @@ RUNS = {
 def test_zero_against_itself_and_against_the_saved_run(run, metric, tmp_path):
     a = RUNS[run]()
     a.save(tmp_path / "run.npz")
-    request = Request(a, load(tmp_path / "run.npz"), lambda depth: Plane())
+    request = CurvePair(a, load(tmp_path / "run.npz"), lambda depth: Plane())
     if metric == "rho-hat" and run == "states that come and go":
         with pytest.raises(UsageError, match="these runs have none"):
             between(metric, request)
@@ -333,13 +333,13 @@ def test_runs_of_different_models_are_refused():
     other = replace(hand_made.jumping_input(), digest="1" * 64)
     for metric in CURVE_METRICS:
         with pytest.raises(UsageError, match="runs are of different models"):
-            between(metric, Request(hand_made.jumping_input(), other, lambda depth: Plane()))
+            between(metric, CurvePair(hand_made.jumping_input(), other, lambda depth: Plane()))
 
 
 def test_an_unknown_metric_is_refused_with_the_nearest():
     run = hand_made.jumping_input()
     with pytest.raises(UsageError, match="no distance 'skorohod' between runs") as caught:
-        between("skorohod", Request(run, run, lambda depth: Plane()))
+        between("skorohod", CurvePair(run, run, lambda depth: Plane()))
     assert caught.value.hint is not None and "skorokhod" in caught.value.hint
 
 
@@ -378,7 +378,7 @@ def test_every_metric_is_documented_and_answers_to_its_name(metric):
     theory = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
     assert f"`{metric}`" in theory
     a, b = ramp((0, 0), (2, 2)), ramp((0, 0), (2, 1))
-    found = between(metric, Request(a, b, lambda depth: Plane()))
+    found = between(metric, CurvePair(a, b, lambda depth: Plane()))
     assert found.metric == metric
     assert found.lower <= 1.0 <= found.upper + 1e-12
 

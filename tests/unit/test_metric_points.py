@@ -9,9 +9,9 @@ import pytest
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.metrics.gate_sequence import Problem, Shape
+from hsdsl.metrics.gate_sequence import ConeProblem, ConeShape
 from hsdsl.metrics.interval import INFINITE, ZERO
-from hsdsl.metrics.points import Place, distance, distances
+from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
 
@@ -49,7 +49,7 @@ AT_THE_STOP = [
 
 @pytest.mark.parametrize(("p", "q", "expected"), AT_THE_STOP)
 def test_oscillator_distances_at_the_stop(oscillator, p, q, expected):
-    found = distance(oscillator, Place("free", p), Place("free", q))
+    found = distance(oscillator, SpacePoint("free", p), SpacePoint("free", q))
     assert expected in found.interval
     assert found.interval.width <= 1e-9 * max(expected, 1e-3)
     assert found.certified == "certified"
@@ -57,13 +57,13 @@ def test_oscillator_distances_at_the_stop(oscillator, p, q, expected):
 
 @pytest.mark.parametrize(("p", "q", "expected"), AT_THE_STOP)
 def test_passages_of_the_relaxed_space_cost_the_relaxation(oscillator, p, q, expected):
-    found = distance(oscillator, Place("free", p), Place("free", q), relaxation=1e-3)
+    found = distance(oscillator, SpacePoint("free", p), SpacePoint("free", q), relaxation=1e-3)
     passages = sum(piece.edge is not None for piece in found.path)
     assert expected + 1e-3 * passages in found.interval
 
 
 def test_path_is_a_path_of_the_length_it_claims(oscillator):
-    found = distance(oscillator, Place("free", (13, 5)), Place("free", (13, -4)))
+    found = distance(oscillator, SpacePoint("free", (13, 5)), SpacePoint("free", (13, -4)))
     first, second = found.path
     assert first.edge == "impact" and first.end[0] == pytest.approx(14)
     assert second.start == pytest.approx((14, -0.9 * first.end[1]))
@@ -76,7 +76,7 @@ def test_digital_control_is_the_plane(quadrants):
     for mode, signs in QUADRANTS.items():
         for other, other_signs in QUADRANTS.items():
             p, q = np.abs(rng.normal(size=2)) * signs, np.abs(rng.normal(size=2)) * other_signs
-            found = distance(quadrants, Place(mode, tuple(p)), Place(other, tuple(q)))
+            found = distance(quadrants, SpacePoint(mode, tuple(p)), SpacePoint(other, tuple(q)))
             assert np.hypot(*(p - q)) in found.interval
             assert found.interval.width < 1e-8
             assert found.certified == "certified"
@@ -84,22 +84,26 @@ def test_digital_control_is_the_plane(quadrants):
 
 @pytest.mark.parametrize("d", [1e-1, 1e-3, 1e-6])
 def test_distances_of_the_digital_control_runs_at_their_end(quadrants, d):
-    y, z = Place("D3", (1 - d, 1 - 0.2 * d)), Place("D3", (1 - 0.3 * d, 1 - d))
+    y, z = SpacePoint("D3", (1 - d, 1 - 0.2 * d)), SpacePoint("D3", (1 - 0.3 * d, 1 - d))
     expected = np.hypot(0.7, 0.8)  # 1.063015 d
     assert distance(quadrants, y, z).interval.middle / d == pytest.approx(expected, rel=1e-6 if d > 1e-6 else 1e-5)
 
 
 def strip(v, depth):
-    return Place("free", (14, v), "impact", depth)
+    return SpacePoint("free", (14, v), "impact", depth)
 
 
 STRIPS = [
     (strip(5, 2e-4), strip(5, 7e-4), 5e-4),  # inside the strip
     (strip(5, 2e-4), strip(6, 7e-4), 0.9 + 11e-4),  # on to the image, where the way is shorter, and back
     (strip(0.001, 2e-4), strip(0.002, 2e-4), 1e-3),  # inside: two more strips' ends would cost more than they save
-    (strip(5, 3e-4), Place("free", (13, 5)), 1 + 3e-4),  # back out
-    (strip(5, 3e-4), Place("free", (14, -4.5)), 7e-4),  # on
-    (strip(5, 3e-4), Place("free", (14, 6)), 0.9 + 7e-4 + 1e-3),  # on, along the image, and back through a whole strip
+    (strip(5, 3e-4), SpacePoint("free", (13, 5)), 1 + 3e-4),  # back out
+    (strip(5, 3e-4), SpacePoint("free", (14, -4.5)), 7e-4),  # on
+    (
+        strip(5, 3e-4),
+        SpacePoint("free", (14, 6)),
+        0.9 + 7e-4 + 1e-3,
+    ),  # on, along the image, and back through a whole strip
 ]
 
 
@@ -111,18 +115,18 @@ def test_points_of_strips(oscillator, p, q, expected):
 
 
 def test_on_the_quotient_a_point_of_a_strip_counts_as_its_guard_point(oscillator):
-    found = distance(oscillator, strip(5, 3e-4), Place("free", (14, -4.5)))
+    found = distance(oscillator, strip(5, 3e-4), SpacePoint("free", (14, -4.5)))
     assert 0.0 in found.interval and found.interval.upper < 1e-12
 
 
 def test_same_point_and_no_path(tmp_path, oscillator):
-    assert distance(oscillator, Place("free", (1, 2)), Place("free", (1, 2))).interval == ZERO
+    assert distance(oscillator, SpacePoint("free", (1, 2)), SpacePoint("free", (1, 2))).interval == ZERO
     model = tmp_path / "m.yaml"
     model.write_text(
         "hsdsl: 1\nmodes:\n  a: {flow: {x: 1}}\n  b: {flow: {x: 1}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n"
     )
     space = make_space(hsdsl.load(model).system, [])
-    assert distance(space, Place("a", (0,)), Place("b", (0,))).interval == INFINITE
+    assert distance(space, SpacePoint("a", (0,)), SpacePoint("b", (0,))).interval == INFINITE
     lower, upper, _ = distances(space, "a", np.zeros((3, 1)), "b", np.zeros((3, 1)))
     assert np.all(lower == np.inf) and np.all(upper == np.inf)
 
@@ -137,7 +141,7 @@ def test_no_path_has_more_passages_than_asked_for(tmp_path):
     )
     space = make_space(hsdsl.load(model).system, [])
     for hops, expected in enumerate((15, 7, 3, 1, 0)):
-        found = distance(space, Place("a", (0, 16)), Place("a", (0, 1)), hops=hops)
+        found = distance(space, SpacePoint("a", (0, 16)), SpacePoint("a", (0, 1)), hops=hops)
         assert found.interval.lower == 0  # whatever the cap: four passages lead there
         assert expected <= found.interval.upper < expected + 1e-9
         assert len(found.path) - 1 == hops
@@ -159,10 +163,10 @@ def test_guard_on_time_makes_time_a_coordinate(tmp_path):
     )
     space = make_space(hsdsl.load(model).system, [])
     assert space.timed
-    found = distance(space, Place("a", (0,), t=1.0), Place("b", (3,), t=5.0))
+    found = distance(space, SpacePoint("a", (0,), t=1.0), SpacePoint("b", (3,), t=5.0))
     assert 5.0 in found.interval and found.interval.width < 1e-9
     with pytest.raises(ValueError, match="time is a coordinate"):
-        distance(space, Place("a", (0,)), Place("b", (3,), t=5.0))
+        distance(space, SpacePoint("a", (0,)), SpacePoint("b", (3,), t=5.0))
 
 
 @pytest.mark.parametrize(
@@ -179,7 +183,7 @@ def test_condition_says_which_part_of_the_surface_is_the_guard(tmp_path, conditi
         "  b: {flow: {x: 1, y: 0}}\ninitial: {mode: a, x: -1, y: 0}\nexperiment: {until: 3}\n"
     )
     space = make_space(hsdsl.load(model).system, [])
-    found = distance(space, Place("a", (-1, 0)), Place("b", (1, 0)))
+    found = distance(space, SpacePoint("a", (-1, 0)), SpacePoint("b", (1, 0)))
     assert expected in found.interval and found.interval.width < 1e-9
 
 
@@ -196,7 +200,9 @@ def test_many_pairs_at_once_are_the_pairs_one_by_one(name, modes, relaxation):
     assert status == "certified"
     assert np.all(upper - lower <= 1e-8 * upper)
     for k in range(len(p)):
-        alone = distance(space, Place(modes[0], tuple(p[k])), Place(modes[1], tuple(q[k])), relaxation).interval
+        alone = distance(
+            space, SpacePoint(modes[0], tuple(p[k])), SpacePoint(modes[1], tuple(q[k])), relaxation
+        ).interval
         assert alone.lower <= upper[k] and lower[k] <= alone.upper
 
 
@@ -210,12 +216,12 @@ def test_problems_solved_together_have_the_minima_of_each(seed):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     inner, room = rng.normal(size=unknowns), 10 ** rng.uniform(-3, 0, size=len(normals))
     levels = normals @ inner + room
-    shape = Shape(tuple(matrices), normals, levels, inner, room)
+    shape = ConeShape(tuple(matrices), normals, levels, inner, room)
     numbers = np.array([sum(np.linalg.norm(o[k]) for o in offsets) for k in range(count)])
-    lower, upper, s = solve(Problem(shape, offsets, numbers))
+    lower, upper, s = solve(ConeProblem(shape, offsets, numbers))
     assert np.all(s @ normals.T <= levels)
     for k in range(count):
-        (below,), (above,), _ = solve(Problem(shape, [o[k : k + 1] for o in offsets], numbers[k : k + 1]))
+        (below,), (above,), _ = solve(ConeProblem(shape, [o[k : k + 1] for o in offsets], numbers[k : k + 1]))
         assert above - below <= 1e-9 * above + 1e-13 * np.abs(np.hstack(offsets)).max()
         assert lower[k] <= above * (1 + 1e-12) and below <= upper[k] * (1 + 1e-12)
         assert upper[k] - lower[k] <= 1e-9 * upper[k] + 1e-13 * np.abs(np.hstack(offsets)).max()
@@ -225,7 +231,7 @@ def test_runner_through_a_curved_guard_in_a_slice():
     # In the slice x = 0, th = w = 0 both legs touch down together, at z = cos(pi/5).
     space = space_of("pronking-runner", 1, 1, 30, 1, 1, 9.81, float(np.pi / 5))
     ahead = 0.5 + np.sin(np.pi / 5)
-    p, q = Place("aerial", (0, 1, 0, 0, -1, 0)), Place("left", (0, 0.85, 0, 0, -1, 0, ahead - 0.1))
+    p, q = SpacePoint("aerial", (0, 1, 0, 0, -1, 0)), SpacePoint("left", (0, 0.85, 0, 0, -1, 0, ahead - 0.1))
     found = distance(space, p, q)
     touchdown = np.cos(np.pi / 5)
     direct = (1 - touchdown) + np.hypot(0.85 - touchdown, 0.1)  # through the guard's point of the slice
@@ -237,15 +243,15 @@ def test_runner_through_a_curved_guard_in_a_slice():
 @pytest.mark.parametrize(
     ("place", "message"),
     [
-        (Place("fre", (1, 2)), "no mode 'fre'"),
-        (Place("free", (1,)), "coordinates x, v"),
-        (Place("free", (14, 2), "impact", 2.0), "depth"),
-        (Place("free", (14, 2), "bounce", 0.0), "no edge 'bounce'"),
+        (SpacePoint("fre", (1, 2)), "no mode 'fre'"),
+        (SpacePoint("free", (1,)), "coordinates x, v"),
+        (SpacePoint("free", (14, 2), "impact", 2.0), "depth"),
+        (SpacePoint("free", (14, 2), "bounce", 0.0), "no edge 'bounce'"),
     ],
 )
 def test_places_that_do_not_fit_are_refused(oscillator, place, message):
     with pytest.raises(ValueError, match=message):
-        distance(oscillator, place, Place("free", (1, 2)), relaxation=1e-3)
+        distance(oscillator, place, SpacePoint("free", (1, 2)), relaxation=1e-3)
 
 
 @pytest.mark.slow
@@ -284,7 +290,7 @@ def test_runner_against_another_optimiser_from_two_hundred_starts(height, shift)
     rng = np.random.default_rng(0)
     starts = rng.normal(size=(200, 5)) * (0.3, 0.3, 0.3, 0.3, 0.5) + (0, 0, -1, 0, 0)
     best = min(minimize(length, start, method="Powell", options={"xtol": 1e-9, "ftol": 1e-12}).fun for start in starts)
-    found = distance(space, Place("aerial", tuple(p)), Place("left", tuple(q)))
+    found = distance(space, SpacePoint("aerial", tuple(p)), SpacePoint("left", tuple(q)))
     assert found.interval.upper <= best * (1 + 1e-6)
     assert found.interval.lower <= best
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 import hsdsl
 from hsdsl.metrics.guard_clearance import to_passages
-from hsdsl.metrics.points import Place, distance
+from hsdsl.metrics.points import SpacePoint, distance
 from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.space import make_space
 from hsdsl.model.distances import distance_of_runs as between_runs
@@ -57,8 +57,8 @@ SLICE += [((0.82, -0.5, -0.1), (0.9, 0.5, -0.4, 0.2))]
 
 def in_slice(p, q):
     foot = 0.5 + np.sin(PSI) - q[3]
-    start = Place("aerial", (0, p[0], 0, p[1], p[2], 0))
-    return start, Place("left", (0, q[0], 0, q[1], q[2], 0, foot)), (*q[:3], foot)
+    start = SpacePoint("aerial", (0, p[0], 0, p[1], p[2], 0))
+    return start, SpacePoint("left", (0, q[0], 0, q[1], q[2], 0, foot)), (*q[:3], foot)
 
 
 @pytest.mark.parametrize(("p", "q"), SLICE)
@@ -131,7 +131,7 @@ def test_straight_pieces_are_judged_as_many_points_say(space):
 
 def test_a_straight_line_far_from_every_guard_is_certified(space):
     p, q = (0, 1.3, 0, 0, -1, 0), (0.05, 1.32, 0.01, 0, -1.05, 0)
-    found = distance(space, Place("aerial", p), Place("aerial", q))
+    found = distance(space, SpacePoint("aerial", p), SpacePoint("aerial", q))
     assert np.linalg.norm(np.subtract(p, q)) in found.interval
     assert found.interval.width < 1e-12
     assert found.certified == "certified"
@@ -142,7 +142,7 @@ def test_a_path_bends_around_a_corner_of_its_domain(space):
     left = [0.8281199055613102, TOUCHDOWN, 0.0, 3.4, -2.3893694922224857, 0.0, 1.9159051578537833]
     th, x = -0.096, 0.8276
     right = [x, np.cos(PSI + th) + 0.5 * np.sin(th), th, 3.36, -2.31, -0.36, 1.7129]
-    found = distance(space, Place("left", tuple(left)), Place("left", tuple(right)))
+    found = distance(space, SpacePoint("left", tuple(left)), SpacePoint("left", tuple(right)))
     straight = float(np.linalg.norm(np.subtract(left, right)))
     assert straight < found.interval.upper < straight * 1.05
     assert len(found.path) >= 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.metrics.points import Place, distance
+from hsdsl.metrics.points import SpacePoint, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.model.distances import distance_of_runs as between_runs
 
@@ -46,7 +46,7 @@ def test_distance_with_time_as_a_coordinate(tmp_path, name):
     text, (mode_p, x_p, t_p), (mode_q, x_q, t_q), expected = CASES[name]
     space = make_space(loaded(tmp_path, text).system, [])
     assert space.timed
-    found = distance(space, Place(mode_p, (x_p,), t=t_p), Place(mode_q, (x_q,), t=t_q)).interval
+    found = distance(space, SpacePoint(mode_p, (x_p,), t=t_p), SpacePoint(mode_q, (x_q,), t=t_q)).interval
     if expected is None:  # by hand: cross at time s, then (1 + s/10, s) to (1.2, 2)
         s = np.linspace(0, 4, 400_001)
         expected = np.min(np.hypot(0.5, s - 2) + np.hypot(s / 10 - 0.2, s - 2))

@@ -12,7 +12,7 @@ from hsdsl.metrics import passage_bounds
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.dominance import followers, hops_of
 from hsdsl.metrics.interval import EndsCross, Interval, weakest
-from hsdsl.metrics.points import Place, distance, distances
+from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
 
@@ -27,7 +27,7 @@ def space_of(tmp_path, text):
 
 
 def measured(space, scene, mode, x, units):
-    return Place(f"m{mode}", tuple(float(v) for v in units.point(scene, mode, x)))
+    return SpacePoint(f"m{mode}", tuple(float(v) for v in units.point(scene, mode, x)))
 
 
 def faults(tmp_path, seeds, pairs, tolls=(None, 0.05)):
@@ -111,7 +111,7 @@ def test_a_point_and_its_image_are_one_in_any_units(tmp_path, name):
         tmp_path,
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    transitions: [{{when: {when}, to: a, reset: {{{reset}}}}}]\n{TAIL}",
     )
-    found = distance(space, Place("a", guard), Place("a", image)).interval
+    found = distance(space, SpacePoint("a", guard), SpacePoint("a", image)).interval
     assert found.lower == 0
     assert found.upper <= 1e-13 * sum(map(abs, (*guard, *image)))
 
@@ -125,7 +125,7 @@ def test_a_domain_and_its_guard_may_be_tiny_or_huge(tmp_path, unit):
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    domain: [x >= -{unit}, y >= -{unit}, y <= {unit}]\n"
         f"    transitions: [{{when: x >= {unit}, to: a, reset: {{x: -{unit}, y: y}}}}]\n{TAIL}",
     )
-    found = distance(space, Place("a", (0.75 * size, 0)), Place("a", (-0.5 * size, 0)))
+    found = distance(space, SpacePoint("a", (0.75 * size, 0)), SpacePoint("a", (-0.5 * size, 0)))
     assert found.status == "certified"
     assert found.interval.lower == pytest.approx(0.75 * size, rel=1e-9)
     assert found.interval.upper == pytest.approx(0.75 * size, rel=1e-9)
@@ -140,7 +140,7 @@ def test_a_guard_is_empty_only_if_it_is(tmp_path):
     )
     for level, connected in (("1 + 1e-12", True), ("1", True), ("1 - 1e-30", False)):
         space = space_of(tmp_path, text.replace("LEVEL", level))
-        found = distance(space, Place("a", (-1, 1)), Place("b", (1, 1))).interval
+        found = distance(space, SpacePoint("a", (-1, 1)), SpacePoint("b", (1, 1))).interval
         assert (2 in found) == connected == (found.upper < 3)
 
 
@@ -159,7 +159,7 @@ def chain_of_modes(tmp_path, modes):
 @pytest.mark.parametrize("modes", [3, 10, 25])
 def test_a_chain_of_modes_is_as_long_as_it_is(tmp_path, modes):
     space = make_space(hsdsl.load(chain_of_modes(tmp_path, modes)).system, [])
-    found = distance(space, Place("m0", (0.5,)), Place(f"m{modes - 1}", (0.25,)))
+    found = distance(space, SpacePoint("m0", (0.5,)), SpacePoint(f"m{modes - 1}", (0.25,)))
     assert found.interval.lower == pytest.approx(modes - 1 - 0.25) == found.interval.upper
     assert found.status == "certified"
 
@@ -233,7 +233,7 @@ def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path
         space = space_of(tmp_path, text_of(scene))
         expected = BruteForce(scene).distance(p, q)
         solved.clear()
-        found = distance(space, *(Place(f"m{m}", tuple(map(float, x))) for m, x in (p, q)), budget=Looks(looks))
+        found = distance(space, *(SpacePoint(f"m{m}", tuple(map(float, x))) for m, x in (p, q)), budget=Looks(looks))
         assert found.interval.lower <= expected * (1 + 1e-9) + 1e-12
         assert len(solved) <= 4 * looks + 4
         if 0 < found.interval.upper < np.inf:
@@ -255,7 +255,7 @@ def test_runs_back_and_forth_through_one_gate_are_bounded_at_once(tmp_path):
     assert list(followers(space, (0, 1))) == [0]
     assert list(followers(space, (0, ~1, 0))) == list(followers(space, (0, 1, 0))) == []
     assert [hops_of(s) for s in ((0,), (0, 1), (0, ~1), (0, ~1, 0))] == [1, 2, 4, 5]
-    found = distance(space, Place("a", (0, -1, -1)), Place("a", (0, 1, 1)))
+    found = distance(space, SpacePoint("a", (0, -1, -1)), SpacePoint("a", (0, 1, 1)))
     assert found.status == "certified"
     assert found.interval.lower == pytest.approx(found.interval.upper)
     assert found.interval.upper == pytest.approx(6 / 5**0.5)  # steepest linear function of both sides
