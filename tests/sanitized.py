@@ -19,8 +19,8 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO
 from hsdsl.model import Model
+from hsdsl.runtime.structures import SCHEMES
 from hsdsl.simulate import output_buffers
-from hsdsl.simulate.compiled import SCHEMES
 
 
 def by_c(model: Model, **arguments: Any) -> bool:

@@ -105,7 +105,7 @@ def _load(path: Path, settings: dict[str, Any]) -> LoadedModel:
     from hsdsl.model import engines, load
 
     text = read_bytes(path)
-    engines.begin(text, *(settings[key] for key in ("engine", "precision", "scheme", "method")))
+    engines.begin(settings["engine"], settings["precision"], settings["scheme"])
     return load(path, text=text)
 
 

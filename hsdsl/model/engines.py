@@ -9,19 +9,17 @@ python   the readable one
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from functools import cache
 
-from hsdsl.defaults import DEFAULTS
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
 from hsdsl.runtime import kernel
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.runtime.structures import SCHEMES
 from hsdsl.simulate import Settings
-from hsdsl.simulate.compiled import SCHEMES
 
 ENGINES = ("auto", "c", "python")
 
@@ -32,17 +30,10 @@ def check(engine: str) -> None:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
 
 
-def begin(model: bytes, engine: str, precision: int | None, scheme: str | None, method: str | None) -> None:
-    """Compile the runtime while a model is read, where a run will need it and no earlier run has compiled it.
-
-    Scheme and method are guessed from the text of the model; after a wrong guess the right runtime is compiled later.
-    """
-    if engine == "python" or precision is not None:
-        return
-    guessed = dict(re.findall(r"\b(scheme|method): *(\w+)", model.decode(errors="replace")))
-    scheme = scheme or guessed.get("scheme", DEFAULTS["scheme"])
-    if scheme in SCHEMES:
-        kernel.begin(scheme, method or guessed.get("method", DEFAULTS["method"]))
+def begin(engine: str, precision: int | None, scheme: str | None) -> None:
+    """Compile the runtime while a model is read, where the run may need it."""
+    if engine != "python" and precision is None and (scheme or SCHEMES[0]) in SCHEMES:
+        kernel.begin()
 
 
 def choose(
@@ -58,7 +49,7 @@ def choose(
     if why is None:
         try:
             compiled = make()
-            kernel.runtime(settings.scheme, settings.method.name if settings.method else "")
+            kernel.runtime()
             return compiled
         except NoCompiler as error:
             why = str(error)
@@ -74,9 +65,6 @@ def _refusal(settings: Settings, precision: int | None) -> str | None:
         return "it computes with float64 only, and a precision is given"
     if settings.scheme not in SCHEMES:
         return f"scheme '{settings.scheme}' has no compiled loop"
-    if not isinstance(settings.method, SCHEMES[settings.scheme]):
-        name = settings.method.name if settings.method else settings.scheme
-        return f"method '{name}' has no compiled loop in scheme '{settings.scheme}'"
     return None
 
 

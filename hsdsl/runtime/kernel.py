@@ -10,6 +10,7 @@ import ctypes
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from contextvars import copy_context
+from functools import cache
 from threading import Lock, Thread
 from typing import Any
 
@@ -32,60 +33,45 @@ SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Dou
 LARGE = 1 << 17  # characters of a program
 SYMBOL = "hs_the_model"
 
-Parts = tuple[bool, bool]  # whether it has the scheme `located`, and the method `radau`
-_loaded: dict[Parts, ctypes.CDLL] = {}
+RUNTIME: tuple[str, str, Effort] = '#include "hs.c"\n', "hs_simulate", "-O1"  # -O2 compiles 1.6 times as long
 _loading = Lock()
 
 
-def runtime(scheme: str | None = None, method: str = "radau") -> ctypes.CDLL:
-    """The hand-written runtime, compiled with what a scheme and a method need; whichever there is where none is named.
-
-    The part of a large scheme or method takes longer to compile than all the rest, and the first run waits for it.
+def runtime() -> ctypes.CDLL:
+    """The hand-written runtime; a run in it leaves the interpreter free.
 
     Raises
     ------
     NoCompiler
         There is no compiler, or it fails.
     """
-    parts = _parts(scheme, method) if scheme else next(iter(_loaded), (True, True))
-    with _loading:  # another thread may be at it: see `begin`
-        if parts not in _loaded:
-            library = load(_text(parts), "hs_simulate", lambda: _text(parts), _effort(parts))
-            library.hs_workspace.restype = ctypes.c_int64
-            library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
-            library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-            library.hs_sample.argtypes, library.hs_sample.restype = (ctypes.c_void_p,), ctypes.c_int64
-            library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
-            _loaded[parts] = library
-    return _loaded[parts]
+    with _loading:  # another thread may compile it: see `begin`
+        return _runtime()
 
 
-def begin(scheme: str, method: str) -> None:
-    """Compile the runtime for a scheme and a method in another thread, where that has not been done."""
+@cache
+def _runtime() -> ctypes.CDLL:
+    text, symbol, effort = RUNTIME
+    library = load(text, symbol, lambda: text, effort)
+    library.hs_workspace.restype = ctypes.c_int64
+    library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
+    library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
+    library.hs_sample.argtypes, library.hs_sample.restype = (ctypes.c_void_p,), ctypes.c_int64
+    library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
+    return library
+
+
+def begin() -> None:
+    """Compile the runtime in another thread, unless an earlier process compiled it."""
 
     def compile_runtime() -> None:
-        with suppress(NoCompiler):  # who needs it will be told
-            runtime(scheme, method)
+        with suppress(NoCompiler):  # the run that needs it reports the failure
+            runtime()
 
     with suppress(NoCompiler):
-        parts = _parts(scheme, method)
-        if not is_kept(_text(parts), _effort(parts)):
+        text, _, effort = RUNTIME
+        if not is_kept(text, effort):
             Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
-
-
-def _parts(scheme: str, method: str) -> Parts:
-    return scheme == "located", method == "radau"
-
-
-def _text(parts: Parts) -> str:
-    located, radau = map(int, parts)
-    return f'#define HS_HAS_LOCATED {located}\n#define HS_HAS_RADAU {radau}\n#include "hs.c"\n'
-
-
-def _effort(parts: Parts) -> Effort:
-    """More effort takes twice as long to compile, for which a first run waits; little but `radau` gets faster by it."""
-    _, radau = parts
-    return "-O2" if radau else "-O1"
 
 
 class CompiledModel:
@@ -110,7 +96,7 @@ class CompiledModel:
     def workspace(self, method: Any, scheme: str) -> int:
         """How many numbers a run needs for itself."""
         number = structures.SCHEMES.index(scheme)
-        return runtime_of(method, scheme).hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
+        return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def mode(self, number: int) -> Any:
         """The ``hs_mode`` of a mode."""
@@ -119,11 +105,6 @@ class CompiledModel:
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made when it is first asked for."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
-
-
-def runtime_of(method: Any, scheme: str) -> ctypes.CDLL:
-    """The runtime that has a method and a scheme; what runs there leaves the interpreter free meanwhile."""
-    return runtime(scheme, structures.METHOD_KINDS[int(method.kind)])
 
 
 def _model_effort(content: str) -> Effort:

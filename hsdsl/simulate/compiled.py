@@ -14,10 +14,9 @@ import numpy as np
 
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
-from hsdsl.integrators import ButcherTableau, RadauMethod, TaylorMethod
 from hsdsl.interrupts import Noted
 from hsdsl.runtime import methods, structures
-from hsdsl.runtime.kernel import CompiledModel, runtime_of
+from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.runtime.sampling import Sampled
 from hsdsl.simulate import stops
 from hsdsl.simulate.columns import Columns, Shape
@@ -30,11 +29,6 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
 from hsdsl.simulate.workspace import Workspace, Workspaces
-
-SCHEMES: dict[str, tuple[type, ...]] = {  # and which methods each one takes
-    "relaxed": (ButcherTableau, TaylorMethod, RadauMethod),
-    "located": (ButcherTableau, TaylorMethod, RadauMethod),
-}
 
 
 class CompiledPlan:
@@ -59,7 +53,7 @@ class CompiledPlan:
         self._interpolation = _interpolations(settings)
         self._columns = _Timeline(problem.timeline)
         self.timeline = self._columns.pointer
-        self.sampled = Sampled(runtime_of(method, scheme), compiled, self.timeline)
+        self.sampled = Sampled(runtime(), compiled, self.timeline)
         self._mode, self._x = problem.mode, np.array(problem.x, np.float64)
         self._start = len(problem.x), self._x.ctypes.data
         self.until, self.memory = settings.until, settings.memory

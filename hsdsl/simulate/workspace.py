@@ -14,7 +14,7 @@ import numpy as np
 
 from hsdsl.execution import Array
 from hsdsl.runtime import structures
-from hsdsl.runtime.kernel import CompiledModel, runtime_of
+from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.simulate.columns import Shape
 from hsdsl.simulate.output_buffers import OutputBuffers, grown
 
@@ -41,7 +41,7 @@ class Workspace:
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
         self.task.stop.scales = self._scales.ctypes.data
         self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
-        self._runtime, self._where = runtime_of(method, scheme), ctypes.addressof(self.task)
+        self._runtime, self._where = runtime(), ctypes.addressof(self.task)
         _desks[self._where] = self
 
     def clear(self, rows: float, memory: int) -> None:

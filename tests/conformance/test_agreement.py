@@ -6,6 +6,7 @@ loop. Where the second differs the printer of C is wrong, where only the third d
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,11 @@ from conformance.test_conformance import CASES, SETTINGS, Run, model, read
 from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
-from hsdsl.integrators import AUTO, METHODS
-from hsdsl.simulate.compiled import SCHEMES
+from hsdsl.integrators import METHODS
+from hsdsl.runtime.structures import SCHEMES
 
 pytestmark = needs_compiler
-COMPILED = [
-    (scheme, name) for scheme, kinds in SCHEMES.items() for name, method in METHODS.items() if isinstance(method, kinds)
-]
+COMPILED = list(product(SCHEMES, METHODS))
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
 FLOATS = {name: setting for name, setting in SETTINGS.items() if "precision" not in setting}
 LONG = ("m4-chattering", "m10-sliding", "zeno-ball")  # tens of thousands of transitions
@@ -41,7 +40,7 @@ def test_every_case_in_every_setting(name: str, scheme: str) -> None:
     for run in map(Run.of, read(CASES[name])["runs"]):
         if scheme in run.scheme:
             for key, setting in FLOATS.items():
-                if (scheme, setting.get("method", AUTO)) not in COMPILED or setting.get("only", scheme) != scheme:
+                if setting.get("only", scheme) != scheme:
                     continue
                 assert_engines_agree(model(name), kernel=key in OVER_BOTH, **arguments(run, setting, scheme))
 

@@ -41,8 +41,6 @@ from engines import COMPILER
 from exact.arithmetic import evaluate
 
 import hsdsl
-from hsdsl.integrators import AUTO, METHODS
-from hsdsl.simulate.compiled import SCHEMES as COMPILED
 
 HERE = Path(__file__).parent
 CASES = {path.name.removesuffix(".expect.yaml"): path for path in sorted((HERE / "cases").glob("*.expect.yaml"))}
@@ -289,8 +287,6 @@ def test_conformance(name: str, run: Run, setting: str, scheme: str, engine: str
                 arguments[whole] = int(arguments[whole])
         if engine == "c" and "precision" in arguments:
             pytest.skip("many digits are the Python engine's")
-        if engine == "c" and not isinstance(METHODS[arguments.get("method", AUTO)], COMPILED[scheme]):
-            pytest.skip("the Python engine's")
         execution = model(name).simulate(**arguments)
         assert_legal(execution)
         comparison = Comparison(run, SETTINGS[setting], execution)

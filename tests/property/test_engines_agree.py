@@ -11,9 +11,8 @@ from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smoo
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.execution import Execution
-from hsdsl.integrators import TaylorMethod
 from hsdsl.model import Model
-from hsdsl.simulate.compiled import SCHEMES
+from hsdsl.runtime.structures import SCHEMES
 
 pytestmark = needs_compiler
 
@@ -36,7 +35,7 @@ def check(seeds: range) -> Counter[str]:
 
 
 def check_smooth(seeds: range) -> Counter[str]:
-    schemes = [scheme for scheme, methods in SCHEMES.items() if TaylorMethod in methods]
+    schemes = list(SCHEMES)
     texts = map(smooth_model, seeds)
     return Counter(run.stop.reason for text in texts for run in runs_of(text, SMOOTH_SETTINGS, schemes))
 

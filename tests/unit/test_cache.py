@@ -174,7 +174,7 @@ def test_a_foreign_library_is_not_loaded(depth, monkeypatch: pytest.MonkeyPatch,
         foreign.write_bytes(b"foreign")
         (folder / library.KIND, foreign.parent, foreign)[depth].chmod(0o777)
     monkeypatch.setattr(library.ctypes, "CDLL", lambda p, load=library.ctypes.CDLL: (loaded.append(p), load(p))[1])
-    monkeypatch.setattr(kernel, "_loaded", {})
+    kernel._runtime.cache_clear()
     CompiledModel(program)
     assert loaded and not any(Path(path).stem == cache._checksum(b"foreign") for path in loaded)
     assert ("can be written by other users" in capsys.readouterr().err) == (depth < 2)
@@ -336,31 +336,23 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
 
 @needs_compiler
 def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[str, str]] = []
-    monkeypatch.setattr(engines.kernel, "begin", lambda *parts: asked.append(parts))
-    for text, scheme, method in (
-        ("experiment: {scheme: located, method: radau}", None, None),
-        ("experiment: {until: 1, method: rk4}", "located", None),
-        ("experiment: {scheme: relaxed, method: rk4}", None, "taylor"),
-        ("experiment: {scheme: nothing}", None, None),
+    begun: list[str | None] = []
+    for engine, precision, scheme in (
+        ("auto", None, None),
+        ("c", None, "relaxed"),
+        ("auto", None, "paoli-schatzman"),
+        ("python", None, "located"),
+        ("auto", 50, "located"),
     ):
-        engines.begin(text.encode(), "auto", None, scheme, method)
-    engines.begin(b"", "python", None, "located", None)
-    engines.begin(b"", "auto", 50, "located", None)
-    assert asked == [("located", "radau"), ("located", "rk4"), ("relaxed", "taylor")]
+        monkeypatch.setattr(engines.kernel, "begin", lambda scheme=scheme: begun.append(scheme))
+        engines.begin(engine, precision, scheme)
+    assert begun == [None, "relaxed"]
 
 
 @needs_compiler
-def test_a_runtime_has_the_parts_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernel, "_loaded", {})
-    kernel.begin("relaxed", "rk4")
-    assert kernel.runtime("relaxed", "rk4") is kernel.runtime() is kernel.runtime("relaxed", "taylor")
-    assert not kernel.is_kept("nothing", "-O1") and kernel.is_kept(kernel._text((False, False)), "-O1")
-
-
-@needs_compiler
-def test_a_run_and_its_samples_load_no_other_runtime(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernel, "_loaded", {})
-    run = hsdsl.load(ROOT / "models" / "bouncing-ball.yaml").simulate(1, scheme="relaxed", method="rk4", step=0.1)
-    run.sample([0.5])
-    assert list(kernel._loaded) == [(False, False)]
+def test_the_runtime_is_compiled_once() -> None:
+    kernel._runtime.cache_clear()
+    text, _, effort = kernel.RUNTIME
+    kernel.begin()
+    assert kernel.runtime() is kernel.runtime()
+    assert not kernel.is_kept("nothing", effort) and kernel.is_kept(text, effort)

@@ -50,13 +50,13 @@ WRONG = {
 @pytest.fixture(autouse=True)
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Nothing is compiled, nothing has been said, and a compiler has a second."""
-    monkeypatch.setattr(kernel, "_loaded", {})
+    kernel._runtime.cache_clear()
     monkeypatch.setattr(process, "PATIENCE", 1.0)
     monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
-    engines._say_once.cache_clear()
+    engines._warn_once.cache_clear()
     library._say_unkept.cache_clear()
 
 
@@ -151,7 +151,7 @@ def test_a_compiler_has_so_much_time(use, capsys) -> None:
 @needs_compiler
 def test_a_compiler_that_fails_for_the_runtime_alone(use, capsys) -> None:
     real = compiler.find_compiler().command[0]
-    use(f'grep -qs HS_HAS "$TMPDIR"/model.c && exit 1\nexec {real} "$@"')
+    use(f'grep -qsF hs.c "$TMPDIR"/model.c && exit 1\nexec {real} "$@"')
     assert_python_runs_with_one_remark("exit code 1", capsys)
 
 

@@ -30,7 +30,7 @@ static double ratio_closer(hs_run *run, double h, double ratio) {
   const int again = run->here.t == control->failed_at;
   control->failed_at = run->here.t;
   if (!control->closer && !again) return ratio;
-  if (HS_HAS_RADAU && run->method->kind == HS_RADAU) {
+  if (run->method->kind == HS_RADAU) {
     radau_scales(run, run->here.t, h, 1);
     ratio = ratio_to(run, h, run->radau.scales);
   } else {

@@ -102,7 +102,7 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, double h, double t
   }
   if (method_piece(run, span->t, h, &span->piece) || curves_along(run)) return HS_NOT_FINITE;
   if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
-  const int blurred = HS_HAS_RADAU && run->method->kind == HS_RADAU && run->control.tolerance > 0;
+  const int blurred = run->method->kind == HS_RADAU && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
 }
 

@@ -6,15 +6,7 @@
 
 #include "run.h"
 
-/* What a caller can do without, to compile in a fraction of the time: the scheme located, the method radau. */
-#ifndef HS_HAS_LOCATED
-#define HS_HAS_LOCATED 1
-#endif
-#ifndef HS_HAS_RADAU
-#define HS_HAS_RADAU 1
-#endif
-
-#if HS_HAS_LOCATED && defined(__GNUC__) && !defined(__clang__)
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a tenth */
 #endif
 
@@ -22,9 +14,12 @@
 
 #include "table.c"
 #include "taylor.c"
-#include "linear.c"
 #include "scales.c"
+#pragma GCC push_options
+#pragma GCC optimize("O2")
+#include "linear.c"
 #include "radau.c"
+#pragma GCC pop_options
 #include "stepper.c"
 
 #include "control.c"
@@ -223,7 +218,7 @@ void hs_simulate(hs_task *task) {
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
-  if (HS_HAS_LOCATED && task->settings.scheme == HS_LOCATED)
+  if (task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else
     relaxed(&run, entered);

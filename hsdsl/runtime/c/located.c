@@ -178,8 +178,9 @@ HS_INLINE void go_to_end(hs_run *run) {
 }
 
 /* Step until a surface is crossed, or to a time in the segment. */
-HS_INLINE int follow(hs_run *run, const int n, double limit) {
+static int follow(hs_run *run, double limit) {
   hs_mode_state *const here = &run->here;
+  const int n = here->dimension;
   run->sloped = run->creeping = run->has_before = run->chatter = 0;
   run->ratio = 1;
   forget_steps(run);
@@ -202,7 +203,7 @@ static int rest(hs_run *run, int k, double until) {
   hs_mode_state *const here = &run->here;
   const double from = here->t;
   run->resting = k;
-  const int outcome = follow(run, here->dimension, until);
+  const int outcome = follow(run, until);
   note(run, HS_AT_REST, k, 0, from, run->task->now);
   if (outcome != AT_BOUNDARY || !(until < run->task->timeline->end[here->segment])) return outcome;
   const int standing_before = here->standing;
@@ -217,11 +218,7 @@ static int located_flow(hs_run *run) {
   const int edge = rests(run);
   double until;
   if (edge >= 0 && release(run, edge, &until)) return rest(run, edge, until);
-  switch (run->here.dimension) {
-    case 1: return follow(run, 1, limit);
-    case 2: return follow(run, 2, limit);
-    default: return follow(run, run->here.dimension, limit);
-  }
+  return follow(run, limit);
 }
 
 /* Whether the transition before this one was made at the same instant. */

@@ -108,7 +108,7 @@ HS_INLINE void guess(hs_run *run, int n, double t, double h) {
 }
 
 /* Solve for the step with the derivatives that there are. */
-HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int closer) {
+HS_INLINE int settle_in(hs_run *run, int n, double t, double h, int exactly, int closer) {
   hs_radau *const radau = &run->radau;
   radau->scales = radau->lifted ? run->resolved : run->scales;
   for (int s = 0; radau->lifted && s < n; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
@@ -118,6 +118,22 @@ HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int cl
   if (status) return status;
   for (int i = 0; i < 3; i++) weighted3(n, run->method->collocation->unmix[i], radau->z, radau->apart[i]);
   return exactly ? to_roundoff(run, n, t, h) : to_tolerance(run, n, t, h);
+}
+
+static int settle_2(hs_run *run, double t, double h, int exactly, int closer) {
+  return settle_in(run, 2, t, h, exactly, closer);
+}
+
+static int settle_3(hs_run *run, double t, double h, int exactly, int closer) {
+  return settle_in(run, 3, t, h, exactly, closer);
+}
+
+static int settle_n(hs_run *run, double t, double h, int exactly, int closer) {
+  return settle_in(run, run->here.dimension, t, h, exactly, closer);
+}
+
+HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int closer) {
+  return (n == 2 ? settle_2 : n == 3 ? settle_3 : settle_n)(run, t, h, exactly, closer);
 }
 
 /* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */

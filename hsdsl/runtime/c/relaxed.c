@@ -94,10 +94,11 @@ static int interrupted(hs_run *run) {
 }
 
 /* Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9). */
-HS_INLINE int flow_in(hs_run *run, const int n) {
+static int flow(hs_run *run) {
   hs_mode_state *here = &run->here;
   hs_control *control = &run->control;
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
+  const int n = here->dimension;
   const double limit = run->task->timeline->end[here->segment];
   run->patience.reached = NAN;
   run->patience.idle = run->patience.creeping = run->chatter = 0;
@@ -156,17 +157,6 @@ HS_INLINE int flow_in(hs_run *run, const int n) {
     run->k[run->method->stages] = run->end;
   }
   return AT_BOUNDARY;
-}
-
-/* The same for any number of states; for a few the compiler is told how many, and needs no loops over them. */
-static int flow(hs_run *run) {
-  switch (run->here.dimension) {
-    case 1: return flow_in(run, 1);
-    case 2: return flow_in(run, 2);
-    case 3: return flow_in(run, 3);
-    case 4: return flow_in(run, 4);
-    default: return flow_in(run, run->here.dimension);
-  }
 }
 
 static int in_strip(hs_run *run, hs_reason reason, double t) {

@@ -4,14 +4,14 @@
 HS_INLINE int step(hs_run *run, int n, double t, double h) {
   switch (run->method->kind) {
     case HS_TAYLOR: return taylor_step(run, t, h);
-    case HS_RADAU: return HS_HAS_RADAU ? radau_step(run, t, h) : NO_VALUE;
+    case HS_RADAU: return radau_step(run, t, h);
     default: return table_step(run, n, t, h);
   }
 }
 
 /* A part of the step just made, from (t, run->x) to run->z: by Radau IIA it is solved to round-off. */
 HS_INLINE int part_of_step(hs_run *run, int n, double t, double h) {
-  return HS_HAS_RADAU && run->method->kind == HS_RADAU ? radau_landing(run, t, h) : step(run, n, t, h);
+  return run->method->kind == HS_RADAU ? radau_landing(run, t, h) : step(run, n, t, h);
 }
 
 /* The method's own interpolant of the step from (t, run->x) to run->z; not 0 where the flow has no value. */
