@@ -11,7 +11,7 @@ from hsdsl.chart.result import Attempt, Refused, Result
 from hsdsl.chart.scene import Scene, sampled
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.integrators import METHODS, ButcherTableau
+from hsdsl.integrators import METHODS
 from hsdsl.simulate import SCHEMES as ALL_SCHEMES
 
 SCHEMES = tuple(name for name in ALL_SCHEMES if name != "paoli-schatzman")
@@ -66,7 +66,7 @@ def _attempt(scene: Scene, options: dict[str, Any], size: str, value: float) -> 
 def relaxation(method: str, value: float) -> float:
     """Return a relaxation whose error is below that of the tolerance or step it goes with."""
     chosen = METHODS[method]
-    order = min(chosen.order, 2) if isinstance(chosen, ButcherTableau) and not chosen.adaptive else 1
+    order = 1 if chosen.adaptive else min(chosen.order, 2)
     return max(LEAST_RELAXATION, 0.01 * value**order)
 
 

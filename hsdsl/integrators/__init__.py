@@ -1,4 +1,8 @@
-"""Integrators: one file a method, most of them tables; METHODS is what models and the command line may name."""
+"""Integrators, most of them tables; METHODS has the names for models and the command line.
+
+A method has the properties `kind`, `implicit`, `is_series`, `adaptive`, `order`, `error_order`, `degree`, `digits`, and
+`for_tolerance`.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +16,11 @@ from hsdsl.integrators.taylor import TaylorMethod
 
 Method = ButcherTableau | TaylorMethod | RadauMethod
 M = TypeVar("M", bound=Method)
+MODULES: dict[str, str] = dict.fromkeys(("euler", "midpoint", "heun", "ralston", "rk4"), "classical")
 
 
 class _Named(Mapping[str, M]):
-    """Methods by name. A table checks itself when it is loaded, so each is loaded when it is first asked for."""
+    """Methods by name. A table checks itself when its module is imported, so that is done at first use."""
 
     def __init__(self, *names: str) -> None:
         self._names = names
@@ -23,7 +28,7 @@ class _Named(Mapping[str, M]):
     def __getitem__(self, name: str) -> M:
         if name not in self._names:
             raise KeyError(name)
-        return getattr(import_module(f"hsdsl.integrators.{name}"), name.upper())
+        return getattr(import_module(f"hsdsl.integrators.{MODULES.get(name, name)}"), name.upper())
 
     def __contains__(self, name: object) -> bool:
         return name in self._names

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from hsdsl.arithmetic import Arithmetic, Number
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,13 @@ class RadauMethod:
     adaptive: bool = True
     digits: int | None = None
     degree: int = 3
+    kind: ClassVar[Literal["radau"]] = "radau"
+    implicit: ClassVar[bool] = True
+    is_series: ClassVar[bool] = False
+
+    def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> RadauMethod:
+        """Return the method for a tolerance: itself."""
+        return self
 
 
 RADAU = RadauMethod()

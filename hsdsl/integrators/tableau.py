@@ -15,7 +15,9 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement
 from math import prod
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
+
+from hsdsl.arithmetic import Arithmetic, Number
 
 Vector = tuple[Fraction, ...]
 Tree = tuple["Tree", ...]  # a rooted tree is the multiset of its root's subtrees
@@ -103,6 +105,14 @@ class ButcherTableau:
                     wanted = Fraction(1, density(tree)) if len(powers) == 1 or m == size else Fraction(0)
                     if not weights.satisfy(row, tree, wanted):
                         raise ValueError(f"{self.name}: {what} fails the order condition of tree {tree}")
+
+    kind: ClassVar[Literal["table"]] = "table"
+    implicit: ClassVar[bool] = False
+    is_series: ClassVar[bool] = False
+
+    def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> ButcherTableau:
+        """Return the method for a tolerance: itself."""
+        return self
 
     @property
     def rows(self) -> tuple[Vector, ...]:

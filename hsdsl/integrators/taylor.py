@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import ClassVar, Literal
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.integrators.scales import root
@@ -35,6 +36,9 @@ class TaylorMethod:
     source: str = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
     adaptive: bool = True
     digits: int | None = None
+    kind: ClassVar[Literal["taylor"]] = "taylor"
+    implicit: ClassVar[bool] = False
+    is_series: ClassVar[bool] = True
 
     @property
     def degree(self) -> int:

@@ -30,7 +30,7 @@ import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Array
-from hsdsl.integrators import AUTO, METHODS, Method, TaylorMethod
+from hsdsl.integrators import AUTO, METHODS, Method
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
@@ -64,8 +64,7 @@ def chosen(
     method, why = METHODS[AUTO], "the step is fixed"
     if settings.tolerance is not None:
         method, why = _adaptive(float(settings.until), program, kernel, timeline, mode, x)
-    if isinstance(method, TaylorMethod):
-        method = method.for_tolerance(settings.tolerance, kernel.arithmetic)
+    method = method.for_tolerance(settings.tolerance, kernel.arithmetic)
     return replace(settings, method=method, method_chosen=f"{method.name}: {why}")
 
 

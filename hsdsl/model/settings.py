@@ -11,7 +11,7 @@ from typing import Any, SupportsIndex
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
-from hsdsl.integrators import AUTO, Method, TaylorMethod
+from hsdsl.integrators import AUTO, Method
 from hsdsl.limits import current
 from hsdsl.model.options import DEFAULT, FILE, SCALE, Options
 from hsdsl.model.values import InstanceTable, Values
@@ -42,9 +42,7 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
             f"a tolerance of {float(tolerance):.3g} is below the precision of {kind}, {float(2 * arithmetic.unit):.2g}",
             "take a larger tolerance, or more digits by --precision",
         )
-    method = options.method
-    if isinstance(method, TaylorMethod):
-        method = method.for_tolerance(tolerance, arithmetic)
+    method = options.method and options.method.for_tolerance(tolerance, arithmetic)
     return Settings(
         scheme=options.scheme,
         method=method,
@@ -102,10 +100,11 @@ def following_digits(settings: Settings, options: Options, arithmetic: Arithmeti
     A method of fixed order would need steps shorter by as many orders of magnitude: with one the tolerance stays.
     """
     left_open = options.size == "tolerance" and options.values["tolerance"].origin == DEFAULT
-    if not left_open or arithmetic.digits is None or not isinstance(settings.method, TaylorMethod):
+    method = settings.method
+    if not left_open or arithmetic.digits is None or method is None or not method.is_series:
         return settings
     tolerance = arithmetic.constant(Fraction(1, 10 ** kept_digits(arithmetic.digits)))
-    return replace(settings, tolerance=tolerance, method=settings.method.for_tolerance(tolerance, arithmetic))
+    return replace(settings, tolerance=tolerance, method=method.for_tolerance(tolerance, arithmetic))
 
 
 def _samples(options: Options, values: Values) -> int | tuple[Number, ...] | None:
@@ -135,7 +134,7 @@ def check_method(method: Method | None, program: Program, arithmetic: Arithmetic
             f"use method '{AUTO}', whose coefficients are exact",
         )
     kinked = next((mode.name for mode in program.modes if mode.tape is None), None)
-    if isinstance(method, TaylorMethod) and kinked is not None:
+    if method is not None and method.is_series and kinked is not None:
         raise UsageError(
             f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max or floor "
             "of a state",

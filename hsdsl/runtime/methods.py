@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.integrators import ButcherTableau, Method, RadauMethod
+from hsdsl.integrators import ButcherTableau, Method
 from hsdsl.runtime import structures
 from hsdsl.runtime.structures import address
 
@@ -27,14 +27,14 @@ def interpolation_table(
 @cache
 def method_table(method: Method) -> Any:
     """Write a method as the runtime takes it."""
-    if isinstance(method, ButcherTableau):
+    if method.kind == "table":
         return _butcher_table(method)
     return structures.Method(
-        kind=structures.METHOD_KINDS.index(method.name),
+        kind=structures.METHOD_KINDS.index(method.kind),
         order=method.error_order,
         interpolant=structures.INTERPOLANTS.index("dense"),
         degree=method.degree,
-        collocation=address(ctypes.pointer(_collocation())) if isinstance(method, RadauMethod) else None,
+        collocation=address(ctypes.pointer(_collocation())) if method.implicit else None,
     )
 
 
@@ -69,7 +69,7 @@ def _butcher_table(table: ButcherTableau) -> Any:
     rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
     dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
     return structures.Method(
-        kind=structures.METHOD_KINDS.index("table"),
+        kind=structures.METHOD_KINDS.index(table.kind),
         stages=stages,
         extra=len(table.extra),
         order=table.order,

@@ -25,7 +25,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.integrators import RadauMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.settings import Settings
 
@@ -157,7 +156,7 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     largest = settings.until * LARGEST_SHARE
     if settings.longest_step is not None:
         largest = min(largest, settings.longest_step)
-    implicit = isinstance(settings.method, RadauMethod)
+    implicit = settings.method is not None and settings.method.implicit
     control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
     return control

@@ -63,10 +63,11 @@ class Stepping(Protocol):
 
 def stepping(run: Run, here: ModeState) -> Stepping:
     """Choose by the method."""
-    if isinstance(run.settings.method, TaylorMethod):
+    method = run.settings.method
+    if method is not None and method.kind == "taylor":
         series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
         assert series is not None
-        return SeriesSteps(run, here, run.settings.method, series, run.stepper(here))
+        return SeriesSteps(run, here, method, series, run.stepper(here))
     return TableSteps(run, here, run.stepper(here))
 
 

@@ -7,7 +7,6 @@ from fractions import Fraction
 from functools import cache
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.integrators import TaylorMethod
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.settings import Settings
 
@@ -25,7 +24,7 @@ def along_steps(settings: Settings) -> tuple[int, Number]:
     """Of which degree surfaces are interpolated along a step, and how far they may be off, relative to their size."""
     tolerance, method = settings.tolerance, settings.method
     share = max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
-    if method is None or isinstance(method, TaylorMethod):
+    if method is None or method.is_series:
         return SERIES_DEGREE, share
     return max(LEAST_DEGREE, method.degree), share
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hsdsl.arithmetic import Arithmetic, Number
-from hsdsl.integrators import ButcherTableau, TaylorMethod
 from hsdsl.simulate.settings import Settings
 
 FINER = 10
@@ -25,7 +24,7 @@ def finer_settings(settings: Settings, longest: Number, arithmetic: Arithmetic) 
     if settings.scheme != "located":
         finer = replace(finer, relaxation=settings.relaxation / FINER)
     if settings.step is not None:
-        first = isinstance(settings.method, ButcherTableau) and settings.method.order == 1
+        first = settings.method is not None and settings.method.order == 1
         return replace(finer, step=settings.step / (4 if first else 2))
     assert settings.tolerance is not None
     smaller = settings.tolerance / FINER
@@ -33,6 +32,5 @@ def finer_settings(settings: Settings, longest: Number, arithmetic: Arithmetic) 
     method = settings.method
     assert method is not None
     longest = longest * float(FINER) ** (-1 / method.order)
-    if isinstance(method, TaylorMethod):
-        method = method.for_tolerance(tolerance, arithmetic)
+    method = method.for_tolerance(tolerance, arithmetic)
     return replace(finer, tolerance=tolerance, method=method, longest_step=longest)

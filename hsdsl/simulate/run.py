@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
-from hsdsl.integrators import ButcherTableau, RadauMethod
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import ModeKernel
@@ -59,10 +58,10 @@ class Run(Problem):
         """The method for the mode that the run is in."""
         method = self.settings.method
         assert method is not None
-        if isinstance(method, ButcherTableau):
+        if method.kind == "table":
             return stepper(method, len(here.x), self.arithmetic)
         mode = self.program.modes.index(here.mode)
-        if isinstance(method, RadauMethod):
+        if method.kind == "radau":
             from hsdsl.integrators.radau import radau_stepper
 
             jacobian = self.kernel.jacobian(mode, here.segment.data)

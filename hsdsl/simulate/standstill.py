@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
-from hsdsl.integrators import RadauMethod, TaylorMethod
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import NoSeries, terms
 from hsdsl.program import ModeProgram
@@ -116,7 +115,7 @@ class Standstill:
         """Whether the method is Taylor's and cannot expand the flow here."""
         method = self.problem.settings.method
         series = self.problem.kernel.taylor(self.mode, self.segment.data)
-        if not isinstance(method, TaylorMethod) or series is None:
+        if method is None or not method.is_series or series is None:
             return False
         try:
             terms(series, method.order, self.t, self.x)
@@ -126,7 +125,8 @@ class Standstill:
 
     def _has_no_jacobian(self) -> bool:
         """Whether the method is implicit and the flow has no derivatives here."""
-        if not isinstance(self.problem.settings.method, RadauMethod):
+        method = self.problem.settings.method
+        if method is None or not method.implicit:
             return False
         try:
             slopes = self.problem.kernel.jacobian(self.mode, self.segment.data)(self.t, *self.x)
