@@ -46,14 +46,8 @@ class Side:
         return self.powers[:, 0] if end == 0 else np.sum(self.powers, axis=1)
 
     def __getitem__(self, chosen: Array) -> Side:
-        return replace(
-            self,
-            pieces=self.pieces[chosen],
-            powers=self.powers[chosen],
-            depth=self.depth[chosen],
-            duration=self.duration[chosen],
-            doubt=self.doubt[chosen],
-        )
+        arrays = (self.pieces, self.powers, self.depth, self.duration, self.doubt)
+        return Side(self.trace, *(array[chosen] for array in arrays))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,20 +68,22 @@ class Cells:
     def __len__(self) -> int:
         return len(self.begin)
 
+    @property
+    def _arrays(self) -> tuple[Array, ...]:
+        return self.piece_a, self.piece_b, self.begin, self.end
+
     def __getitem__(self, chosen: Array | slice) -> Cells:
-        return Cells(self.a, self.b, self.piece_a[chosen], self.piece_b[chosen], self.begin[chosen], self.end[chosen])
+        return Cells(self.a, self.b, *(array[chosen] for array in self._arrays))
+
+    def joined(self, other: Cells) -> Cells:
+        """These cells, then others of the same curves."""
+        pairs = zip(self._arrays, other._arrays, strict=True)
+        return Cells(self.a, self.b, *(np.concatenate(pair) for pair in pairs))
 
     def halved(self) -> Cells:
         """Cut each cell in two, first halves first."""
         middle = self.begin + (self.end - self.begin) / 2
-        return Cells(
-            self.a,
-            self.b,
-            np.concatenate([self.piece_a, self.piece_a]),
-            np.concatenate([self.piece_b, self.piece_b]),
-            np.concatenate([self.begin, middle]),
-            np.concatenate([middle, self.end]),
-        )
+        return replace(self, end=middle).joined(replace(self, begin=middle))
 
     @property
     def divisible(self) -> Array:

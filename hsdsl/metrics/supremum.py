@@ -69,15 +69,7 @@ class _Frontier:
         return _Frontier(self.cells[chosen], self.bound[chosen], self.ends[chosen])
 
     def joined(self, other: _Frontier) -> _Frontier:
-        own, more = self.cells, other.cells
-        cells = Cells(
-            own.a,
-            own.b,
-            np.concatenate([own.piece_a, more.piece_a]),
-            np.concatenate([own.piece_b, more.piece_b]),
-            np.concatenate([own.begin, more.begin]),
-            np.concatenate([own.end, more.end]),
-        )
+        cells = self.cells.joined(other.cells)
         return _Frontier(cells, np.concatenate([self.bound, other.bound]), np.concatenate([self.ends, other.ends]))
 
 
