@@ -13,7 +13,7 @@ piece, where the run may go to another one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,19 +112,27 @@ def passes_by(dynamics: Dynamics, edge: Edge) -> Answer:
     """A point of an edge's surface that the flow goes through where no edge of the mode fires."""
     residual = dynamics.residual(edge.surface)
     alternatives: list[Clause] = [()]
+    same: list[Edge] = []
     elsewhere: list[Any] = []
     for other in dynamics.modes[edge.source].edges:
         if dynamics.residual(other.surface) == residual:
             refused = dynamics.condition(other, holds=False)
             if refused is None:
                 return UNKNOWN
+            same.append(other)
             alternatives = [(*before, *clause) for before in alternatives for clause in refused]
         elif other.condition is not None:
             elsewhere.append(dynamics.residual(other.surface))
-    answer = _passed(dynamics, edge, alternatives, (), elsewhere)
-    if answer.somewhere or not elsewhere:
-        return answer
-    return _passed(dynamics, edge, alternatives, tuple(map(negative, elsewhere)), elsewhere)
+
+    def passes(here: ModePoint) -> bool:
+        return all(here.sign(r) != 0 for r in elsewhere) and not any(map(here.will_hold, same))
+
+    for clauses in ([strict(clause) for clause in alternatives], alternatives):
+        for more in dict.fromkeys(((), tuple(map(negative, elsewhere)))):
+            answer = _passed(dynamics, edge, clauses, more, passes)
+            if answer.somewhere:
+                return answer
+    return UNKNOWN
 
 
 def _passed(
@@ -132,9 +140,9 @@ def _passed(
     edge: Edge,
     conditions: Sequence[Clause] | None,
     more: tuple[Constraint, ...],
-    off: Sequence[Any] = (),
+    accepts: Callable[[ModePoint], bool] = lambda _: True,
 ) -> Answer:
-    """A point of an edge's surface with some conditions, ``off`` other surfaces, through which the flow goes."""
+    """An accepted point of an edge's surface with some conditions, through which the flow goes."""
     mode, residual = dynamics.modes[edge.source], dynamics.residual(edge.surface)
     rate = dynamics.rate(mode, residual)
     domain = dynamics.domain(mode, without=edge)
@@ -145,17 +153,16 @@ def _passed(
         for speed in dict.fromkeys((out, ())):
             clauses = [(zero(residual), *inside, *speed, *clause) for clause in conditions]
             answer = dynamics.ask_any(mode, clauses, *more)
-            if answer.somewhere and _goes_out(ModePoint(dynamics, mode, answer.point), edge, off):
+            if answer.somewhere and _goes_out(ModePoint(dynamics, mode, answer.point), edge, accepts):
                 return answer
     return UNKNOWN
 
 
-def _goes_out(here: ModePoint, edge: Edge, off: Sequence[Any]) -> bool:
+def _goes_out(here: ModePoint, edge: Edge, accepts: Callable[[ModePoint], bool]) -> bool:
     """Whether the flow goes out of the surface of an edge, and into all else that the point lies on."""
     domain = here.dynamics.domain(here.mode, without=edge)
     try:
         inside = all(here.sign(c.expr) < 0 or here.first(c.expr)[1] < 0 for c in domain)
-        clear = all(here.sign(residual) != 0 for residual in off)
-        return inside and clear and here.first(here.dynamics.residual(edge.surface))[1] > 0
+        return inside and accepts(here) and here.first(here.dynamics.residual(edge.surface))[1] > 0
     except Unsure:
         return False

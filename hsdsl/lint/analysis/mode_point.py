@@ -17,6 +17,7 @@ import sympy as sp
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.decide import MOST_PARTS
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
+from hsdsl.lint.analysis.question import Constraint
 from hsdsl.lint.analysis.singularities import breaks
 from hsdsl.lint.analysis.smooth_pieces import SmoothPiece, pieces
 from hsdsl.lint.analysis.straight_line_program import StraightLine, too_large
@@ -144,6 +145,25 @@ class ModePoint:
         if 0 in signs:
             raise Unsure
         return True
+
+    def will_hold(self, edge: Edge) -> bool:
+        """Whether the `if` of an edge holds just after the point, along the flow.
+
+        Raises
+        ------
+        Unsure
+            A kink, a jump or an input decides that.
+        """
+        clauses = self.dynamics.condition(edge)
+        if clauses is None:
+            raise Unsure
+        return any(all(map(self._will_hold, clause)) for clause in clauses)
+
+    def _will_hold(self, constraint: Constraint) -> bool:
+        sign = self.sign(constraint.expr) or self.first(constraint.expr)[1]
+        if constraint.relation == "= 0":
+            return sign == 0
+        return sign < 0 or (sign == 0 and constraint.relation == "<= 0")
 
     def after(self, edge: Edge) -> ModePoint:
         """Where an edge leads to from here."""

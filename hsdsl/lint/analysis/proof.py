@@ -68,5 +68,5 @@ def closed(clause: Iterable[Constraint]) -> Clause:
 
 
 def strict(clause: Iterable[Constraint]) -> Clause:
-    """Inequalities without their ends."""
-    return tuple(replace(c, relation="< 0") if c.relation == "<= 0" else c for c in clause)
+    """Inequalities without their ends, where they are more than numbers."""
+    return tuple(replace(c, relation="< 0") if c.relation == "<= 0" and not c.expr.is_number else c for c in clause)

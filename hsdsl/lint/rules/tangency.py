@@ -29,17 +29,20 @@ def tangency(subject: Subject) -> Iterator[Finding]:
         rate = dynamics.rate(part.mode, residual)
         if rate is None or rate.is_number or alike.again(rate):
             continue
-        answer, how = _touches(dynamics, part.mode, edge)
+        answer = _touches(dynamics, part.mode, edge)
         if answer.somewhere:
-            bend = dynamics.rate(part.mode, rate) if how == _GRAZES else None
-            where = at(dynamics, part.mode, answer, [residual, rate, bend])
+            how, order = _contact(ModePoint(dynamics, part.mode, answer.point), residual)
+            derivatives = [residual]
+            for _ in range(order):
+                derivatives.append(dynamics.rate(part.mode, derivatives[-1]))
+            where = at(dynamics, part.mode, answer, derivatives)
             message = f"the flow meets the guard of '{edge.edge.name}' {where}, where L_f r = 0: {how}"
             alike.add(rate, Finding(edge.document.when.place.span, message, None, answer.decided))
     yield from alike
 
 
-def _touches(dynamics: Dynamics, mode: Mode, edge: EdgePart) -> tuple[Answer, str]:
-    """A point of the guard where the rate vanishes, and what the flow does there."""
+def _touches(dynamics: Dynamics, mode: Mode, edge: EdgePart) -> Answer:
+    """A point of the guard where the rate vanishes; one where runs graze it, if there is."""
     residual = dynamics.residual(edge.edge.surface)
     domain, conditions = dynamics.domain(mode, without=edge.edge), dynamics.condition(edge.edge) or []
     for piece in pieces(residual, dynamics.flow(mode)) or ():
@@ -51,23 +54,22 @@ def _touches(dynamics: Dynamics, mode: Mode, edge: EdgePart) -> tuple[Answer, st
         inside = [(*surface, *strict(domain), *clause) for clause in conditions]
         answer = dynamics.ask_any(mode, inside, negative(bend))
         here = ModePoint(dynamics, mode, answer.point)
-        if answer.somewhere and not here.changes_sign_nearby(bend) and _contact(here, residual) == _GRAZES:
-            return answer, _GRAZES
-    answer = dynamics.ask_any(mode, dynamics.guard(edge.edge), zero(dynamics.rate(mode, residual)))
-    return answer, _contact(ModePoint(dynamics, mode, answer.point), residual) if answer.somewhere else ""
+        if answer.somewhere and not here.changes_sign_nearby(bend) and _contact(here, residual)[0] == _GRAZES:
+            return answer
+    return dynamics.ask_any(mode, dynamics.guard(edge.edge), zero(dynamics.rate(mode, residual)))
 
 
-def _contact(here: ModePoint, residual: Any) -> str:
-    """Say what the flow does at a point of a surface where the first derivative vanishes."""
+def _contact(here: ModePoint, residual: Any) -> tuple[str, int]:
+    """Say what the flow does at a point of a surface where the first derivative vanishes, and which order decides."""
     try:
         order, sign = here.first(residual)
     except Unsure:
-        return "a kink, a jump or an input decides there whether it crosses"
+        return "a kink, a jump or an input decides there whether it crosses", 1
     if not sign:
-        return f"all derivatives of r along the flow vanish there, up to order {order}"
+        return f"all derivatives of r along the flow vanish there, up to order {order}", 1
     if order % 2:
-        return f"it {'goes out' if sign > 0 else 'comes in'} there, with the derivative of order {order} alone"
-    return _GRAZES if sign < 0 else "runs come there only by resting on it, or by starting there"
+        return f"it {'goes out' if sign > 0 else 'comes in'} there, with the derivative of order {order} alone", order
+    return _GRAZES if sign < 0 else "runs come there only by resting on it, or by starting there", order
 
 
 def degenerate_surface(subject: Subject) -> Iterator[Finding]:
