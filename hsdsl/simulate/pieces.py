@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from hsdsl import limits
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.enclosures import Range, as_range
-
-if TYPE_CHECKING:
-    from hsdsl.simulate.switches import Changes, Part
+from hsdsl.errors import UsageError
+from hsdsl.kernel import Kernel, Routine
+from hsdsl.program import Switch
 
 Array = np.ndarray[Any, Any]
 Found = list[tuple[int, Number, Number]]  # the number of the part, and two times in it
@@ -27,11 +27,44 @@ NO_VALUE = 2.0**-10  # of the run: an interval without values at its ends and mi
 STILL = 2.0**-1000  # a slope below this is none
 
 
-def isolated(changes: Changes, parts: Sequence[Part]) -> tuple[Found, Found]:
-    """Intervals on which the argument is monotone and meets a level, and those that nothing is proved of."""
-    from hsdsl.simulate.switches import check
+class Part(Protocol):
+    """A part of the time, and what routines are bound to on it."""
 
-    enclosed, tie = _Enclosed.of(changes, [part.data for part in parts]), float(changes.tie)
+    @property
+    def start(self) -> Number: ...
+    @property
+    def end(self) -> Number: ...
+    @property
+    def data(self) -> tuple[Number, ...]: ...
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What a switch of a program is the floor or the sign of; two changes within ``tie`` are one."""
+
+    kernel: Kernel
+    switch: Switch
+    index: int
+    tie: Number
+
+    def argument(self, part: Part) -> Routine:
+        """The routine of time on a part, with its derivative."""
+        return self.kernel.switching(part.data)[f"argument_{self.index}"]
+
+
+def check(left: float) -> None:
+    """Refuse to look for more changes than the limit allows."""
+    if left < 0:
+        most = limits.current().switches
+        raise UsageError(
+            f"floor, sign, abs, min, max or atan2 of time switches more than {most} times in this run",
+            f"make the run shorter, or allow more with --limit switches={10 * most}",
+        )
+
+
+def isolated(argument: Argument, parts: Sequence[Part]) -> tuple[Found, Found]:
+    """Intervals on which the argument is monotone and meets a level, and those that nothing is proved of."""
+    enclosed, tie = _Enclosed.of(argument, [part.data for part in parts]), float(argument.tie)
     low, high = (np.array([float(getattr(part, name)) for part in parts]) for name in ("start", "end"))
     owner, whole, most = np.arange(len(parts)), float(high[-1]), UNDER_WAY * limits.current().switches
     monotone: Found = []
@@ -46,7 +79,7 @@ def isolated(changes: Changes, parts: Sequence[Part]) -> tuple[Found, Found]:
         check(most - len(low))
         meets, one_way, nothing = enclosed.looked_at(low, high, owner)
         narrow = (high - low <= tie) | ~((low + high) / 2 > low)
-        one_way[one_way] = [all(_has_value(changes, parts[k], t) for t in ends) for k, *ends in given(one_way)]
+        one_way[one_way] = [all(_has_value(argument, parts[k], t) for t in ends) for k, *ends in given(one_way)]
         lost = meets & ~one_way & (narrow | (nothing & (high - low <= NO_VALUE * whole)))
         monotone += given(one_way)
         unsure += given(lost)
@@ -57,9 +90,9 @@ def isolated(changes: Changes, parts: Sequence[Part]) -> tuple[Found, Found]:
     return monotone, list(_joined(unsure))
 
 
-def decided(changes: Changes, places: Sequence[tuple[Part, Number]]) -> list[bool]:
+def decided(argument: Argument, places: Sequence[tuple[Part, Number]]) -> list[bool]:
     """Whether the argument is off its levels by more than round-off at times, or stays on one."""
-    enclosed = _Enclosed.of(changes, [part.data for part, _ in places])
+    enclosed = _Enclosed.of(argument, [part.data for part, _ in places])
     times = np.array([float(t) for _, t in places])
     meets, still = enclosed.on_level(times, np.arange(len(places)))
     return (~meets | still).tolist()
@@ -69,24 +102,24 @@ def decided(changes: Changes, places: Sequence[tuple[Part, Number]]) -> list[boo
 class _Enclosed:
     """A switch's argument over ranges; row i of ``below`` and ``above`` encloses the data of part i."""
 
-    changes: Changes
+    argument: Argument
     below: Array
     above: Array
 
     @classmethod
-    def of(cls, changes: Changes, data: Sequence[tuple[Number, ...]]) -> _Enclosed:
+    def of(cls, argument: Argument, data: Sequence[tuple[Number, ...]]) -> _Enclosed:
         rows = np.array([[float(a) for a in row] for row in data])
-        exact = changes.kernel.arithmetic.digits is None
-        return cls(changes, *((rows, rows) if exact else (np.nextafter(rows, -np.inf), np.nextafter(rows, np.inf))))
+        exact = argument.kernel.arithmetic.digits is None
+        return cls(argument, *((rows, rows) if exact else (np.nextafter(rows, -np.inf), np.nextafter(rows, np.inf))))
 
     def _at(self, t: Range, owner: Array) -> tuple[Range, Range]:
         columns = [Range(self.below[owner, i], self.above[owner, i]) for i in range(self.below.shape[1])]
-        routine = self.changes.kernel.enclosed_switching(columns)[f"argument_{self.changes.index}"]
+        routine = self.argument.kernel.enclosed_switching(columns)[f"argument_{self.argument.index}"]
         value, slope = map(as_range, routine(t))
         return _spread(value, len(owner)), _spread(slope, len(owner))
 
     def _meets(self, value: Range) -> Array:
-        if self.changes.switch.kind == "sign":
+        if self.argument.switch.kind == "sign":
             return (value.low <= 0) & (value.high >= 0)
         return np.ceil(value.low) <= np.floor(value.high)
 
@@ -131,9 +164,9 @@ def _within(part: Part, low: float, high: float) -> tuple[Number, Number]:
     return max(part.start, zero + float(low)), min(part.end, zero + float(high))
 
 
-def _has_value(changes: Changes, part: Part, t: Number) -> bool:
+def _has_value(argument: Argument, part: Part, t: Number) -> bool:
     try:
-        return changes.kernel.arithmetic.isfinite(changes.argument(part)(t)[0])
+        return argument.kernel.arithmetic.isfinite(argument.argument(part)(t)[0])
     except DOMAIN_ERRORS:
         return False
 

@@ -11,28 +11,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, floor
-from typing import Protocol
 
 from hsdsl import limits
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.errors import UsageError
-from hsdsl.kernel import Kernel, Routine
-from hsdsl.program import Switch
+from hsdsl.simulate.pieces import Argument, Part, check, decided, isolated
 from hsdsl.simulate.surfaces import close_bracket
 
 Stretch = tuple[Number, Number]
 Cuts = tuple[list[Number], list[Stretch]]  # where the number changes, and stretches that nothing is proved of
-
-
-class Part(Protocol):
-    """A part of the time, and what routines are bound to on it."""
-
-    @property
-    def start(self) -> Number: ...
-    @property
-    def end(self) -> Number: ...
-    @property
-    def data(self) -> tuple[Number, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -47,13 +33,8 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Changes:
+class Changes(Argument):
     """Finds the changes of one switch; two within ``tie`` are one."""
-
-    kernel: Kernel
-    switch: Switch
-    index: int
-    tie: Number
 
     def pieces(self, parts: Sequence[Part]) -> list[Piece]:
         """Cut parts of time where the switch changes, and give its numbers.
@@ -70,8 +51,8 @@ class Changes:
             for part, (inside, unsure) in zip(parts, cuts, strict=True)
             for a, b in pairwise((part.start, *self._apart(part, inside), part.end))
         ]
-        decided = [True] * len(cut) if linear else self._decided(cut)
-        sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, decided, strict=True))
+        certain = [True] * len(cut) if linear else decided(self, [(piece.part, piece.at) for piece in cut])
+        sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, certain, strict=True))
         return list(self._merged(sure))
 
     def _merged(self, pieces: Iterator[Piece]) -> Iterator[Piece]:
@@ -102,10 +83,6 @@ class Changes:
             if cut - before > self.tie and part.end - cut > self.tie:
                 yield cut
                 before = cut
-
-    def argument(self, part: Part) -> Routine:
-        """What the switch is the floor or the sign of."""
-        return self.kernel.switching(part.data)[f"argument_{self.index}"]
 
     def number(self, part: Part) -> Callable[[Number], Number]:
         """The switch's number at a time; not-a-number where its argument has no value."""
@@ -141,8 +118,6 @@ class Changes:
             yield found, []
 
     def _of_curves(self, parts: Sequence[Part]) -> list[Cuts]:
-        from hsdsl.simulate.pieces import isolated  # only what is not linear pays for it
-
         found: list[Cuts] = [([], []) for _ in parts]
         left = limits.current().switches
         monotone, unsure = isolated(self, parts)
@@ -155,11 +130,6 @@ class Changes:
             found[owner][0].extend(self._unproved(parts[owner], low, high))
             found[owner][1].append((low, high))
         return found
-
-    def _decided(self, pieces: Sequence[Piece]) -> list[bool]:
-        from hsdsl.simulate.pieces import decided
-
-        return decided(self, [(piece.part, piece.at) for piece in pieces])
 
     def _roots(self, part: Part, a: Number, b: Number) -> list[Number]:
         """Where an argument that is monotone on [a, b] meets its levels, solved to round-off."""
@@ -192,16 +162,6 @@ class Changes:
         if between != between and first == first:
             return [_change(number, a, middle), _change(number, middle, b)]
         return []
-
-
-def check(left: float) -> None:
-    """Refuse to look for more changes than the limit allows."""
-    if left < 0:
-        most = limits.current().switches
-        raise UsageError(
-            f"floor, sign, abs, min, max or atan2 of time switches more than {most} times in this run",
-            f"make the run shorter, or allow more with --limit switches={10 * most}",
-        )
 
 
 def _change(number: Callable[[Number], Number], a: Number, b: Number) -> Number:
