@@ -12,7 +12,6 @@ from hsdsl.execution import Array, Evaluated
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 
-BLOCK = 16  # HS_BLOCK
 NUMBER = 8  # bytes
 
 
@@ -62,19 +61,17 @@ class Filled:
     @property
     def rows(self) -> Array:
         """Shape (n,), of int."""
-        room = self._n + BLOCK
-        return self._memory[room : room + self._n].view(np.int64)
+        return self._memory[self._n : 2 * self._n].view(np.int64)
 
     @property
     def states(self) -> Array:
         """Shape (n, k)."""
-        room = self._n + BLOCK
-        return self._memory[2 * room : (2 + self._k) * room].reshape(self._k, room)[:, : self._n].T
+        return self._memory[2 * self._n : (2 + self._k) * self._n].reshape(self._k, self._n).T
 
     @property
     def outputs(self) -> Array:
         """Shape (n, m)."""
-        start = (2 + self._k) * (self._n + BLOCK)
+        start = (2 + self._k) * self._n
         return self._memory[start : start + self._n * self._m].reshape(self._n, self._m)
 
 
@@ -117,10 +114,10 @@ class Sampler:
         states : sequence of str
         outputs : bool
         """
-        n, k, room = len(times), len(states), len(times) + BLOCK
+        n, k = len(times), len(states)
         own = self._own = self._own or self._table()
         m = self._outputs if outputs else 0
-        ends = 0, room, 2 * room, (2 + k) * room, (2 + k) * room + n * m  # time, row, states, results, scratch
+        ends = 0, n, 2 * n, (2 + k) * n, (2 + k + m) * n  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n] = times
         table, start = structures.Sampling.from_buffer_copy(own), memory.ctypes.data

@@ -11,7 +11,6 @@ import numpy as np
 
 from hsdsl.execution import REASONS, Array
 from hsdsl.runtime import structures
-from hsdsl.runtime.sampling import BLOCK
 from hsdsl.simulate.compiled import CompiledPlan, task_settings
 from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.settings import Settings
@@ -124,7 +123,7 @@ class Place:
         self.table = structures.Ensemble()
         self.workspace = plan.workspaces.new(self.table.task)
         plan.lay(self.workspace)
-        model, chunk, room = plan.compiled.table, self.table.task.chunk, samples + BLOCK
+        model, chunk, room = plan.compiled.table, self.table.task.chunk, samples
         self._memory = np.zeros(room * (2 + len(names)) + 2 * model.width)
         self._arcs = np.zeros(chunk.arc_room, np.int32)
         sampling, start = self.table.sampling, self._memory.ctypes.data

@@ -103,7 +103,10 @@ def _transitions(execution: Execution) -> tuple[Transition, ...]:
 
 def _arcs(execution: Execution) -> tuple[Arc, ...]:
     of = _of(execution)
-    return tuple(arcs_of(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts))
+    arcs = tuple(arcs_of(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts))
+    execution.__dict__["arcs"] = arcs
+    execution.check()
+    return arcs
 
 
 def _verdict(execution: Execution) -> Verdict:

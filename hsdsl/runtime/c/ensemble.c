@@ -25,7 +25,7 @@ static void sample_chunk(hs_ensemble *e, int at_end) {
   hs_sample(s);
   for (int k = 0; k < s->columns; k++)
     for (int64_t i = 0; i < count; i++)
-      e->states[(instance * s->columns + k) * e->samples + e->next + i] = s->states[k * (count + HS_BLOCK) + i];
+      e->states[(instance * s->columns + k) * e->samples + e->next + i] = s->states[k * count + i];
   for (int64_t k = 0; k < chunk->arcs; k++) chunk->arc[k].first += e->base;
   e->next += count;
 }

@@ -5,8 +5,6 @@
 
 #include "hs_simulate.h"
 
-#define HS_BLOCK 16 /* times that are evaluated together: memory for so many more than there are */
-
 typedef struct {
   const hs_model *model; /* these two for outputs alone */
   const hs_timeline *timeline;
@@ -20,9 +18,9 @@ typedef struct {
   const int32_t *layout;    /* of each arc, by its states; 0 where there is only one */
   const int32_t *dimension; /* of each layout */
   const int32_t *column;    /* (layouts, columns): which of the arc's states it is, -1 for none */
-  double *time;             /* (samples + HS_BLOCK), in any order; moved to the run's ends where outside to round-off */
+  double *time;             /* (samples), in any order; moved to the run's ends where outside to round-off */
   int64_t *row;             /* (samples): where the piece begins */
-  double *states;           /* (columns, samples + HS_BLOCK) */
+  double *states;           /* (columns, samples) */
   double *results;          /* (samples, outputs) */
   double *scratch;          /* 2 width */
 } hs_sampling;

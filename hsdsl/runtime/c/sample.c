@@ -1,23 +1,15 @@
 /* The value of a run at many times. See hsdsl/execution/sampling.py.
 
-   Times in one piece are evaluated together, a block of them at once; a block may go beyond them, since what it writes
-   there is written again. Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)); a processor that
-   does four at once rounds none of them otherwise. */
+   Times in one piece are evaluated together, a block of them at once: one sum waits for its last product, many do not.
+   Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)). */
 
-#if defined(__GNUC__)
-typedef double hs_few __attribute__((vector_size(32)));
-#else
-typedef double hs_few;
-#endif
 #if defined(__GNUC__) && !defined(__clang__)
 #define HS_UNROLLED __attribute__((optimize("O3")))
 #else
 #define HS_UNROLLED
 #endif
 
-enum { STEPS_BEFORE_SEARCH = 8 };
-#define PARTS(count) ((count) / (int)(sizeof(hs_few) / sizeof(double)))
-
+enum { STEPS_BEFORE_SEARCH = 8, BLOCK = 16 };
 /* A row's piece, and where its arc's states are among the columns asked for. */
 typedef struct {
   int64_t row, arc;
@@ -28,51 +20,31 @@ typedef struct {
   int dimension;
 } hs_place;
 
-/* Evaluate the columns asked for at the times of a block, to `out` and further columns behind it. */
-#define DEFINE_BLOCK(name, count, target)                                                                         \
-  HS_INLINE target void name(const hs_sampling *s, const hs_place *at, const double *time, double *out) {        \
-    const int w = s->width, top = at->degree - 1;                                                                \
-    const double length = at->end - at->begin;                                                                   \
-    hs_few u[PARTS(count)], y[PARTS(count)];                                                                     \
-    memcpy(u, time, sizeof u);                                                                                   \
-    for (int q = 0; q < PARTS(count); q++) u[q] = (u[q] - at->begin) / length;                                   \
-    for (int k = 0; k < s->columns; k++, out += s->samples + HS_BLOCK) {                                         \
-      const int place = at->column[k];                                                                           \
-      const double *c = place < 0 ? at->c : at->c + place, x = place < 0 ? NAN : at->x[place];                   \
-      for (int q = 0; q < PARTS(count); q++) y[q] = (hs_few){0} + (place < 0 ? 0.0 : c[top * w]);                \
-      for (int m = place < 0 ? -1 : top - 1; m >= 0; m--)                                                        \
-        for (int q = 0; q < PARTS(count); q++) y[q] = c[m * w] + u[q] * y[q];                                    \
-      for (int q = 0; q < PARTS(count); q++) y[q] = x + u[q] * y[q];                                             \
-      memcpy(out, y, sizeof y);                                                                                  \
-    }                                                                                                            \
+/* Evaluate the columns at `count` times of one piece, at most a block; to `out` and further columns behind it. */
+HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const double *time, int count, double *out) {
+  const int w = s->width, top = at->degree - 1;
+  const double length = at->end - at->begin;
+  double u[BLOCK], y[BLOCK];
+  for (int q = 0; q < count; q++) u[q] = (time[q] - at->begin) / length;
+  for (int k = 0; k < s->columns; k++, out += s->samples) {
+    const int place = at->column[k];
+    if (place < 0) {
+      for (int q = 0; q < count; q++) out[q] = NAN;
+      continue;
+    }
+    const double *const c = at->c + place, x = at->x[place];
+    for (int q = 0; q < count; q++) y[q] = c[top * w];
+    for (int m = top - 1; m >= 0; m--)
+      for (int q = 0; q < count; q++) y[q] = c[m * w] + u[q] * y[q];
+    for (int q = 0; q < count; q++) out[q] = x + u[q] * y[q];
   }
+}
 
-/* Evaluate them at all times from one up to another, which are in one piece. */
-#define DEFINE_PIECE(name, target)                                                                                \
-  DEFINE_BLOCK(name##_block, HS_BLOCK, target)                                                                   \
-  DEFINE_BLOCK(name##_half, HS_BLOCK / 2, target)                                                                \
-  DEFINE_BLOCK(name##_quarter, HS_BLOCK / 4, target)                                                             \
-  HS_UNROLLED target static void name(const hs_sampling *s, const hs_place *at, int64_t from, int64_t to) {      \
-    for (int64_t k = from; k < to; k += HS_BLOCK) {                                                              \
-      const double *time = s->time + k;                                                                          \
-      double *out = s->states + k;                                                                               \
-      if (to - k > HS_BLOCK / 2)                                                                                 \
-        name##_block(s, at, time, out);                                                                          \
-      else if (to - k > HS_BLOCK / 4)                                                                            \
-        name##_half(s, at, time, out);                                                                           \
-      else                                                                                                       \
-        name##_quarter(s, at, time, out);                                                                        \
-    }                                                                                                            \
-  }
-
-DEFINE_PIECE(piece, )
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-DEFINE_PIECE(wide_piece, __attribute__((target("avx2"))))
-#define HS_PIECE (__builtin_cpu_supports("avx2") ? wide_piece : piece)
-#else
-#define HS_PIECE piece
-#endif
+/* The same at all times from one up to another, which are in one piece. */
+HS_UNROLLED static void evaluate_piece(const hs_sampling *s, const hs_place *at, int64_t from, int64_t to) {
+  for (; to - from >= BLOCK; from += BLOCK) evaluate_block(s, at, s->time + from, BLOCK, s->states + from);
+  evaluate_block(s, at, s->time + from, (int)(to - from), s->states + from);
+}
 
 /* The last row not after a time; it is likely to be soon behind `from`. */
 HS_INLINE int64_t row_at(const hs_sampling *s, double t, int64_t from) {
@@ -136,8 +108,7 @@ HS_INLINE void go_to(const hs_sampling *s, int64_t row, hs_place *at) {
 static void at_row(const hs_sampling *s, const hs_place *at, int64_t row, int64_t i) {
   s->row[i] = row;
   for (int k = 0; k < s->columns; k++)
-    s->states[k * (s->samples + HS_BLOCK) + i] =
-        at->column[k] < 0 ? NAN : s->values[row * s->width + at->column[k]];
+    s->states[k * s->samples + i] = at->column[k] < 0 ? NAN : s->values[row * s->width + at->column[k]];
   for (int k = 0; k < s->outputs; k++) s->results[i * s->outputs + k] = s->recorded[row * s->outputs + k];
 }
 
@@ -171,11 +142,9 @@ static int64_t outside(const hs_sampling *s) {
 }
 
 int64_t hs_sample(const hs_sampling *s) {
-  void (*const evaluate)(const hs_sampling *, const hs_place *, int64_t, int64_t) = HS_PIECE;
   const int64_t first = outside(s);
   hs_place at;
   if (first >= 0 || !s->samples) return first;
-  for (int i = 0; i < HS_BLOCK; i++) s->time[s->samples + i] = 0.0; /* a last block goes beyond the times */
   at.arc = 0;
   go_to(s, 0, &at);
   for (int64_t i = 0; i < s->samples;) {
@@ -190,7 +159,7 @@ int64_t hs_sample(const hs_sampling *s) {
     }
     const int64_t start = i;
     for (; i < s->samples && at.begin < s->time[i] && s->time[i] < at.end; i++) s->row[i] = at.row;
-    evaluate(s, &at, start, i);
+    evaluate_piece(s, &at, start, i);
     for (int64_t k = start; s->outputs && k < i; k++) outputs_between(s, &at, k);
   }
   return -1;
