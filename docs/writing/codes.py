@@ -10,7 +10,7 @@ from hsdsl.lint.rules import FAMILIES, RULES, family
 
 ERROR_CODES = """# Error codes
 
-A code keeps its meaning for ever; a retired one is not used again. `hsdsl explain CODE` prints what stands here.
+A code keeps its meaning for ever; a retired one is not used again. `hsdsl explain CODE` prints this text.
 Examples may leave out the keys that every model has.
 
 """

@@ -21,7 +21,7 @@ parentheses and functions. An *inequality* has an expression on either side of o
 
 `floor`, `sign`, `abs`, `min`, `max` and `atan2` of `t`, parameters and inputs alone switch at boundaries of steps,
 [each at its own time](../meaning.md#m9-inputs): `floor(t) - floor(t - 0.01)` is a pulse of 0.01 every second, and
-`sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where a state stands in them they are looked at within steps.
+`sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where they contain a state they are looked at within steps.
 
 An *output* belongs to the modes in which all its names mean something. One of the whole model is read in each mode with
 that mode's own `let`; one of a mode goes before it. Elsewhere it has no value: not-a-number in arrays, an empty cell in
@@ -103,14 +103,14 @@ def typed(node: Mapping[str, Any]) -> str:
 
 
 def defaults() -> Iterator[tuple[str, str]]:
-    """List what an experiment is when nothing is said."""
+    """List the defaults of an experiment."""
     for key, value in (DEFAULTS | {"tolerance": DEFAULT_TOLERANCE}).items():
         text = value if isinstance(value, str) else f"{float(value):g}".replace("e-0", "e-").replace("e+0", "e")
         yield f"`{key}`", f"`{text}`"
 
 
 def callables() -> Iterator[tuple[str, str]]:
-    """List what an expression may name beside the model's own names."""
+    """List what an expression may name besides the model's own names."""
     for name, (_, least, most) in FUNCTIONS.items():
         yield f"`{name}`", f"{least}" if most == least else f"{least} to {most or 'any number'}"
     for name in (*CONSTANTS, "t"):

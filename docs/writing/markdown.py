@@ -14,7 +14,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def code(text: str) -> str:
-    """Set a text as code, whatever marks are in it."""
+    """Set a text as code, with any marks in it."""
     text = text.strip()
     fence = "``" if "`" in text else "`"
     space = " " if text.startswith("`") or text.endswith("`") else ""
@@ -27,7 +27,7 @@ def escaped(text: str) -> str:
 
 
 def parted(text: str) -> str:
-    """As :func:`escaped`, but for what stands between backticks, which is code."""
+    """As :func:`escaped`, but for what is between backticks, which is code."""
     if text.count("`") % 2 or "``" in text:
         return re.sub(r"([\\*_<\[\]{}`])", r"\\\1", text)
     pieces = text.split("`")

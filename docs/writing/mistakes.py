@@ -14,7 +14,7 @@ GOLDEN = Path(__file__).parents[2] / "tests" / "golden"
 
 MISTAKES = """# Typical mistakes
 
-What people write who come from other tools or are new to YAML, and what they are told. Each row is a test: the model at
+What people write who come from other tools or are new to YAML, and the messages. Each row is a test: the model at
 the end with one passage written as in the row, a file of its own, or a command. The codes are explained on
 [their page](errors.md); `hsdsl explain HS106` prints the same.
 
