@@ -1,5 +1,7 @@
 /* Transitions that follow each other without any flow between them. See hsdsl/simulate/cascade.py. */
 
+#include "functions.h"
+
 #define PARALLEL 1e-6
 
 /* Count a transition that led to run->x of the present mode, after some flow or none; say whether one of the same

@@ -1,10 +1,13 @@
 /* Steps that go to and fro across a jump of the flow. See hsdsl/simulate/chatter.py. */
 
+#include "functions.h"
+
 #define MOST_CHATTER 2000
 #define JUMP_HALVINGS 40
 
 /* Component k of the flow at the share s of the way from (t, x) to (t1, z). */
-static int flow_between(hs_run *run, int k, double t, const double *x, double t1, const double *z, double s, double *f) {
+static int flow_between(hs_run *run, int k, double t, const double *x, double t1, const double *z, double s,
+                        double *f) {
   const hs_mode_state *here = &run->here;
   for (int i = 0; i < here->dimension; i++) run->at[i] = x[i] + s * (z[i] - x[i]);
   if (here->table->flow(here->p, t + s * (t1 - t), run->at, run->source)) return RAISED;

@@ -1,5 +1,7 @@
 /* The step size: fixed, or from the embedded error estimate. See hsdsl/simulate/control.py. */
 
+#include "functions.h"
+
 #define SAFETY 0.9
 #define LEAST 0.2
 #define MOST 5.0

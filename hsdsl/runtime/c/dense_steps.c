@@ -1,6 +1,8 @@
 /* One accepted step of the located scheme, with what happens along it. See hsdsl/simulate/dense_steps.py.
    run->span is the step, from (t, run->x) to (t1, run->z); run->curves are the surfaces along it. */
 
+#include "functions.h"
+
 #define BLUR 2
 #define UNKNOWN_TOLERANCE 1e-10
 #define LAST_TERM 4

@@ -1,6 +1,9 @@
 /* Many instances of one model, of which little is kept. See hsdsl/simulate/ensemble.py. */
 
-/* Evaluate the samples that fall into the chunk; at its last time a later row may still follow, unless it is the end. */
+#include "functions.h"
+
+/* Evaluate the samples that fall into the chunk; after its last time another row may
+   follow, unless it is the end. */
 static void sample_chunk(hs_ensemble *e, int at_end) {
   const hs_chunk *chunk = &e->task.chunk;
   hs_sampling *s = &e->sampling;
@@ -12,7 +15,9 @@ static void sample_chunk(hs_ensemble *e, int at_end) {
   const double *time = e->time + instance * e->samples, last = chunk->times[rows - 1];
   const double reach = at_end ? last + HS_TIE * fabs(last) : last;
   int64_t count = 0;
-  while (e->next + count < e->samples && (at_end ? time[e->next + count] <= reach : time[e->next + count] < reach)) count++;
+  while (e->next + count < e->samples &&
+         (at_end ? time[e->next + count] <= reach : time[e->next + count] < reach))
+    count++;
   if (!count) return;
   for (int64_t k = 0; k < chunk->arcs; k++) chunk->arc[k].first -= e->base;
   s->timeline = e->task.timeline;

@@ -1,6 +1,6 @@
 /* Entering a mode: at the start, after a reset, at a jump of an input. See hsdsl/simulate/entry.py. */
 
-enum { GOES_ON = -1 }; /* instead of a reason to stop */
+#include "functions.h"
 
 static int entered_outside(hs_run *run, int surface, double t) {
   run->task->stop.surface = surface;

@@ -1,16 +1,10 @@
 /* The runtime: one translation unit, each file the twin of one in hsdsl/simulate or hsdsl/integrators. */
 
-#include <stddef.h>
-#include <string.h>
-#include <time.h>
-
-#include "run.h"
+#include "functions.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a tenth */
 #endif
-
-#include "hs_ensemble.h"
 
 #include "table.c"
 #include "taylor.c"
@@ -19,6 +13,7 @@
 #pragma GCC optimize("O2")
 #include "linear.c"
 #include "radau.c"
+#include "newton.c"
 #pragma GCC pop_options
 #include "stepper.c"
 
@@ -35,9 +30,7 @@
 #include "relaxed.c"
 #include "root_isolation.c"
 #include "surface_polynomials.c"
-#include "curves.c"
 #include "dense_steps.c"
-#include "rest.c"
 #include "sticking.c"
 #include "zeno.c"
 #include "touching.c"
@@ -86,7 +79,8 @@ static void lay_out(hs_run *run, hs_store *store) {
   double **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
                        &run->entered, &run->after, &run->landed, &run->error, 0};
   for (double ***state = states; *state; state++) **state = numbers(store, w);
-  double **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby, &run->flow_sizes, 0};
+  double **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby,
+                    &run->flow_sizes, 0};
   for (double ***each = own; *each; each++) **each = numbers(store, w);
   run->known = numbers(store, run->model->states);
   run->lifted = take(store, w, sizeof(int));
@@ -96,7 +90,8 @@ static void lay_out(hs_run *run, hs_store *store) {
     if (store->numbers) run->k[i] = stage;
   }
   if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
-  if (run->method->kind == HS_TAYLOR) run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
+  if (run->method->kind == HS_TAYLOR)
+    run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
   if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, w, store);
   run->values = numbers(store, m);
   run->ahead = numbers(store, m);

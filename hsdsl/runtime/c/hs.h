@@ -48,7 +48,7 @@ typedef struct {
   hs_routine *const *gradients;
   hs_routine *const *rates;
   const hs_edge *edge;
-  hs_series *series; /* 0 where the flow is kinked: it has no Taylor coefficients everywhere; then there are no others */
+  hs_series *series; /* 0 where the flow is kinked; then a mode has no other series */
   hs_surface_series *surface_series;
   const int *surface_line; /* for each surface; -1 where it is kinked */
   hs_routine *jacobian;    /* of the flow by the states, row by row */

@@ -23,7 +23,7 @@ typedef struct {
   double *ended;               /* (instances): the last time */
   double *final;               /* (instances, width) */
   double *outputs;             /* (instances, outputs) */
-  double *crossed;             /* (instances, most_transitions): when the first transitions were made; the rest untouched */
+  double *crossed;             /* (instances, most_transitions): times of the first transitions */
   double *states;              /* (instances, columns, samples); untouched beyond a run's end */
   double *results;             /* (instances, samples, outputs), likewise */
   int64_t done;

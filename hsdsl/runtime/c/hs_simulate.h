@@ -102,7 +102,7 @@ typedef struct {
 
 typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
 
-/* What a run says besides: see hsdsl/simulate/diagnostics.py. `surface` is an edge where there is no doubt about a surface. */
+/* A diagnostic: see hsdsl/simulate/diagnostics.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
   int32_t kind;
   int32_t mode;

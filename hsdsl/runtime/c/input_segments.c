@@ -1,5 +1,7 @@
 /* Sampled inputs over time. See hsdsl/simulate/input_segments.py. */
 
+#include "functions.h"
+
 /* The segment that time is in; at a boundary the later one. */
 static int64_t segment_at(const hs_timeline *timeline, double t) {
   int64_t low = 0, high = timeline->segments;

@@ -1,5 +1,7 @@
 /* Systems of linear equations: dense LU with partial pivoting. See hsdsl/integrators/linear.py. */
 
+#include "functions.h"
+
 static void exchange_rows(double *a, int n, int i, int k) {
   if (i == k) return;
   for (int j = 0; j < n; j++) {
@@ -20,8 +22,8 @@ HS_INLINE int is_larger(double a, double of_a, double b, double of_b) {
   return of_a > 0 && of_b > 0 ? a * of_b > b * of_a : b == 0 && a > 0;
 }
 
-/* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. Its rows, as its
-   columns, belong to unknowns of these scales. */
+/* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. `scales` are
+   those of the unknowns. */
 HS_INLINE int factored(int n, double *restrict a, int *restrict order, const double *scales) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {

@@ -1,8 +1,8 @@
 /* The located scheme: Burden et al. 2013, Fig. 8. See hsdsl/simulate/located.py. */
 
-#define MOST_CORRECTIONS 8
+#include "functions.h"
 
-enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON, LANDED and reasons to stop */
+#define MOST_CORRECTIONS 8
 
 /* Whether the polynomials of surface k say that it is not crossed. */
 static int is_passed_by(hs_run *run, int k) {
@@ -60,8 +60,10 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   double first, last;
   if (is_passed_by(run, k)) return touched(run, k, crossing);
-  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last)) return RAISED;
-  hs_walk walk = begin_walk(k, hs_max(first, last), coefficients_of(&run->curves, 0, k)[0] > first, run->ends[k] > last);
+  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last))
+    return RAISED;
+  const int beyond = coefficients_of(&run->curves, 0, k)[0] > first;
+  hs_walk walk = begin_walk(k, hs_max(first, last), beyond, run->ends[k] > last);
   hs_rise rise;
   while (next_rise(run, &walk, &rise)) {
     if (settled(run, k, &rise, crossing)) return RAISED;

@@ -1,4 +1,6 @@
-/* When the iterations for an implicit step have done enough, and when they will not. See hsdsl/integrators/newton.py. */
+/* Stopping rules of the iterations for an implicit step. See hsdsl/integrators/newton.py. */
+
+#include "functions.h"
 
 #define MOST_ITERATIONS 7
 #define MOST_TO_ROUNDOFF 122 /* 16 - 2 log2(u) */

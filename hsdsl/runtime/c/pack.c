@@ -1,6 +1,8 @@
 /* What a run has written, taken out of its chunk: column after column in one stretch of memory that is as long as they
    are. See Packed in hsdsl/simulate/columns.py. */
 
+#include "functions.h"
+
 /* The most states of any mode the run was in. */
 static int most_states(const hs_task *task) {
   const hs_chunk *chunk = &task->chunk;

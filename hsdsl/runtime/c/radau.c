@@ -1,5 +1,7 @@
 /* Steps by Radau IIA. See hsdsl/integrators/radau.py. */
 
+#include "functions.h"
+
 /* The weighted sum of three vectors. */
 HS_INLINE void weighted3(int n, const double *w, double *const v[3], double *out) {
   for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
@@ -36,8 +38,6 @@ HS_INLINE int iterate(hs_run *run, int n, double t, double h) {
   for (int i = 0; i < 3; i++) weighted3(n, known->mix[i], u, radau->z[i]);
   return hs_finite(total) ? 0 : NO_CONVERGENCE;
 }
-
-#include "newton.c"
 
 static void radau_forget(hs_radau *radau) {
   radau->derived = radau->factored = radau->stepped = 0;

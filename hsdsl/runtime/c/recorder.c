@@ -1,5 +1,7 @@
 /* Rows, arcs and transitions, written to the caller's chunk. See hsdsl/simulate/recorder.py. */
 
+#include "functions.h"
+
 /* Whether there is room for one more of each; the caller is asked for it where there is not. */
 static int make_chunk(hs_run *run) {
   if (run->full) return 0;

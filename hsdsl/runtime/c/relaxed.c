@@ -1,10 +1,8 @@
 /* The relaxed scheme: Burden et al. 2013, Fig. 12. See hsdsl/simulate/relaxed.py. */
 
-#define ALMOST (1 - 0x1p-30)
-#define MOST_HALVINGS 122 /* 16 - 2 log2(u) */
-#define POLL_EVERY (CLOCKS_PER_SEC / 50)
+#include "functions.h"
 
-enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and reasons to stop */
+#define POLL_EVERY (CLOCKS_PER_SEC / 50)
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
 HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
@@ -100,8 +98,8 @@ static int flow(hs_run *run) {
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const int n = here->dimension;
   const double limit = run->task->timeline->end[here->segment];
-  run->patience.reached = NAN;
-  run->patience.idle = run->patience.creeping = run->chatter = 0;
+  run->stall.reached = NAN;
+  run->stall.idle = run->stall.creeping = run->chatter = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(run);
@@ -144,7 +142,7 @@ static int flow(hs_run *run) {
       return LANDED;
     }
     if (halvings || !(t1 > here->t)) {
-      const hs_step_failure given_up = patience_ends(run, halvings, last.failure, last.surface, t1);
+      const hs_step_failure given_up = stall_ends(run, halvings, last.failure, last.surface, t1);
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
     if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);

@@ -1,9 +1,9 @@
-/* Where polynomials change sign on [0, 1], with the Bernstein form as the certificate. See hsdsl/simulate/root_isolation.py.
+/* Where polynomials change sign on [0, 1], certified by the Bernstein form. See hsdsl/simulate/root_isolation.py.
    A polynomial of degree n is c[0] + c[1] s + ... + c[n] s**n. */
 
+#include "functions.h"
+
 #define MOST_REFINEMENTS 300
-#define ROUNDING 8
-#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
 
 /* C(n, 0) to C(n, n). */
 static const double *binomials(const hs_run *run, int n) { return run->binomials + n * (n + 1) / 2; }

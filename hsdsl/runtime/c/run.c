@@ -1,5 +1,7 @@
 /* Entering a mode, choosing among crossings, resets. See hsdsl/simulate/run.py. */
 
+#include "functions.h"
+
 static hs_reason stopped(hs_run *run, hs_reason reason, double t) {
   hs_stop *stop = &run->task->stop;
   stop->reason = reason;

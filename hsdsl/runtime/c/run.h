@@ -79,7 +79,7 @@ typedef struct {
   int aged;
 } hs_convergence;
 
-/* What Radau IIA knows from one step to the next, and what it works with: vectors of `width`, matrices of its square. */
+/* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of its square. */
 typedef struct {
   int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
   double derived_at, factored_for, start, length;
@@ -99,7 +99,7 @@ typedef struct {
 typedef struct {
   double reached;
   int idle, creeping;
-} hs_patience;
+} hs_stall;
 
 /* What is remembered of a transition. */
 typedef struct {
@@ -107,7 +107,7 @@ typedef struct {
   int mode, edge, target, entry;
 } hs_made;
 
-/* One of the states that transitions without flow between them led to, and how many they were since: room 0 for none. */
+/* A state that transitions without flow between them led to, and how many followed: room 0 for none. */
 typedef struct {
   int mode;
   long length, room;
@@ -148,7 +148,7 @@ typedef struct {
   hs_mode_state here;
   hs_trial trial;
   hs_control control;
-  hs_patience patience;
+  hs_stall stall;
   hs_cascade cascade;
   int chatter;
   /* in the workspace, a state's room each unless said otherwise */
@@ -156,7 +156,7 @@ typedef struct {
   double *scales, *known; /* of the states here, and of those of all modes before this one was entered */
   double *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
   int *lifted;
-  double *flow_sizes, *jacobian; /* see rest.c; jacobian: width * width */
+  double *flow_sizes, *jacobian; /* see sticking.c; jacobian: width * width */
   double **k;          /* stages, then the flow at the end */
   double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */

@@ -1,6 +1,8 @@
 /* The scale of a state: the largest size it has had in a run, and what round-off in its flow makes of that.
    See hsdsl/integrators/scales.py. */
 
+#include "functions.h"
+
 #define SHARE 32
 #define BLUR_UNITS 4 /* BLUR there */
 
@@ -28,7 +30,7 @@ static double root(double x, int m) {
   return ldexp(pow(ldexp(fraction, exponent - shift * m), -1.0 / m), -shift);
 }
 
-/* The sizes of the terms of a flow, by what the last digits of states that were `moved` so far change in it, to `found`;
+/* The sizes of the terms of a flow, by what the last digits of the states `moved` change in it, to `found`;
    its value is `slope`. Not 0 where it has none nearby. */
 static int flow_terms(hs_run *run, double t, const double *x, const double *slope, const double *moved, double *found) {
   static const double probes[4][2] = {{2, 2}, {-2, 2}, {6, -2}, {-6, -6}};

@@ -1,9 +1,9 @@
 /* When to stop trying ever shorter steps. See hsdsl/simulate/stall_detection.py. */
 
+#include "functions.h"
+
 #define IDLE_UNITS 64
 #define MOST_IDLE 64
-#define CREEPING 10
-#define MOST_CREEPING 2000
 
 /* Whether the surface in the way did not come nearer: its round-off is larger than what the step adds. */
 static int still(hs_run *run, int surface, double t1) {
@@ -22,14 +22,14 @@ static int unmoved(const hs_run *run) {
 }
 
 /* Count a step from run->x to run->z that was halved because of `failure`; say what ends the run, if anything. */
-static hs_step_failure patience_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, double t1) {
-  hs_patience *patience = &run->patience;
+static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, double t1) {
+  hs_stall *stall = &run->stall;
   const double t = run->here.t;
-  if (t != patience->reached) patience->idle = patience->creeping = 0;
-  patience->reached = t1;
+  if (t != stall->reached) stall->idle = stall->creeping = 0;
+  stall->reached = t1;
   const int small = t1 - t <= IDLE_UNITS * HS_UNIT * hs_max(t, run->control.h);
-  patience->idle = small || still(run, surface, t1) ? patience->idle + 1 : 0;
-  patience->creeping = halvings >= CREEPING ? patience->creeping + 1 : 0;
-  if (patience->idle > MOST_IDLE || (small && unmoved(run))) return failure;
-  return patience->creeping > MOST_CREEPING ? HS_CREEPING : HS_CLEAR;
+  stall->idle = small || still(run, surface, t1) ? stall->idle + 1 : 0;
+  stall->creeping = halvings >= CREEPING ? stall->creeping + 1 : 0;
+  if (stall->idle > MOST_IDLE || (small && unmoved(run))) return failure;
+  return stall->creeping > MOST_CREEPING ? HS_CREEPING : HS_CLEAR;
 }

@@ -1,5 +1,7 @@
 /* Steps by whichever method the run has: a table, Taylor series, Radau IIA. */
 
+#include "functions.h"
+
 /* One step from (t, run->x) to run->z; NO_VALUE or NO_CONVERGENCE where the method has none. */
 HS_INLINE int step(hs_run *run, int n, double t, double h) {
   switch (run->method->kind) {

@@ -1,15 +1,11 @@
 /* Geometry of a trial step against a mode's surfaces: round-off, depth, and where a surface was crossed.
-   See hsdsl/simulate/surfaces.py. A function that returns a status returns 0, or RAISED where a routine has no value. */
+   See hsdsl/simulate/surfaces.py. A status is 0, or RAISED where a routine has no value. */
 
-#define ROUNDOFF_UNITS 32
+#include "functions.h"
+
 #define SCAN 8
 #define ROOT_ITERATIONS 200
 #define ROOT_SHARE (1.0 / 16)
-
-enum { RAISED = -1 };
-
-static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0};
-static const hs_found TOO_WRONG = {HS_ERROR, -1, 0}, UNSOLVED = {HS_UNSOLVED, -1, 0};
 
 static hs_found failure(hs_step_failure kind, int surface) {
   const hs_found found = {kind, surface, 0};
@@ -146,7 +142,7 @@ static int norm_of(hs_run *run, double t, const double *x, int k, double *norm) 
   return 0;
 }
 
-/* Whether the `if` of edge k holds: 1, 0, or RAISED. A part that is false decides, whatever another has no value for. */
+/* Whether the `if` of edge k holds: 1, 0, or RAISED. A part that is false decides, even if another has no value. */
 static int condition(hs_run *run, int k, double t, const double *x) {
   const hs_edge *edge = &run->here.table->edge[k];
   int answer = 1;
@@ -240,9 +236,6 @@ static hs_found excursion(hs_run *run, hs_trial *trial) {
   }
   return CLEAR;
 }
-
-/* Surface k at the share s of a step. */
-typedef int hs_value(hs_run *run, const hs_polynomial *piece, int k, double s, double *r);
 
 static int on_piece(hs_run *run, const hs_polynomial *piece, int k, double s, double *r) {
   at(run, piece, s, run->at);

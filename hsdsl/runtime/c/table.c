@@ -1,5 +1,7 @@
 /* Steps by a Butcher tableau: sums go left to right, as in the functions hsdsl/integrators/stepper.py writes out. */
 
+#include "functions.h"
+
 HS_INLINE double weighted(const hs_row *row, double *const *k, int state) {
   if (!row->terms) return 0.0;
   double total = row->weight[0] * k[row->stage[0]][state];

@@ -1,5 +1,7 @@
 /* Steps by Taylor series of any order. See hsdsl/integrators/taylor.py. */
 
+#include "functions.h"
+
 /* Room for the coefficients of one line. */
 static int series_length(const hs_method *method) { return method->order + 2; }
 
@@ -14,7 +16,7 @@ static int is_expanded(const hs_run *run, double t) {
   return 1;
 }
 
-/* Have the coefficients along the flow through (t, run->x); trials from one point share them. Not 0 where it has none. */
+/* Compute the coefficients along the flow through (t, run->x), shared by trials from there. Not 0 where it has none. */
 static int expand(hs_run *run, double t) {
   if (is_expanded(run, t)) return 0;
   run->expanded = !run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines);

@@ -1,5 +1,7 @@
 /* A guard that the flow reaches and has no value beyond, as that of an empty tank. See hsdsl/simulate/touching.py. */
 
+#include "functions.h"
+
 #define TURNINGS 60
 
 /* Whether a crossing's state is on surface k, within the error of a step, and the flow has no value beyond. */

@@ -1,5 +1,7 @@
 /* The set of states a chain of transitions at one instant has been in, as Python's set of (mode, state). */
 
+#include "functions.h"
+
 static int same_state(const double *a, const double *b, int n) {
   for (int s = 0; s < n; s++)
     if (a[s] != b[s]) return 0;

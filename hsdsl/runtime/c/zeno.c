@@ -1,6 +1,8 @@
 /* Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
    See hsdsl/simulate/zeno.py. */
 
+#include "functions.h"
+
 #define LEAST_FLIGHTS 3
 #define MOST_ROUNDS 60
 
