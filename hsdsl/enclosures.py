@@ -47,9 +47,16 @@ class Range:
         other = as_range(other)
         if other is self:
             return _square(self)
-        found = _corners(_product, self, other)
-        alike = ((self.low >= 0) & (other.low >= 0)) | ((self.high <= 0) & (other.high <= 0))
-        return Range(np.where(alike, np.maximum(found.low, 0.0), found.low), found.high)
+        products = [x * y for x in (self.low, self.high) for y in (other.low, other.high)]
+        low, high = reduce(np.minimum, products), reduce(np.maximum, products)
+        if np.isnan(low).any():  # zero times an unbounded end
+            products = [np.where(np.isnan(product), 0.0, product) for product in products]
+            low, high = reduce(np.minimum, products), reduce(np.maximum, products)
+        least, most = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+        if np.any(low == 0):
+            alike = ((self.low >= 0) & (other.low >= 0)) | ((self.high <= 0) & (other.high <= 0))
+            least = np.where(alike, np.maximum(least, 0.0), least)
+        return Range(least, most)
 
     def __truediv__(self, other: Any) -> Range:
         other = as_range(other)
@@ -78,11 +85,6 @@ def _corners(function: Callable[[Any, Any], Any], a: Range, b: Range, steps: int
     """A function with its extremes at the corners of a box."""
     values = [function(x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
     return _outwards(reduce(np.minimum, values), reduce(np.maximum, values), steps)
-
-
-def _product(a: Any, b: Any) -> Any:
-    product = a * b
-    return np.where(np.isnan(product), 0.0, product)  # zero times an unbounded end
 
 
 def _square(x: Range) -> Range:

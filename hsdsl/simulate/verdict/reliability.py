@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from hsdsl.enclosures import Range, as_range
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS, SAFE
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.steps import steps_of
 
 PLACES = 64  # of a run where the round-off of its flow is looked at
 ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
@@ -41,20 +44,18 @@ def _roundoff(run: RunView) -> dict[str, float]:
 
     A state that stays near zero by cancellation has no digit right, and nothing is wrong with it.
     """
-    moved: dict[str, float] = {}
     span, unit = float(run.times[-1] - run.times[0]), ROUNDOFF_UNITS * float(run.arithmetic.unit)
-    rows = [(arc, row) for arc in run.flows for row in (arc.first, arc.last)]
+    ends = list(steps_of(run, PLACES))
+    moved: dict[str, float] = {}
     for _ in range(ROUNDS):
         found = dict(moved)
-        for arc, row in rows[:: max(1, len(rows) // PLACES)]:
-            place = run.at_row(arc, row)
-            data = [Range(float(v), float(v)) for v in run.problem.timeline.at(place.t).data]
-            kernel = run.problem.kernel.enclosing.bind(run.index(arc.mode), data)
-            t, x = float(place.t), [float(a) for a in place.x]
-            wide = [unit * abs(a) + moved.get(name, 0.0) for name, a in zip(arc.states, x, strict=True)]
-            box = [Range(a - e, a + e) for a, e in zip(x, wide, strict=True)]
-            flow = map(as_range, kernel.flow(Range(t - unit * abs(t), t + unit * abs(t)), *box))
-            for name, f in zip(arc.states, flow, strict=False):
-                found[name] = max(found.get(name, 0.0), span * float(f.high - f.low))
+        for steps in ends:
+            names = run.problem.program.modes[steps.mode].states
+            t, *x = steps.ends()[0]
+            sizes = [np.abs(t.low), *(np.abs(a.low) for a in x)]
+            wide = [unit * size + moved.get(name, 0.0) for name, size in zip(("", *names), sizes, strict=True)]
+            box = [Range(a.low - e, a.high + e) for a, e in zip((t, *x), wide, strict=True)]
+            for name, f in zip(names, map(as_range, steps.bound(run).flow(*box)), strict=True):
+                found[name] = max(found.get(name, 0.0), span * float(np.max(f.high - f.low)))
         moved = found
     return moved

@@ -111,8 +111,8 @@ class Parts:
         return run.problem.kernel.enclosing.bind(self.mode, self.bound_data)
 
 
-def steps_of(run: RunView) -> Iterator[Parts]:
-    """Give the steps of all arcs of flow, those of a mode together, as many at once as memory allows."""
+def steps_of(run: RunView, places: int | None = None) -> Iterator[Parts]:
+    """Give the steps of all arcs of flow, or about ``places`` of a mode; those of a mode together, as memory allows."""
     times = np.asarray(run.execution.times, dtype=float)
     ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
     for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
@@ -120,6 +120,7 @@ def steps_of(run: RunView) -> Iterator[Parts]:
             continue  # a final mode flows as the one before it
         rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
         rows = rows[(times[rows + 1] > times[rows]) & (times[rows] <= run.upto)]
+        rows = rows[:: max(1, len(rows) // places)] if places else rows
         for first in range(0, len(rows), MOST_PARTS):
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
