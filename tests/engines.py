@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
-from hsdsl.execution.same import same
+from hsdsl.execution.records import same
 from hsdsl.model import Model
 from hsdsl.runtime.compiler import NoCompiler, find_compiler
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel

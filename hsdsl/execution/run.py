@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hsdsl.execution.deferred import Deferred
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
-from hsdsl.execution.same import same
+from hsdsl.execution.records import Deferred, same
 from hsdsl.execution.samples import Samples
 from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 from hsdsl.names import visible

@@ -11,7 +11,7 @@ from typing import Any
 import numpy.typing as npt
 
 from hsdsl.errors import UsageError
-from hsdsl.execution.deferred import Deferred
+from hsdsl.execution.records import Deferred
 from hsdsl.names import did_you_mean
 
 Array = npt.NDArray[Any]

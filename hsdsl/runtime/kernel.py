@@ -130,38 +130,12 @@ def _source(program: Program) -> str:
     return model_source(program)
 
 
-class CompiledKernel:
-    """A compiled program, for the Python loop."""
+class CompiledKernel(PythonKernel):
+    """A compiled program for the Python loop; constants, switches and diagnoses are Python's."""
 
     def __init__(self, program: Program, compiled: CompiledModel) -> None:
-        self.arithmetic = FLOAT64
-        self._program, self._compiled = program, compiled
-        self._python = PythonKernel(program, FLOAT64)
-
-    @property
-    def enclosing(self) -> PythonKernel:
-        """The same program over interval arithmetic."""
-        return self._python.enclosing
-
-    def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
-        """Evaluate one of ``Program.constants``' routines at parameter values."""
-        return self._python.constant(name, parameters)
-
-    def has_constant(self, name: str) -> bool:
-        """Whether the program gives this constant."""
-        return self._python.has_constant(name)
-
-    def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
-        """Return a mode's expressions one by one, named for a person."""
-        return self._python.expressions(mode, data)
-
-    def switching(self, data: Sequence[Number]) -> dict[str, Routine]:
-        """Return the routines of ``Program.switching`` by name."""
-        return self._python.switching(data)
-
-    def enclosed_switching(self, data: Sequence[Any]) -> dict[str, Routine]:
-        """Return them over ranges of numbers."""
-        return self._python.enclosed_switching(data)
+        super().__init__(program, FLOAT64)
+        self._compiled = compiled
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""

@@ -14,7 +14,7 @@ from engines import COMPILER, needs_compiler
 import hsdsl
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
-from hsdsl.execution.same import same
+from hsdsl.execution.records import same
 from hsdsl.model import Model
 from hsdsl.simulate import output_buffers
 
