@@ -2,6 +2,7 @@
 
 #include "functions.h"
 
+#define ALMOST (1 - 0x1p-30)
 #define SAFETY 0.9
 #define LEAST 0.2
 #define MOST 5.0
@@ -92,6 +93,13 @@ static void accept(hs_control *control, double taken, double ratio) {
 static void reject(hs_control *control, double taken, double ratio) {
   control->rejected++;
   control->h = ratio != ratio ? taken / 2 : taken * hs_min(1.0, factor(control, ratio));
+}
+
+/* End of a step of length h from t, which is stretched to the limit where it nearly gets there. */
+static double end_of_step(double t, double *h, double limit) {
+  if (*h < (limit - t) * ALMOST) return t + *h;
+  *h = limit - t;
+  return limit;
 }
 
 /* Cut a step to what the surfaces of the mode allow. */

@@ -118,10 +118,7 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, double limit) {
   run->sloped = 1;
   double h = within_reach(run, control->h), t1;
   for (;;) {
-    if (h < (limit - t) * ALMOST)
-      t1 = t + h;
-    else
-      h = limit - t, t1 = limit;
+    t1 = end_of_step(t, &h, limit);
     run->refused = 0;
     const hs_step_failure tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
@@ -269,10 +266,7 @@ HS_INLINE hs_step_failure next_series(hs_run *run, const int n, double limit) {
   if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
   double h = within_reach(run, longest(run, n)), t1;
   for (int i = 0; i < MOST_HALVINGS; i++) {
-    if (h < (limit - t) * ALMOST)
-      t1 = t + h;
-    else
-      h = limit - t, t1 = limit;
+    t1 = end_of_step(t, &h, limit);
     if (!(t1 > t)) break;
     run->refused = 0;
     if (try_series(run, n, h, t1) == HS_CLEAR) return slow_enough(run, h), HS_CLEAR;

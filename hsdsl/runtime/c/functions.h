@@ -14,7 +14,6 @@ enum { GOES_ON = -1 }; /* instead of a reason to stop */
 enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and reasons to stop */
 enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON, LANDED and reasons to stop */
 
-#define ALMOST (1 - 0x1p-30)
 #define MOST_HALVINGS 122 /* 16 - 2 log2(u) */
 #define CREEPING 10
 #define MOST_CREEPING 2000
@@ -98,6 +97,7 @@ HS_INLINE double error_ratio(hs_run *run, double h);
 static void begin_steps(hs_run *run);
 static void accept(hs_control *control, double taken, double ratio);
 static void reject(hs_control *control, double taken, double ratio);
+static double end_of_step(double t, double *h, double limit);
 static double within_reach(const hs_run *run, double h);
 static void too_fast(hs_run *run, double tried);
 static void slow_enough(hs_run *run, double taken);
@@ -108,7 +108,7 @@ static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure fai
 
 /* surfaces.c */
 HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, double *value);
-HS_INLINE void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value);
+static void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value);
 static void shortened(const hs_run *run, const hs_polynomial *piece, double theta, hs_polynomial *part);
 static int surface(hs_run *run, int k, double t, const double *x, double *r);
 static int roundoff_bound(hs_run *run, int k, double t, const double *x, int entry, double *noise);

@@ -109,10 +109,7 @@ static int flow(hs_run *run) {
     hs_found found, last = TOO_WRONG;
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
     for (;;) {
-      if (h < (limit - here->t) * ALMOST)
-        t1 = here->t + h;
-      else
-        h = limit - here->t, t1 = limit;
+      t1 = end_of_step(here->t, &h, limit);
       found = attempt(run, n, h, t1);
       if (adaptive && run->trial.ends && found.failure == HS_CLEAR) {
         local_error(run, h);

@@ -202,10 +202,7 @@ static hs_step_failure next_rest(hs_run *run, int n, double limit) {
   hs_span *const span = &run->span;
   double h = longest_rest(run), t1;
   for (;; h = h / 2) {
-    if (h < (limit - t) * ALMOST)
-      t1 = t + h;
-    else
-      h = limit - t, t1 = limit;
+    t1 = end_of_step(t, &h, limit);
     if (!(t1 > t)) return HS_NOT_FINITE;
     begin_span(run, h, t1);
     span->piece.degree = 1;

@@ -12,9 +12,9 @@ static hs_found failure(hs_step_failure kind, int surface) {
   return found;
 }
 
-/* Evaluate the interpolant of a step of n states at s = theta, to `value`. */
-HS_INLINE void at_in(const hs_run *run, const int n, const hs_polynomial *piece, double theta, double *value) {
-  const int w = run->width, last = piece->degree - 1;
+/* Evaluate the interpolant of a step at s = theta, to `value`. */
+static void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
+  const int n = run->here.dimension, w = run->width, last = piece->degree - 1;
   for (int s = 0; s < n; s++) {
     double v = piece->c[last * w + s] * theta;
     for (int m = last - 1; m >= 0; m--) v = (piece->c[m * w + s] + v) * theta;
@@ -29,15 +29,6 @@ HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece
     double v = piece->c[last * w + s];
     for (int m = last - 1; m >= 0; m--) v = piece->c[m * w + s] + v;
     value[s] = run->x[s] + v;
-  }
-}
-
-/* The same; for one or two states the compiler is told how many. */
-HS_INLINE void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
-  switch (run->here.dimension) {
-    case 1: at_in(run, 1, piece, theta, value); return;
-    case 2: at_in(run, 2, piece, theta, value); return;
-    default: at_in(run, run->here.dimension, piece, theta, value);
   }
 }
 
