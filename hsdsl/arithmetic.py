@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import Any
 
-Number = Any  # float or mpmath.mpf: whatever the arithmetic makes
+Number = Any  # float or mpmath.mpf, as the arithmetic makes them
 
 DOMAIN_ERRORS = (ValueError, OverflowError, ZeroDivisionError)
 
@@ -29,7 +29,7 @@ class Arithmetic:
     name : str
         ``float64`` or ``mpmath``.
     digits : int or None
-        Decimal digits asked for; None for float64.
+        Decimal digits; None for float64.
     bits : int
         Of the significand.
     unit : Number

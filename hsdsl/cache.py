@@ -1,7 +1,7 @@
 """Files that can be made again, in the user's cache folder: private, checked when read, safe among processes.
 
 An entry is ``KIND/KEY/CHECKSUM.SUFFIX``: its name says what its content must hash to, so a damaged file is noticed and
-made again, and no other file has to be written together with it. Files are written beside and renamed.
+made again, and no other file has to be written together with it. Files are written under another name and renamed.
 
 Compiled code is loaded from here. So the folder, all in it and the file itself must belong to the user (or to root), be
 writable by nobody else and be no links, and a folder above may be writable by everybody only if it is sticky, as /tmp

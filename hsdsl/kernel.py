@@ -1,7 +1,7 @@
 """What a simulator may call: one mode's routines with parameters and input segment bound, and who binds them.
 
-Any engine's kernel fits here (generated Python over float or mpmath today), so a fault can be told to be the loop's or
-the code generator's by exchanging one of them.
+Any engine's kernel fits here (generated Python over float or mpmath today), so exchanging
+kernels tells a fault of the loop from one of the code generator.
 """
 
 from __future__ import annotations

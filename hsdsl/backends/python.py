@@ -113,7 +113,7 @@ class PythonKernel:
         return self._tapes[mode](data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
-        """Return the derivatives of a mode's flow by its states; compiled when they are first asked for."""
+        """Return the derivatives of a mode's flow by its states; compiled on first use."""
         program = self._program.modes[mode]
         if mode not in self._jacobians:
             text = program.jacobian.routines
@@ -146,7 +146,7 @@ PLAIN = ("flow", "surfaces", "magnitudes", "outputs")
 
 
 def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..., tuple[bool, ...]]:
-    """Make `and` of parts: one that is false decides, whatever another has no value for."""
+    """Make `and` of parts: one that is false decides, even if another has no value."""
     if len(parts) == 1:
         return parts[0]
 

@@ -71,7 +71,7 @@ class Language:
     zero : str
         The number.
     call, bad : str
-        What stands before the name of a recurrence; its last argument where it may have no value.
+        Prefix of the name of a recurrence; its last argument where it may have no value.
     least : callable
         The lesser of k and a number.
     """

@@ -45,10 +45,10 @@ class Ensemble:
     transitions : array of int
         How many were made.
     transition_times : array, shape (..., n)
-        Times of the first n transitions, if they were asked for; not-a-number where fewer were made.
+        Times of the first n transitions, for a positive n; not-a-number where fewer were made.
     sample_times : array, shape (..., n)
     samples : dict of array, shape (..., n)
-        States and outputs at these times by name, not-a-number beyond a run's end; empty where none were asked for.
+        States and outputs at these times by name, not-a-number beyond a run's end; empty without sample times.
     """
 
     model: str
@@ -115,5 +115,5 @@ class Ensemble:
             There is no such instance.
         """
         if len(index) != len(self.shape) or any(not -n <= i < n for i, n in zip(index, self.shape, strict=True)):
-            raise IndexError(f"an index of an ensemble of shape {self.shape} is wanted, not {index}")
+            raise IndexError(f"expected an index of an ensemble of shape {self.shape}, got {index}")
         return self.again(tuple(i % n for i, n in zip(index, self.shape, strict=True)))

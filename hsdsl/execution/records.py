@@ -36,7 +36,7 @@ class Deferred:
             return value
 
     def __dir__(self) -> list[str]:
-        """List the public names: fields, whether made yet or not, and what can be asked."""
+        """List the public names: fields, made or deferred, properties and methods."""
         own = {field.name for field in fields(self)}  # pyright: ignore[reportArgumentType]
         return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name != "deferred")
 

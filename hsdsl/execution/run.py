@@ -1,4 +1,4 @@
-"""The execution itself: the arrays a run filled, and the questions that can be asked of them."""
+"""The execution: columns that a run filled, with sampling, equality, display and saving."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Execution(Deferred):
     Attributes
     ----------
     overrides : dict
-        What the run was asked beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
+        The settings beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
         ``experiment.until``), each value as it was written.
     output_function : callable or None
         ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only: between rows
@@ -178,7 +178,7 @@ class Execution(Deferred):
         """
         one = self.sample(t, side)
         if len(one) != 1:
-            raise ValueError(f"one time is wanted, not {len(one)}: sample(times) takes many")
+            raise ValueError(f"expected one time, got {len(one)}; sample(times) takes many")
         state = {
             name: value
             for name, value, there in zip(one.states, one.state_columns[0].tolist(), one.present[0], strict=True)
@@ -233,7 +233,7 @@ class Execution(Deferred):
         """Save to ``.npz`` (everything, without loss), or to ``.csv`` or ``.parquet`` (a table, with a JSON
         sidecar).
 
-        Files are written beside their place and renamed, so that a failure leaves what was there.
+        Files are written under another name and renamed, so that a failure leaves what was there.
 
         Parameters
         ----------
@@ -241,8 +241,8 @@ class Execution(Deferred):
             The suffix says which.
         samples : times, optional
             For a table: rows at these times and both rows of each jump, instead of the rows the integrator
-            chose. Times outside the run are left out (a run may stop early). Left out: the samples the run was
-            asked for (:attr:`sample_times`).
+            chose. Times outside the run are left out (a run may stop early). Left out: the run's own
+            :attr:`sample_times`.
         columns : names, optional
             For a table: which states and outputs, in this order.
 
@@ -262,7 +262,7 @@ class Execution(Deferred):
 
     @property
     def sample_times(self) -> Array | None:
-        """The times the run was asked to be sampled at, in its ``samples`` setting; None for the integrator's rows."""
+        """The times in the run's ``samples`` setting; None for the integrator's rows."""
         asked = self.settings.get("samples")
         if isinstance(asked, int):
             until = self.settings["until"]

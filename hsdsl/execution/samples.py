@@ -33,7 +33,7 @@ class Samples(Deferred):
     state_columns, output_columns : array, shape (n, number of names)
         Values, NaN where the mode lacks the state (or does not define the output).
     present : array of bool, shape (n, number of states)
-        Whether the mode has the state, so that a state that *is* NaN can be told from one that is not there.
+        Whether the mode has the state, so that a state that *is* NaN differs from an absent one.
 
     ``samples["x"]`` is the column of a state or output, shape (n,); ``len(samples)`` is n.
     """
@@ -64,7 +64,7 @@ class Samples(Deferred):
         return self.states + self.outputs
 
     def only(self, columns: Sequence[str] | None) -> Samples:
-        """Keep only the states and outputs named, in the order named (states still stand before outputs).
+        """Keep only the states and outputs named, in the order named (states before outputs).
 
         Raises
         ------

@@ -19,7 +19,7 @@ Side = Literal["right", "left"]
 
 
 class Evaluated(Protocol):
-    """What a sampler finds at n times; all but the first may be made when it is asked for.
+    """What a sampler finds at n times; all but the first may be made on first use.
 
     Attributes
     ----------

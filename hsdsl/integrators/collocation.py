@@ -37,7 +37,7 @@ class Coefficients:
     mix, unmix : tuple of tuple of Number
         T, whose columns are an eigenvector to gamma and the parts of one to alpha + i beta, and its inverse.
     estimate : tuple of Number
-        Weights of the increments in the embedded method's defect, beside h times the flow at the step's start.
+        Weights of the increments in the embedded method's defect, added to h times the flow at the step's start.
     share : Number
         Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
     values, slope : tuple of Number

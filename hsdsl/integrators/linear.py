@@ -24,7 +24,7 @@ class Singular(ValueError):
 class Factors:
     """Factors of a matrix with permuted rows: below the diagonal L (its diagonal is 1), above it U.
 
-    On the diagonal stand the inverse pivots.
+    The diagonal has the inverse pivots.
     """
 
     rows: Matrix

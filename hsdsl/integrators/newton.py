@@ -78,10 +78,10 @@ class Convergence:
             if size == 0 or ahead <= enough:
                 self.left = left
                 return z
-            told = before is not None and count > 1 + late
-            for _ in range(count, MOST if told else count):
+            rated = before is not None and count > 1 + late
+            for _ in range(count, MOST if rated else count):
                 ahead = ahead * self.rate
-            if count == MOST or (told and ahead > enough and size > noise):
+            if count == MOST or (rated and ahead > enough and size > noise):
                 break
             before = size
         self.rate, self.left, self.aged = one, one, True

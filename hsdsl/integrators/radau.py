@@ -55,7 +55,7 @@ class Steps:
     Attributes
     ----------
     derived, factorings, iterations : int
-        How often derivatives were asked for and matrices were factored, and how many iterations there were.
+        Numbers of evaluations of the derivatives, of factorings, and of iterations.
     """
 
     def __init__(
@@ -181,8 +181,8 @@ class Steps:
         u, v, w = (_weighted(row, z) for row in known.unmix)
         while True:
             self.iterations += 1
-            wanted = [flow(t + c * h, *_sum(x, k)) for c, k in zip(known.nodes, z, strict=True)]
-            f, g, k = (_weighted(row, wanted) for row in known.unmix)
+            slopes = [flow(t + c * h, *_sum(x, k)) for c, k in zip(known.nodes, z, strict=True)]
+            f, g, k = (_weighted(row, slopes) for row in known.unmix)
             du = real.solve([h * a - known.gamma * b for a, b in zip(f, u, strict=True)])
             dv, dw = turning.solve(
                 [h * a - (known.alpha * b + known.beta * c) for a, b, c in zip(g, v, w, strict=True)],

@@ -32,7 +32,7 @@ class Stepper:
         the flow at the step's end is not evaluated.
     piece : callable
         ``piece(flow, t, h, x, z, stages, slope, end) -> (c_1, ...)`` with ``end = flow(t + h, *z)``: the interpolant.
-        The flow is asked only where the dense output has stages of its own.
+        The flow is evaluated only where the dense output has stages of its own.
     error : callable or None
         ``error(h, stages, end)``: the embedded method's estimate of the local error, for adaptive methods.
     gain : float

@@ -45,7 +45,7 @@ class ButcherTableau:
     embedded : Vector or None
         Weights of the embedded method; with it the method is adaptive.
     embedded_order : int
-        Order of the embedded method, checked; 0 stands for ``order - 1``.
+        Order of the embedded method, checked; 0 means ``order - 1``.
     coarse : Vector or None
         Weights of a second embedded method, two orders below the first. With e and c the differences of the two to the
         method, the error estimate is then e**2 / sqrt(e**2 + c**2 / 100), of order ``order``.
@@ -54,7 +54,7 @@ class ButcherTableau:
     dense_order : int
         Order of the dense output, checked.
     extra : tuple of Vector
-        Further rows of a, for stages that the dense output alone uses. Before them stands the flow at the step's end,
+        Further rows of a, for stages that the dense output alone uses. Before them is the flow at the step's end,
         so the first has one entry more than there are stages.
     digits : int or None
         Decimal digits to which the conditions hold; None for exact fractions.
@@ -102,8 +102,8 @@ class ButcherTableau:
         for size in range(1, order + 1):
             for tree in trees(size):
                 for m, row in enumerate(rows, 1):
-                    wanted = Fraction(1, density(tree)) if len(powers) == 1 or m == size else Fraction(0)
-                    if not weights.satisfy(row, tree, wanted):
+                    expected = Fraction(1, density(tree)) if len(powers) == 1 or m == size else Fraction(0)
+                    if not weights.satisfy(row, tree, expected):
                         raise ValueError(f"{self.name}: {what} fails the order condition of tree {tree}")
 
     kind: ClassVar[Literal["table"]] = "table"
@@ -116,7 +116,7 @@ class ButcherTableau:
 
     @property
     def rows(self) -> tuple[Vector, ...]:
-        """All rows of a: of the stages, and behind them of what the dense output evaluates besides."""
+        """All rows of a: of the stages, then of the dense output."""
         return (*self.a, self.b, *self.extra) if self.extra else self.a
 
     @property
@@ -151,7 +151,7 @@ class ButcherTableau:
 
     @property
     def interpolant(self) -> Literal["secant", "hermite", "dense"]:
-        """What stands between the samples: no curve may be of lower order than the method's global error."""
+        """The curve between the samples: none may be of lower order than the method's global error."""
         if self.dense is not None:
             return "dense"
         return "hermite" if self.order > 2 else "secant"
@@ -165,17 +165,17 @@ class ButcherTableau:
 
 
 class _Weights:
-    """The elementary weights of rooted trees, in fractions or in decimals of more digits than are asked for."""
+    """The elementary weights of rooted trees, in fractions or in decimals with guard digits."""
 
     def __init__(self, rows: tuple[Vector, ...], digits: int | None) -> None:
         self._digits = digits
         self._rows = tuple(self.numbers(row) for row in rows)
         self._known: dict[Tree, tuple[Any, ...]] = {}
 
-    def satisfy(self, row: tuple[Any, ...], tree: Tree, wanted: Fraction) -> bool:
-        """Whether sum_i row_i g_i(tree) is what is wanted."""
+    def satisfy(self, row: tuple[Any, ...], tree: Tree, expected: Fraction) -> bool:
+        """Whether sum_i row_i g_i(tree) is the expected number."""
         total = sum((w * g for w, g in zip(row, self._of(tree), strict=False)), self._number(Fraction(0)))
-        off = abs(total - self._number(wanted))
+        off = abs(total - self._number(expected))
         return off == 0 if self._digits is None else off <= Decimal(10) ** -self._digits
 
     def _of(self, tree: Tree) -> tuple[Any, ...]:

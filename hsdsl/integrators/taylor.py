@@ -53,8 +53,8 @@ class TaylorMethod:
     def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> TaylorMethod:
         """Choose the order; without a tolerance that of round-off.
 
-        The order with the least work in coefficients alone is 1 - log(tolerance)/2 (Jorba and Zou, 3.2). What a step
-        costs besides makes longer steps of a slightly higher order cheaper.
+        The order with the least work in coefficients alone is 1 - log(tolerance)/2 (Jorba and Zou, 3.2). The other
+        costs of a step make longer steps of a slightly higher order cheaper.
         """
         smallest = max(arithmetic.unit, tolerance or 0)
         order = ceil(1 + FURTHER - arithmetic.functions["log"](smallest) / 2)
@@ -141,7 +141,7 @@ def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, a
 
 
 def _from_zero(c: State, tolerance: Number, arithmetic: Arithmetic) -> Iterator[Number]:
-    """The steps at which the first terms that are left out stay below the tolerance beside the first that is not 0."""
+    """The steps that keep the terms left out below the tolerance, relative to the first that is not 0."""
     last = len(c) - 1
     first = next((k for k in range(last - 1) if c[k] != 0), last)
     for k in (last - 1, last):

@@ -24,7 +24,7 @@ FLAGS = (
     "-std=c99",
     "-finline-small-functions",  # with -O1 as fast as -O2 for half the time that it takes to compile
     "-fstrict-aliasing",
-    "-Wno-ignored-optimization-argument",  # clang does so unasked
+    "-Wno-ignored-optimization-argument",  # clang does so by default
     "-ffp-contract=off",  # no a*b + c in one rounding
     "-fno-math-errno",
     *(f"-fno-builtin-{name}" for name in (*EXACT, "exp", "log", "pow", "atan2")),  # those of the library, as Python's

@@ -103,7 +103,7 @@ class CompiledModel:
         return structures.array_at(structures.Mode, self.table.mode, self.table.modes)[number]
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """Return what runs of this model share under a key, made when it is first asked for."""
+        """Return what runs of this model share under a key, made on first use."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
 
 

@@ -22,7 +22,7 @@ KIND = "compiled"
 def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
     """Load the library that ``source`` compiles to and that has ``symbol``.
 
-    ``content`` stands for the source in the cache, so it need not be written.
+    ``content`` is the source's name in the cache; the source is written only where it must be compiled.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -
 
 
 def is_kept(content: str, effort: Effort) -> bool:
-    """Whether the library that ``content`` stands for was compiled before.
+    """Whether the library of ``content`` was compiled before.
 
     Raises
     ------

@@ -66,7 +66,7 @@ def _butcher_table(table: ButcherTableau) -> Any:
     """Write a tableau: numbers instead of fractions, rows without their zeros."""
     stages = table.stages - table.last_is_next
     end: tuple[Fraction, ...] = ()
-    rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end stands between them
+    rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end is between them
     dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
     return structures.Method(
         kind=structures.METHOD_KINDS.index(table.kind),

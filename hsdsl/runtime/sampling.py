@@ -104,7 +104,7 @@ class Sampler:
         return table
 
     def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
-        """Evaluate the states named, and the outputs if they are wanted.
+        """Evaluate the states named, and the outputs where ``outputs`` is true.
 
         Parameters
         ----------

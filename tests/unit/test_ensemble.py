@@ -153,7 +153,7 @@ def test_what_cannot_be_served_is_refused():
     ):
         with pytest.raises(UsageError, match=sentence):
             oscillator.ensemble(**arguments)
-    with pytest.raises(IndexError, match="an index of an ensemble of shape"):
+    with pytest.raises(IndexError, match="expected an index of an ensemble of shape"):
         oscillator.ensemble(parameters={"c": [0.5, 0.6]}, **FAST).run(2)
 
 

@@ -75,7 +75,7 @@ def flow_lines(tape: Tape, dimension: int) -> str:
 
 
 def surface_lines(tape: Tape, dimension: int) -> str:
-    """Write the function of the lines behind them, that surfaces need besides."""
+    """Write the function of the further lines, which surfaces need."""
     first = dimension + 1
     own = range(first + tape.needed, first + len(tape.operations))
 

@@ -113,7 +113,7 @@ class _Writer:
         return f"{{{', '.join(fields)}}}"
 
     def jacobian(self, jacobian: Jacobian, size: int) -> str:
-        """Write the derivatives of a flow: the routine of those that are not zero, and where they stand among zeros."""
+        """Write the derivatives of a flow: the routine of those that are not zero, and their places among zeros."""
         routine = self.routines(jacobian.routines)["jacobian"]
         count = len(jacobian.places)
         if count == size:
@@ -165,7 +165,7 @@ class _Writer:
         return {name: self.function(text) for name, text in _DEFINITION.findall(routines.source)}
 
     def shared(self, kind: str, text: str) -> str:
-        """Write a function whose name stands in its text as ``NAME``; equal texts are one function."""
+        """Write a function whose name is ``NAME`` in its text; equal texts are one function."""
         if text not in self.functions:
             self._names[text] = f"{kind}_{len(self.functions)}"
             self.functions[text] = text.replace("NAME", self._names[text])

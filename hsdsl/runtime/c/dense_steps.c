@@ -8,7 +8,7 @@
 #define LAST_TERM 4
 #define TERM_BEFORE 32
 
-/* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter one beside the one made. */
+/* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter step. */
 static void aside(hs_run *run, double **end) {
   double **const kept = run->k;
   run->k = run->other_k;
@@ -196,7 +196,7 @@ static int meets_middle(hs_run *run, const double *c, int n, int k, double noise
 }
 
 /* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step.
-   One of a surface that is linear in the states need not run out: it is told by giving the surface to round-off. */
+   One of a surface that is linear in the states need not run out: it is known by giving the surface to round-off. */
 static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
   const double given = run->control.tolerance, end = run->ends[k];
   const double tolerance = given > 0 ? hs_max(given, HS_UNIT) : UNKNOWN_TOLERANCE;
@@ -276,7 +276,7 @@ HS_INLINE hs_step_failure next_series(hs_run *run, const int n, double limit) {
   return HS_NOT_FINITE;
 }
 
-/* Make one step that the error allows, not beyond `limit`; or say what stands in the way. */
+/* Make one step that the error allows, not beyond `limit`; or return what is in the way. */
 HS_INLINE hs_step_failure next_span(hs_run *run, const int n, double limit) {
   return run->method->kind == HS_TAYLOR ? next_series(run, n, limit) : next_table(run, n, limit);
 }

@@ -11,8 +11,8 @@
 
 enum { RAISED = -1 };
 enum { GOES_ON = -1 }; /* instead of a reason to stop */
-enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, beside GOES_ON and reasons to stop */
-enum { WITHOUT_VALUE = -4 }; /* something has none along a step; beside GOES_ON, LANDED and reasons to stop */
+enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, else GOES_ON or a reason to stop */
+enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or a reason to stop */
 
 #define MOST_HALVINGS 122 /* 16 - 2 log2(u) */
 #define CREEPING 10

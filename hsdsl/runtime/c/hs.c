@@ -62,7 +62,7 @@ static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
 
 static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
   double **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
-  double **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->wanted, radau->right};
+  double **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
   for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, (int64_t)w * w);
   for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
   radau->largest = numbers(store, w);
@@ -130,7 +130,7 @@ static hs_span lay_out_span(const hs_run *run, hs_store *store) {
   return span;
 }
 
-/* The same for what the located scheme needs besides. */
+/* The same for the arrays of the located scheme. */
 static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
   const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;

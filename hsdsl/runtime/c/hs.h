@@ -22,7 +22,7 @@ typedef int hs_routine(const double *p, double t, const double *x, double *out);
 #define HS_MOST_ORDER 30 /* round-off is below the terms of any order that is higher */
 typedef int hs_series(const double *p, int order, double t, const double *x, double *lines);
 
-/* The same of the lines behind them, which surfaces need besides: coefficients 0 to order. */
+/* The same of the further lines, which surfaces need: coefficients 0 to order. */
 typedef int hs_surface_series(const double *p, int order, double *lines);
 
 typedef struct {

@@ -1,6 +1,6 @@
 /* What a caller gives to have many instances of one model run, and what it gets: plain data, the caller's own memory.
 
-   `task` must come first. Its memory serves every instance; nothing is kept of a run but what stands below. */
+   `task` must come first. Its memory serves every instance; of each run only the results below are kept. */
 
 #ifndef HS_ENSEMBLE_H
 #define HS_ENSEMBLE_H

@@ -10,8 +10,8 @@ typedef struct {
   const hs_timeline *timeline;
   int64_t rows, arcs, samples;
   int32_t width, degree; /* of values and pieces; pieces of degree 0 are the straight lines between rows */
-  int32_t outputs;       /* 0 where none are asked for */
-  int32_t columns;       /* states asked for */
+  int32_t outputs;       /* 0 for none */
+  int32_t columns;       /* states to evaluate */
   int32_t left;          /* at a jump take the first value, not the last */
   const double *times, *values, *recorded, *pieces; /* by row; a row's piece leaves it */
   const hs_arc *arc;

@@ -1,7 +1,7 @@
 /* What a caller gives a run and what it gets: plain data, all of it the caller's own memory.
 
-   A run writes rows, arcs and transitions into the chunk it was given. When one of them is full the caller is asked to
-   `flush`: to keep what is there and to make room. Row k's piece is the interpolant that leads to it. */
+   A run writes rows, arcs and transitions into the chunk it was given. When one of them is full, `flush`
+   has the caller keep its content and make room. Row k's piece is the interpolant that leads to it. */
 
 #ifndef HS_SIMULATE_H
 #define HS_SIMULATE_H
@@ -30,7 +30,7 @@ typedef struct {
   double share, value[3], slope[3];
 } hs_collocation;
 
-/* Only tables have what stands between `degree` and `collocation`, which is that of Radau IIA. */
+/* Fields between `degree` and `collocation` are those of tables; `collocation` is that of Radau IIA. */
 typedef struct {
   int kind;
   int stages; /* to evaluate in a step */
@@ -196,7 +196,7 @@ typedef struct hs_task {
   hs_chunk chunk;
   hs_visited visited;
   int (*flush)(struct hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
-  int (*poll)(struct hs_task *);                       /* asked now and then: not 0 to stop */
+  int (*poll)(struct hs_task *);                       /* called now and then: not 0 to stop */
   int (*grow)(struct hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
   double now;                                   /* to be looked at while it runs */
   int64_t made;

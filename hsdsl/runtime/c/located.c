@@ -144,7 +144,7 @@ static int first_event(hs_run *run) {
   return LANDED;
 }
 
-/* No step is short enough: take a guard that the state stands on, or stop and say why. */
+/* No step is short enough: take a guard on which the state is, or stop with the reason. */
 static int located_stuck(hs_run *run, hs_step_failure kind) {
   const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
@@ -291,7 +291,7 @@ static int located_at_boundary(hs_run *run) {
   return jump(run);
 }
 
-/* Follow the execution from where the run stands until it stops. */
+/* Follow the execution until it stops. */
 static void located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
     if (interrupted(run))

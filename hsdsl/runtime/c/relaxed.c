@@ -40,7 +40,7 @@ static void sizes(hs_run *run, const double *x, const double *z) {
   }
 }
 
-/* Guards that the state stands on, to round-off or a tie relative to the time passed, as crossings. */
+/* Guards on which the state is, to round-off or a tie relative to the time passed, as crossings. */
 static int standing_on(hs_run *run) {
   int count = 0;
   standing(run, run->here.t, run->x, HS_TIE * run->here.t, run->tied);
@@ -85,7 +85,7 @@ static void poll(hs_run *run) {
   if (run->task->poll(run->task)) run->interrupted = 1;
 }
 
-/* Whether to stop: the caller is asked now and then. */
+/* Whether to stop: polls the caller now and then. */
 static int interrupted(hs_run *run) {
   if (--run->steps_to_poll == 0) poll(run);
   return run->interrupted;
@@ -227,7 +227,7 @@ static int at_boundary(hs_run *run) {
   return in_strip(run, HS_UNTIL_ON_GUARD, t);
 }
 
-/* Follow the relaxed execution from where the run stands until it stops. */
+/* Follow the relaxed execution until it stops. */
 static void relaxed(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
     outcome = run->interrupted ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : flow(run);

@@ -34,7 +34,7 @@ typedef struct {
   hs_polynomial piece; /* of degree 0 where the crossing is the step's start */
 } hs_crossing;
 
-/* Where a run stands, ready to flow. */
+/* The mode that a run is in, and the point there. */
 typedef struct {
   int mode, dimension;
   const hs_mode *table;
@@ -49,7 +49,7 @@ typedef struct {
 /* One step as tried, from (t, x) to (t1, z). */
 typedef struct {
   double t, h, t1;
-  int looked, ends; /* whether the flow at the end has been asked for, and has a value */
+  int looked, ends; /* whether the flow at the end was evaluated, and has a value */
   int has_piece;
   hs_polynomial piece;
 } hs_trial;
@@ -89,7 +89,7 @@ typedef struct {
   int *order, *turned;             /* the order of their rows */
   double *z[3], *last[3];          /* increments: as they are now, and of the last step */
   double *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
-  double *wanted[3], *right[3];
+  double *slopes[3], *right[3];
   double *largest, *error;
   const double *scales; /* of the states, as the last step was solved with them */
   double *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */

@@ -12,7 +12,7 @@
 #endif
 
 enum { STEPS_BEFORE_SEARCH = 8, BLOCK = 16 };
-/* A row's piece, and where its arc's states are among the columns asked for. */
+/* A row's piece, and which of its arc's states the columns are. */
 typedef struct {
   int64_t row, arc;
   double begin, end;

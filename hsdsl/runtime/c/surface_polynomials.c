@@ -64,14 +64,14 @@ static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
 }
 
 /* How far a polynomial is off the values it should have at some points. */
-static double residual(const double *c, const hs_interpolation *by, const double *wanted, int every) {
-  double worst = fabs(value_of(c, by->degree, by->tests[0]) - wanted[0]);
+static double residual(const double *c, const hs_interpolation *by, const double *values, int every) {
+  double worst = fabs(value_of(c, by->degree, by->tests[0]) - values[0]);
   for (int i = 1; i < HS_TESTS; i++)
-    worst = hs_max(worst, fabs(value_of(c, by->degree, by->tests[i]) - wanted[i * every]));
+    worst = hs_max(worst, fabs(value_of(c, by->degree, by->tests[i]) - values[i * every]));
   return worst;
 }
 
-/* Whether a residual of function k is small enough; what is allowed beyond that is asked where it matters. */
+/* Whether a residual of function k is small enough; `allowed` is evaluated only where that decides. */
 static int settles(hs_run *run, double off, double enough, hs_allowed *allowed, int k, int *answer) {
   double more;
   *answer = off <= enough;

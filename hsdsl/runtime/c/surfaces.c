@@ -276,7 +276,7 @@ static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, doub
   return 0;
 }
 
-/* How close to zero a crossing of this step can be told: round-off of its own numbers, no older ones. */
+/* The round-off of surface k over this step, from the step's own numbers. */
 static int smallest(hs_run *run, int k, double *small) {
   double *const sizes = run->at;
   for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
