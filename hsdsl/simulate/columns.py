@@ -14,6 +14,7 @@ from hsdsl.runtime import structures
 
 NUMBER = 8  # bytes
 RECORDS = {"arc": structures.ARC, "transition": structures.TRANSITION, "note": structures.NOTE}
+RECORD_NUMBERS = {name: record.itemsize // 8 for name, record in RECORDS.items()}  # as long as so many numbers
 ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
@@ -100,7 +101,10 @@ class Packed:
         by_row = 2 + shape.outputs + shape.width * (1 + shape.degree)
         self._counts, self._shape = counts, shape
         self._memory = np.empty(
-            rows * by_row + 3 * arcs + transitions * (4 + 2 * shape.width) + 5 * notes + (alternatives + 1) // 2
+            rows * by_row
+            + transitions * 2 * shape.width
+            + sum(RECORD_NUMBERS[name] * count for name, count in zip(RECORDS, (arcs, transitions, notes), strict=True))
+            + (alternatives + 1) // 2
         )
         self._start = self._memory.ctypes.data
         self._width = pack(self._start)
@@ -110,7 +114,8 @@ class Packed:
         """How many numbers each column takes, in the order of `ORDER`."""
         (n, arcs, k, notes, alternatives), w, there = self._counts, self._width, self._shape.width
         by_row = n, n * w, n * self._shape.outputs, n, n * self._shape.degree * w
-        return (*by_row, 3 * arcs, 4 * k, k * there, k * there, 5 * notes, (alternatives + 1) // 2)
+        arc, transition, note = (RECORD_NUMBERS[name] for name in RECORDS)
+        return (*by_row, arc * arcs, transition * k, k * there, k * there, note * notes, (alternatives + 1) // 2)
 
     def __getitem__(self, name: str) -> Array:
         place = ORDER.index(name)

@@ -62,9 +62,9 @@ class CompiledPlan:
     def lay(self, workspace: Workspace) -> None:
         """Put everything on a workspace, unless it lies there from the run before."""
         workspace.clear(0 if workspace.chunks.sink else self._rows, self.memory)
-        if workspace.laid is self:
+        if workspace.plan is self:
             return
-        task, workspace.laid = workspace.task, self
+        task, workspace.plan = workspace.task, self
         task.timeline, task.settings = self.timeline, self._settings
         task.interpolation = self._interpolation
         task.mode, (task.dimension, task.x) = self._mode, self._start

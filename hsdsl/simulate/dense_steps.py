@@ -65,7 +65,7 @@ def stepping(run: Run, here: ModeState) -> Stepping:
     """Choose by the method."""
     method = run.settings.method
     if method is not None and method.kind == "taylor":
-        series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
+        series = run.kernel.taylor(here.index, here.segment.data)
         assert series is not None
         return SeriesSteps(run, here, method, series, run.stepper(here))
     return TableSteps(run, here, run.stepper(here))
@@ -195,7 +195,7 @@ class SeriesSteps:
         except DOMAIN_ERRORS:
             return NOT_FINITE
         stages = tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
-        h = run.control.within_reach(mode, self._longest(stages, x))
+        h = run.control.within_reach(mode, self._longest(stages))
         for _ in range(most_halvings(run)):
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             if not t1 > t:
@@ -209,7 +209,7 @@ class SeriesSteps:
             h = h / 2
         return NOT_FINITE
 
-    def _longest(self, stages: Stages, x: State) -> Number:
+    def _longest(self, stages: Stages) -> Number:
         control = self.run.control
         if control.tolerance is None:
             return control.h

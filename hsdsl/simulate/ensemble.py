@@ -85,7 +85,7 @@ class CompiledEnsemble:
         """Let every thread end as soon as it can."""
         self._stop[0] = 1
 
-    def work(self, first: int, last: int, place: Place) -> None:
+    def work(self, first: int, last: int, place: ThreadWorkspace) -> None:
         """Run the instances from ``first`` up to ``last``."""
         table, kept = place.table, self._kept
         table.done, table.instances = 0, last - first
@@ -105,12 +105,12 @@ class CompiledEnsemble:
         known = np.array([*(ENDED.get(reason, reason) for reason in structures.REASONS), "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
 
-    def place(self) -> Place:
+    def place(self) -> ThreadWorkspace:
         """Make a place to work at."""
-        return Place(self._plan, self._names, self._layouts, self._time.shape[1])
+        return ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1])
 
 
-class Place:
+class ThreadWorkspace:
     """One thread's memory."""
 
     def __init__(

@@ -35,7 +35,7 @@ def located(run: Run, here: ModeState | Stop) -> Stop:
     while not isinstance(here, Stop):
         outcome = flow(run, here) if here.t < here.segment.end else here
         if isinstance(outcome, Event):
-            here = jump(run, here, outcome)
+            here = make_transition(run, here, outcome)
         elif isinstance(outcome, ModeState) and not outcome.t < outcome.segment.end:
             here = at_boundary(run, outcome)
         else:
@@ -54,7 +54,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     run.diagnostics.at_rest(here.mode.edges[edge].name, here.t, here.arc.times[-1])
     if not isinstance(outcome, ModeState) or not until < here.segment.end:
         return outcome
-    mode, surfaces = run.program.modes.index(here.mode), here.surfaces
+    mode, surfaces = here.index, here.surfaces
     return run.place(mode, here.mode.states, until, here.x, surfaces.scale, active=surfaces.active)
 
 
@@ -167,19 +167,19 @@ def bracketed(residual: Callable[[Number], Number], s: Number, here: ModeState) 
     return s
 
 
-def jump(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
+def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
-    crossing, until = landing.crossing, run.settings.until
+    crossing, until = event.crossing, run.settings.until
     t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
     if stop := run.limit_reached(t):
         return stop
-    outcome, resumed = reset(here, crossing, landing.scale, run), t
+    outcome, resumed = reset(here, crossing, event.scale, run), t
     if crowded(run, t):
         run.diagnostics.crowded(FREE, t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
-            run.record(here, crossing, None, None, landing.alternatives)
+            run.record(here, crossing, None, None, event.alternatives)
             return reached_in_strip(until, edge.name)
         resumed = min(resumed, until)
     if isinstance(outcome, Stop):
@@ -187,8 +187,8 @@ def jump(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
     if resumed > t:
         run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
     after, scale = outcome
-    since = run.tie(t) if landing.alternatives or same_instant(run, t) else run.arithmetic.zero
-    run.record(here, crossing, resumed, after, landing.alternatives)
+    since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
+    run.record(here, crossing, resumed, after, event.alternatives)
     waited = t if resumed > t else None
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since, reset_at=waited)
     if isinstance(entered, Stop):
@@ -219,11 +219,12 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
-    standing = standing_on(run, here.resting(rests(run, here)))
+    here = here.resting(rests(run, here))
+    standing = standing_on(run, here)
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)
-    return jump(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
+    return make_transition(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
 
 
 def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:

@@ -26,8 +26,6 @@ from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Crossing
 
-Force = Callable[[Number], Number]
-
 
 @dataclass(frozen=True)
 class Path:
@@ -83,7 +81,7 @@ def routines_of(run: Run, here: ModeState) -> Callable[[Number], ModeKernel]:
     """Make the function that gives the mode's routines bound to the input segment of a time."""
     if len(run.timeline.segments) == 1:
         return lambda t: here.kernel
-    mode = run.program.modes.index(here.mode)
+    mode = here.index
     bound: dict[Number, ModeKernel] = {}
 
     def routines(t: Number) -> ModeKernel:

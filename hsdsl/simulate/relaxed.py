@@ -127,8 +127,8 @@ def attempts(run: Run, here: ModeState, method: Stepper) -> Attempt:
                 return NOT_FINITE, z, stages, None
             trial = Trial(t, h, t1, x, slope, z, stages, flow, method)
             found = here.surfaces.judge(trial, values, epsilon)
-            if found or trial.end is not None:  # beyond a guard the flow need not have a value, inside it must
-                return found, z, stages, trial.end
+            if found or trial.end_slope is not None:  # beyond a guard the flow need not have a value, inside it must
+                return found, z, stages, trial.end_slope
         except NoConvergence:
             return UNSOLVED, x, (), None
         except DOMAIN_ERRORS:
@@ -145,28 +145,28 @@ def assess(here: ModeState, found: Found, ratio: Number, trial: Trial) -> Found:
     return found or here.surfaces.excursion(trial) or ()
 
 
-def through_strip(run: Run, here: ModeState, landing: Event) -> ModeState | Stop:
+def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     """Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14)."""
-    crossing, epsilon, until = landing.crossing, run.settings.relaxation, run.settings.until
+    crossing, epsilon, until = event.crossing, run.settings.relaxation, run.settings.until
     t, q, depth = crossing.time, crossing.state, crossing.depth
     if crossing.theta > 0:
         here.arc.append(t, q, crossing.piece)
     if stop := run.limit_reached(t):
         return stop
-    outcome = reset(here, crossing, landing.scale, run)
-    resumed = landing.t1 + (epsilon - depth)
+    outcome = reset(here, crossing, event.scale, run)
+    resumed = event.t1 + (epsilon - depth)
     edge = here.mode.edges[crossing.edge]
     if resumed > until + run.tie(until):
-        depth_at_end = depth + (until - landing.t1)
-        run.wait(here, [(t, depth * 0), (landing.t1, depth), (until, depth_at_end)], q)
-        run.record(here, crossing, None, None, landing.alternatives)
+        depth_at_end = depth + (until - event.t1)
+        run.wait(here, [(t, depth * 0), (event.t1, depth), (until, depth_at_end)], q)
+        run.record(here, crossing, None, None, event.alternatives)
         return reached_in_strip(until, edge.name)
     if isinstance(outcome, Stop):
         return outcome
     resumed = min(resumed, until)
-    run.wait(here, [(t, depth * 0), (landing.t1, depth), (resumed, epsilon)], q)
+    run.wait(here, [(t, depth * 0), (event.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
-    run.record(here, crossing, resumed, after, landing.alternatives)
+    run.record(here, crossing, resumed, after, event.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
     if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
         return slides(edge.name, here.mode.name, entered.mode.name, entered.t)
@@ -202,7 +202,7 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
 
 def go_on(run: Run, here: ModeState) -> ModeState | Stop:
     """Enter the next segment of the inputs: anew where one of them jumps."""
-    t, x, mode, surfaces = here.t, here.x, run.program.modes.index(here.mode), here.surfaces
+    t, x, mode, surfaces = here.t, here.x, here.index, here.surfaces
     if run.timeline.at(t).jump:
         try:
             inside = surfaces.inside(t, x)

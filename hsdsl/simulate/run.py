@@ -23,11 +23,9 @@ from hsdsl.simulate.surfaces import Crossing, Surfaces
 
 @dataclass(frozen=True)
 class ModeState:
-    """Mode, input segment, time and state of a run, ready to flow.
+    """Mode and its number, input segment, time and state of a run, ready to flow."""
 
-    ``scale`` is the size of the numbers each state was computed from when the mode was entered.
-    """
-
+    index: int
     mode: ModeProgram
     kernel: ModeKernel
     surfaces: Surfaces
@@ -38,7 +36,7 @@ class ModeState:
 
     def moved(self, t: Number, x: State) -> ModeState:
         """Return the same place in the mode's life, later."""
-        return ModeState(self.mode, self.kernel, self.surfaces, self.segment, self.arc, t, x)
+        return replace(self, t=t, x=x)
 
     def resting(self, edge: int | None) -> ModeState:
         """Return the same place as one at rest on the guard of an edge."""
@@ -60,7 +58,7 @@ class Run(Problem):
         assert method is not None
         if method.kind == "table":
             return stepper(method, len(here.x), self.arithmetic)
-        mode = self.program.modes.index(here.mode)
+        mode = here.index
         if method.kind == "radau":
             from hsdsl.integrators.radau import radau_stepper
 
@@ -92,11 +90,11 @@ class Run(Problem):
             outputs = before.kernel.outputs
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
         surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
-        return ModeState(program, kernel, surfaces, segment, arc, t, x)
+        return ModeState(mode, program, kernel, surfaces, segment, arc, t, x)
 
     def wait(self, here: ModeState, rows: list[tuple[Number, Number]], q: State) -> None:
         """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""
-        mode = self.program.modes.index(here.mode)
+        mode = here.index
 
         def outputs(t: Number, *x: Number) -> State:
             return self.kernel.bind(mode, self.timeline.at(t).data).outputs(t, *x)
@@ -105,7 +103,7 @@ class Run(Problem):
 
     def returns(self, here: ModeState, made: Crossing, entered: ModeState) -> bool:
         """Whether a transition from an arc without any flow led back to where its cascade has been."""
-        return self.cascade.returns(made.time > here.arc.times[0], self.program.modes.index(entered.mode), entered.x)
+        return self.cascade.returns(made.time > here.arc.times[0], entered.index, entered.x)
 
     def limit_reached(self, t: Number) -> Stop | None:
         """Stop where one more transition would exceed what the run may make."""

@@ -22,10 +22,10 @@ NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is look
 
 @dataclass(frozen=True)
 class Standstill:
-    """A place of a run: mode, input segment, time t, state x and its scales; h is the step to try next."""
+    """A place of a run: number of the mode, input segment, time t, state x and its scales; h is the next step."""
 
     problem: Problem
-    mode: int
+    index: int
     segment: Segment
     t: Number
     x: State
@@ -33,13 +33,13 @@ class Standstill:
     h: Number
 
     @property
-    def program(self) -> ModeProgram:
+    def mode(self) -> ModeProgram:
         """The mode."""
-        return self.problem.program.modes[self.mode]
+        return self.problem.program.modes[self.index]
 
     def not_finite(self, places: Iterable[tuple[Number, State]]) -> Stop:
         """Stop and name the first expression without a finite value at one of ``places``."""
-        t, name, unit = self.t, self.program.name, self.problem.arithmetic.unit
+        t, name, unit = self.t, self.mode.name, self.problem.arithmetic.unit
         for place in places:
             if found := self._without_value(*place):
                 return Stop("not_finite", t, found)
@@ -54,9 +54,9 @@ class Standstill:
 
     def stuck(self, failure: StepFailure, slope: State) -> Stop:
         """Stop where no step is short enough, and say why; ``slope`` is the flow here."""
-        t, x, h, name = self.t, self.x, self.h, self.program.name
+        t, x, h, name = self.t, self.x, self.h, self.mode.name
         if failure.kind == "wall" and failure.surface is not None:
-            return left_domain(self.program, failure.surface, t, LEFT)
+            return left_domain(self.mode, failure.surface, t, LEFT)
         instant = self.problem.arithmetic.sqrt(self.problem.arithmetic.unit) * t
         faster_than_time = any(0 < s < instant * abs(f) for s, f in zip(self.scales, slope, strict=True))
         if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and faster_than_time):
@@ -79,7 +79,7 @@ class Standstill:
 
     def _without_value(self, t: Number, x: State) -> str | None:
         """Name the first expression without a finite value at a place."""
-        for name, routine in self.problem.kernel.expressions(self.mode, self.segment.data):
+        for name, routine in self.problem.kernel.expressions(self.index, self.segment.data):
             try:
                 finite = all(map(self.problem.arithmetic.isfinite, routine(t, *x)))
             except DOMAIN_ERRORS:
@@ -101,10 +101,10 @@ class Standstill:
 
     def _jump_near(self, slope: State) -> str | None:
         """Name a component of the flow that jumps a few steps ahead or behind, and the place."""
-        flow = self.problem.kernel.bind(self.mode, self.segment.data).flow
+        flow = self.problem.kernel.bind(self.index, self.segment.data).flow
         for step in (way * self.h * 2**n for n in range(-NEAR, NEAR + 1) for way in (1, -1)):
             t1, z = self.t + step, tuple(a + step * f for a, f in zip(self.x, slope, strict=True))
-            for k, (state, text) in enumerate(zip(self.program.states, self.program.flow_texts, strict=True)):
+            for k, (state, text) in enumerate(zip(self.mode.states, self.mode.flow_texts, strict=True)):
                 if jump := jump_between(flow, k, self.t, self.x, t1, z):
                     point, before, behind = jump
                     values = f"from {show(before)} to {show(behind)}"
@@ -114,7 +114,7 @@ class Standstill:
     def _has_no_series(self) -> bool:
         """Whether the method is Taylor's and cannot expand the flow here."""
         method = self.problem.settings.method
-        series = self.problem.kernel.taylor(self.mode, self.segment.data)
+        series = self.problem.kernel.taylor(self.index, self.segment.data)
         if method is None or not method.is_series or series is None:
             return False
         try:
@@ -129,21 +129,20 @@ class Standstill:
         if method is None or not method.implicit:
             return False
         try:
-            slopes = self.problem.kernel.jacobian(self.mode, self.segment.data)(self.t, *self.x)
+            slopes = self.problem.kernel.jacobian(self.index, self.segment.data)(self.t, *self.x)
         except DOMAIN_ERRORS:
             return True
         return not all(map(self.problem.arithmetic.isfinite, slopes))
 
     def _largest(self) -> str:
-        sized = zip(self.x, self.program.states, self.program.flow_texts, strict=True)
+        sized = zip(self.x, self.mode.states, self.mode.flow_texts, strict=True)
         value, state, text = max(sized, key=lambda entry: abs(entry[0]))
         return f"{state}, whose flow is {text} and whose value is {show(value)},"
 
     def _state(self, x: State) -> str:
-        return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.program.states, x, strict=True))
+        return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.mode.states, x, strict=True))
 
 
 def standstill(run: Run, here: ModeState) -> Standstill:
     """The present place of the Python loop."""
-    mode = run.program.modes.index(here.mode)
-    return Standstill(run, mode, here.segment, here.t, here.x, here.arc.scales, run.control.h)
+    return Standstill(run, here.index, here.segment, here.t, here.x, here.arc.scales, run.control.h)

@@ -33,7 +33,7 @@ def rests(run: Run, here: ModeState) -> int | None:
     """Return the edge on whose guard the state rests; None where it moves."""
     if not here.surfaces.active or here.mode.states != here.arc.states:
         return None
-    mode = run.program.modes.index(here.mode)
+    mode = here.index
     for k in sorted(here.surfaces.active):
         if k < len(here.mode.edges) and here.mode.edges[k].target == mode:
             try:
@@ -78,7 +78,7 @@ def push(run: Run, here: ModeState, k: int, order: int, t: Number) -> Number:
     x, kernel = here.x, here.kernel
     if order == 1:
         return kernel.rates[k](t, *x)[0]
-    series = run.kernel.taylor(run.program.modes.index(here.mode), here.segment.data)
+    series = run.kernel.taylor(here.index, here.segment.data)
     row = None if series is None else series.surfaces(2, series.flow(2, t, x))[k]
     if row is not None:
         return 2 * row[2]

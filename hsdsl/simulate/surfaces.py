@@ -61,7 +61,7 @@ class Trial:
     stepper: Stepper
 
     @cached_property
-    def end(self) -> State | None:
+    def end_slope(self) -> State | None:
         """The flow at the step's end; None where it has no finite value (beyond a guard it need not have one)."""
         try:
             end = self.flow(self.t1, *self.z)
@@ -72,13 +72,13 @@ class Trial:
     @cached_property
     def piece(self) -> Polynomial:
         """The step's interpolant."""
-        if self.end is None:
+        if self.end_slope is None:
             return (tuple(b - a for a, b in zip(self.x, self.z, strict=True)),)
-        return self.stepper.piece(self.flow, self.t, self.h, self.x, self.z, self.stages, self.slope, self.end)
+        return self.stepper.piece(self.flow, self.t, self.h, self.x, self.z, self.stages, self.slope, self.end_slope)
 
     def cubic(self) -> Polynomial:
         """The cubic Hermite interpolant, for any method."""
-        return self.piece if self.end is None else hermite(self.h, self.x, self.z, self.slope, self.end)
+        return self.piece if self.end_slope is None else hermite(self.h, self.x, self.z, self.slope, self.end_slope)
 
 
 def at(x: State, piece: Polynomial, theta: Number) -> State:
@@ -102,7 +102,7 @@ def shortened(piece: Polynomial, theta: Number) -> Polynomial:
 def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: State, scale: State) -> Number:
     """Below this a surface value counts as zero: 32 u (|L| + |R| + |dr/dt| |t| + sum |dr/dx_i| |x_i|).
 
-    ``scale`` holds the sizes of the numbers a state was computed from (see `ModeState.scale`): a state that a reset
+    ``scale`` holds the sizes of the numbers a state was computed from (see `Surfaces`): a state that a reset
     or a cancellation made small carries the round-off of what made it.
     """
     total = magnitude + abs(gradient[0]) * abs(t)
@@ -224,12 +224,12 @@ class Surfaces:
         Only where the flow points out of a surface at the step's start and back in at its end; for adaptive steps,
         whose length nobody chose.
         """
-        if trial.end is None:
+        if trial.end_slope is None:
             return None
         for k, gradient in enumerate(self.kernel.gradients):
             try:
                 out = self._rate(gradient(trial.t, *trial.x), trial.slope)
-                back = self._rate(gradient(trial.t1, *trial.z), trial.end)
+                back = self._rate(gradient(trial.t1, *trial.z), trial.end_slope)
                 if out > 0 >= back and self._beyond_within(trial, k):
                     return StepFailure("deep", k)
             except DOMAIN_ERRORS:
@@ -262,7 +262,7 @@ class Surfaces:
         for k in beyond:
             if k >= len(self.edges) and k not in self.emerging:
                 return StepFailure("wall", k)
-            if not self._transparent(k) and (failure := self._too_deep(trial, values, noise, k, epsilon)):
+            if not self._may_be_beyond(k) and (failure := self._too_deep(trial, values, noise, k, epsilon)):
                 return failure
         crossings: list[Crossing] = []
         for k in beyond:
@@ -308,7 +308,7 @@ class Surfaces:
             return StepFailure("deep", k)
         return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
 
-    def _transparent(self, k: int) -> bool:
+    def _may_be_beyond(self, k: int) -> bool:
         """Whether a state may be beyond surface k without having crossed it."""
         return k in self.emerging or k >= len(self.edges) or self.edges[k].conditional
 
@@ -339,7 +339,7 @@ class Surfaces:
 
         theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
         if theta is None:
-            if self._transparent(k) and value(self.arithmetic.zero) > self.roundoff_bound(k, trial.t, trial.x):
+            if self._may_be_beyond(k) and value(self.arithmetic.zero) > self.roundoff_bound(k, trial.t, trial.x):
                 return None
             theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
         if theta == 0:

@@ -1,8 +1,8 @@
 """When the switches of a program change: times between which each has one number, its floor or its sign.
 
-Of a switch that is linear in time they are computed. For any other its argument is isolated (`pieces`): between the
-places found it is proved to change nowhere else, but for stretches where it touches a level to round-off, which counts
-as no change, or has no value.
+Of a switch that is linear in time they are computed. For any other its argument is isolated (`switch_isolation`):
+between the places found it is proved to change nowhere else, but for stretches where it touches a level to round-off,
+which counts as no change, or has no value.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from math import ceil, floor
 
 from hsdsl import limits
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.simulate.pieces import Argument, Part, check, decided, isolated
 from hsdsl.simulate.surfaces import close_bracket
+from hsdsl.simulate.switch_isolation import Argument, Part, check, decided, isolated
 
 Stretch = tuple[Number, Number]
 Cuts = tuple[list[Number], list[Stretch]]  # where the number changes, and stretches that nothing is proved of
 
 
 @dataclass(frozen=True)
-class Piece:
+class SwitchPiece:
     """A part of a part, a time in it at which its number is certain, and its number; None where there is none."""
 
     part: Part
@@ -36,7 +36,7 @@ class Piece:
 class Changes(Argument):
     """Finds the changes of one switch; two within ``tie`` are one."""
 
-    def pieces(self, parts: Sequence[Part]) -> list[Piece]:
+    def pieces(self, parts: Sequence[Part]) -> list[SwitchPiece]:
         """Cut parts of time where the switch changes, and give its numbers.
 
         Raises
@@ -47,7 +47,7 @@ class Changes(Argument):
         linear = f"line_{self.index}" in self.kernel.switching(parts[0].data)
         cuts = self._of_lines(parts) if linear else self._of_curves(parts)
         cut = [
-            Piece(part, a, b, _clear(a, b, unsure))
+            SwitchPiece(part, a, b, _clear(a, b, unsure))
             for part, (inside, unsure) in zip(parts, cuts, strict=True)
             for a, b in pairwise((part.start, *self._apart(part, inside), part.end))
         ]
@@ -55,9 +55,9 @@ class Changes(Argument):
         sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, certain, strict=True))
         return list(self._merged(sure))
 
-    def _merged(self, pieces: Iterator[Piece]) -> Iterator[Piece]:
+    def _merged(self, pieces: Iterator[SwitchPiece]) -> Iterator[SwitchPiece]:
         """Join neighbours in one part that have the same number, and one that has none to a neighbour."""
-        last: Piece | None = None
+        last: SwitchPiece | None = None
         for piece in pieces:
             if last is None or last.part is not piece.part:
                 if last is not None:
@@ -73,7 +73,7 @@ class Changes(Argument):
         assert last is not None
         yield self._with_number(last)
 
-    def _with_number(self, piece: Piece) -> Piece:
+    def _with_number(self, piece: SwitchPiece) -> SwitchPiece:
         return replace(piece, number=self.number(piece.part)(piece.at)) if piece.number is None else piece
 
     def _apart(self, part: Part, cuts: Sequence[Number]) -> Iterator[Number]:

@@ -30,7 +30,7 @@ class Workspace:
         self.task: Any = task
         self.degree = shape.degree
         self.pressed, self.failed = False, list[BaseException]()
-        self.laid: object = None  # the plan that the task is filled in from
+        self.plan: object = None  # the plan that the task is filled in from
         self.chunks = OutputBuffers(self.task.chunk, shape)
         self._width = model.width
         self._workspace = np.empty(compiled.workspace(method, scheme))
@@ -42,7 +42,7 @@ class Workspace:
         self.task.stop.scales = self._scales.ctypes.data
         self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
         self._runtime, self._where = runtime(), ctypes.addressof(self.task)
-        _desks[self._where] = self
+        _workspaces[self._where] = self
 
     def clear(self, rows: float, memory: int) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
@@ -118,19 +118,19 @@ class Workspaces:
 
 
 # The three functions that C calls are made once; they find the workspace by its task's place in memory.
-_desks: WeakValueDictionary[int, Workspace] = WeakValueDictionary()
+_workspaces: WeakValueDictionary[int, Workspace] = WeakValueDictionary()
 
 
 def _answer_flush(task: int) -> int:
-    return _desks[task].more_rows()
+    return _workspaces[task].more_rows()
 
 
 def _answer_poll(task: int) -> int:
-    return int(_desks[task].pressed)
+    return int(_workspaces[task].pressed)
 
 
 def _answer_grow(task: int, larger: Any) -> int:
-    return _desks[task].more_visited(structures.Visited.from_address(larger))
+    return _workspaces[task].more_visited(structures.Visited.from_address(larger))
 
 
 _callbacks = dict(structures.Task._fields_)

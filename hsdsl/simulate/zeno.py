@@ -49,7 +49,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     if left > run.settings.relaxation or end > here.segment.end:
         return here
     try:
-        q = fixed_point(run, here, k, end)
+        q = fixed_point(here, k, end)
         if q is None:
             return here
         limit = here.moved(end, q)
@@ -63,7 +63,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return run.diagnostics.accumulates(edge, end, here.t)
     run.diagnostics.replaced(edge, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
-    mode = run.program.modes.index(here.mode)
+    mode = here.index
     rest = run.place(mode, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
     rest.surfaces.active.add(k)
@@ -83,7 +83,7 @@ def meets_another(here: ModeState, limit: ModeState, k: int) -> bool:
     return False
 
 
-def fixed_point(run: Run, here: ModeState, k: int, t: Number) -> State | None:
+def fixed_point(here: ModeState, k: int, t: Number) -> State | None:
     """The point on the guard that repeated resets run to (Aitken's acceleration, by component)."""
     reset, x = here.kernel.resets[k], here.x
     for _ in range(MOST_ROUNDS):

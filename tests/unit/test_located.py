@@ -6,6 +6,7 @@ from math import asin, pi, sqrt
 from typing import Any
 
 import pytest
+from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
 
@@ -116,3 +117,23 @@ def test_a_second_rise_in_one_step_behind_a_shallow_dip(method: str, tmp_path: A
     made = run(tmp_path, TWICE, method=method, step=3)
     assert [t.time for t in made.transitions] == pytest.approx([1.8], abs=1e-12)
     assert len(made.times) == 4
+
+
+@needs_compiler
+@pytest.mark.parametrize("priority", [0, 1])
+def test_a_clock_at_the_end_fires_over_a_state_that_comes_to_rest_there(tmp_path: Any, priority: int) -> None:
+    text = f"""modes:
+  wait: {{flow: {{y: 1}}, transitions: [{{name: go, when: y >= 1, to: push, reset: {{x: 0}}}}]}}
+  push:
+    flow: {{x: 1}}
+    transitions:
+      - {{name: hold, priority: {priority}, when: x >= 0, to: push, reset: {{x: 0}}}}
+      - {{name: clock, when: t >= 1.0000000000005, to: slow}}
+  slow: {{flow: {{x: -1}}}}
+initial: {{mode: wait, y: 0}}
+experiment: {{until: 1}}
+"""
+    made = run(tmp_path, text, method="dopri5", engine="python")
+    assert [t.edge for t in made.transitions] == ["go", "clock"]
+    assert made.stop.reason == "until"
+    assert_engines_agree(hsdsl.load(tmp_path / "model.yaml"), method="dopri5")

@@ -5,17 +5,20 @@ transversally, with no other surface so near that an error could change the sequ
 lead to the same point. A run shows its own neighbourhood of the execution, so every margin is held against the error
 that the run allows itself.
 
-================  ==============================================================================
-`agreement`       the errors of a run, by the same run made finer
-`looking`         a recorded run with its modes' routines, to be looked at anywhere
-`steps`           its steps as polynomials, many at once, with routines over intervals
-`crossings`       is each transition transversal, and its condition the same all around it?
-`landings`        does a reset land within the error of a surface, or jump?
-`misses`          surfaces that are almost reached or passed over, and what happens at the end
-`flows`           does the flow vary unseen, jump, or have a slope without bound?
-`choices`         do transitions that are reached together commute?
-`accumulation`    Zeno points and rest, which the relaxed scheme goes through without a word
-================  ==============================================================================
+==============  ==============================================================================
+`agreement`     the errors of a run, by the same run made finer
+`run_view`      an execution with its modes' routines; `place` is one state of it
+`steps`         its steps as polynomials, many at once, with routines over intervals
+`finding`       one reason; `judged` holds margins against errors
+`reliability`   from when on a run cannot be relied on
+`crossings`     is each transition transversal, and its condition the same all around it?
+`landings`      does a reset land within the error of a surface, or jump?
+`misses`        surfaces that are almost reached or passed over; `endings`: what happens at the end
+`transparent`   surfaces that are passed where their condition is false
+`flows`         does the flow vary unseen, jump, or have a slope without bound?
+`commutation`   do transitions that are reached together commute?
+`accumulation`  Zeno points and rest, which the relaxed scheme goes through without a word
+==============  ==============================================================================
 """
 
 from __future__ import annotations

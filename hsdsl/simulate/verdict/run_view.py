@@ -191,10 +191,6 @@ class RunView:
         surfaces = Surfaces(place.kernel, place.mode.edges, sizes, self.arithmetic)
         return surfaces.roundoff_bound(k, place.t, place.x, entry=True)
 
-    def row_at(self, t: Number) -> int:
-        """The last row before a time, or at it."""
-        return max(0, bisect_right(self.times, t) - 1)
-
     def row_before(self, made: Transition) -> int:
         """The last row before a transition."""
         arc = self.execution.arcs[int(np.searchsorted(self.execution.arc_table.jump, made.index, "right")) - 1]
