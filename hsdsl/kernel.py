@@ -35,27 +35,19 @@ class Taylor:
     surfaces: Callable[[int, tuple[Series, ...]], tuple[Series | None, ...]]
 
 
-class ModeKernel(Protocol):
-    """One mode, data bound; `ModeProgram` says what each routine returns."""
+@dataclass(frozen=True)
+class ModeKernel:
+    """One mode's routines, data bound; `ModeProgram` has what each routine returns."""
 
-    @property
-    def flow(self) -> Routine: ...
-    @property
-    def surfaces(self) -> Routine: ...
-    @property
-    def magnitudes(self) -> Routine: ...
-    @property
-    def gradients(self) -> Sequence[Routine]: ...
-    @property
-    def rates(self) -> Sequence[Routine]: ...
-    @property
-    def conditions(self) -> Sequence[Callable[..., tuple[bool, ...]]]: ...
-    @property
-    def outputs(self) -> Routine: ...
-    @property
-    def resets(self) -> Sequence[Routine]: ...
-    @property
-    def spreads(self) -> Sequence[Routine]: ...
+    flow: Routine
+    surfaces: Routine
+    magnitudes: Routine
+    outputs: Routine
+    gradients: Sequence[Routine]
+    rates: Sequence[Routine]
+    conditions: Sequence[Callable[..., tuple[bool, ...]]]
+    resets: Sequence[Routine]
+    spreads: Sequence[Routine]
 
 
 class Kernel(Protocol):

@@ -8,30 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.kernel import Routine, Taylor, Vector
+from hsdsl.kernel import ModeKernel, Routine, Taylor, Vector
 from hsdsl.program import Program, Routines
 
 _CONSTANT = re.compile(r"\bq_(m?)(\d+)_(\d+)\b")
-
-
-@dataclass(frozen=True)
-class PythonMode:
-    """One mode's routines, bound. See `ModeProgram` for what they return."""
-
-    flow: Routine
-    surfaces: Routine
-    magnitudes: Routine
-    outputs: Routine
-    gradients: tuple[Routine, ...]
-    rates: tuple[Routine, ...]
-    conditions: tuple[Callable[..., tuple[bool, ...]], ...]
-    resets: tuple[Routine, ...]
-    spreads: tuple[Routine, ...]
 
 
 class PythonKernel:
@@ -81,7 +65,7 @@ class PythonKernel:
         """Whether the program gives this constant."""
         return name in self._constants
 
-    def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
+    def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments."""
         routines = self._program.modes[mode].routines
         if mode not in self._modes:
@@ -89,7 +73,7 @@ class PythonKernel:
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
         program = self._program.modes[mode]
         edges, surfaces = len(program.edges), len(program.edges) + len(program.walls)
-        return PythonMode(
+        return ModeKernel(
             **{name: bound[name] for name in PLAIN},
             gradients=tuple(bound[f"gradient_{k}"] for k in range(surfaces)),
             rates=tuple(bound[f"rate_{k}"] for k in range(surfaces)),

@@ -15,8 +15,8 @@ from threading import Lock, Thread
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.python import PythonKernel, PythonMode, conjunction
-from hsdsl.kernel import Routine, Series, Taylor, Vector
+from hsdsl.backends.python import PythonKernel, conjunction
+from hsdsl.kernel import ModeKernel, Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
@@ -148,7 +148,7 @@ class CompiledKernel(PythonKernel):
         n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
         return _routine(table.jacobian, numbers, n, n * n)
 
-    def bind(self, mode: int, data: Sequence[Number]) -> PythonMode:
+    def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments."""
         table, outputs = self._compiled.mode(mode), len(self._program.outputs)
         n, m = table.dimension, table.surfaces
@@ -159,7 +159,7 @@ class CompiledKernel(PythonKernel):
         def bound(address: Address, results: int, arguments: int = n) -> Routine:
             return _routine(address, numbers, arguments, results)
 
-        return PythonMode(
+        return ModeKernel(
             flow=bound(table.flow, n),
             surfaces=bound(table.values, m),
             magnitudes=bound(table.magnitudes, m),

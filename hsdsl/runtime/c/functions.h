@@ -144,13 +144,8 @@ static int goes_before(const hs_mode *mode, int a, int b);
 static void choose(hs_run *run, int count);
 static int reset(hs_run *run, double *scale);
 
-/* visited.c */
-static int same_state(const double *a, const double *b, int n);
-static void forget(hs_visited *visited);
-static int visit(hs_visited *visited, int width, int mode, const double *x, int n);
-static int make_room(hs_run *run);
-
 /* entry.c */
+static int same_state(const double *a, const double *b, int n);
 static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since, int jumped,
                  double reset_at);
 

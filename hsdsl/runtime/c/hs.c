@@ -23,7 +23,6 @@
 #include "input_segments.c"
 #include "recorder.c"
 #include "run.c"
-#include "visited.c"
 #include "entry.c"
 #include "cascade.c"
 #include "chatter.c"
