@@ -10,9 +10,9 @@ from hsdsl.arithmetic import Number
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Transition
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.surfaces import TIE
 from hsdsl.simulate.verdict.agreement import Errors
 
-TIE = 1e-12  # of the run's length
 SAMPLES = 1000
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
 
-MOST_CHATTER = 2000  # twice the steps in a row that turn the flow around; one that does not takes half of one back
+MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
 HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
 Flow = Callable[..., State]
 

@@ -30,9 +30,9 @@ def enter(
 ) -> ModeState | Stop:
     """Enter a mode and make the transitions that fire at once; return the mode entered last, or why the run stops.
 
-    A surface that the flow passes within the time ``since`` counts as stood on: tied transitions share one point. So
-    does one that moved past the state while it waited in a strip, since it was reset at ``reset_at``. One of an edge in
-    ``inside`` was not reached before an input jumped: on it counts as beyond.
+    A surface that the flow passes within the time ``since`` is active: tied transitions share one point. A surface that
+    moved past the state while it waited in a strip, since its reset at ``reset_at``, is active too. Edges in ``inside``
+    were not reached before an input jumped: a state on such a surface counts as beyond it.
     """
     visited: set[tuple[int, State]] = set()
     while True:

@@ -45,7 +45,7 @@ def bernstein(c: Coefficients) -> list[Number]:
 
 
 def stays_below(c: Coefficients, level: Number) -> bool:
-    """Whether the polynomial is nowhere above ``level`` on [0, 1], by bounds that may not see it."""
+    """Whether bounds prove that the polynomial is nowhere above ``level`` on [0, 1]; False proves nothing."""
     return total((a for a in c[1:] if a > 0), c[0]) <= level or max(bernstein(c)) <= level
 
 

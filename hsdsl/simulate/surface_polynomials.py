@@ -141,7 +141,7 @@ def interpolated(
     may_refuse: bool = False,
 ) -> list[list[Piece]]:
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
-    their largest value, or ``allowed(k)`` more; not ``far``, only to where the first of them is positive.
+    their largest value, or ``allowed(k)`` more. Without ``far`` pieces end where the first function is positive.
 
     Raises
     ------

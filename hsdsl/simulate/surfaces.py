@@ -152,8 +152,8 @@ class Surfaces:
     ) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it is on.
 
-        A surface that the flow passes within the time ``since`` counts as stood on. So does one that the state was not
-        beyond when it was reset, before it waited in a strip. On one ``inside`` counts as beyond.
+        A surface that the flow passes within the time ``since`` is active. So is one that the state was not beyond when
+        it was reset, before it waited in a strip. A state on a surface ``inside`` counts as beyond it.
         """
         beyond: list[int] = []
         then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)

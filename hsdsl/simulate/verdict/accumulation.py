@@ -9,23 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import accumulate, pairwise
 
+from hsdsl.simulate.located import FREE
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.run_view import RunView
-
-CROWD = 16  # transitions within the relaxation of flow
 
 
 def accumulations(run: RunView) -> Iterator[str]:
     """Say where transitions first crowd together, and where they are last seen to."""
     relaxation, made = run.problem.settings.relaxation, run.transitions
-    if len(made) <= CROWD:
+    if len(made) <= FREE:
         return
     flights = [b.time - (a.resumed if a.resumed is not None else a.time) for a, b in pairwise(made)]
     flown = [run.arithmetic.zero, *accumulate(flights)]
-    crowded = [k for k in range(CROWD, len(made)) if flown[k] - flown[k - CROWD] <= relaxation]
+    crowded = [k for k in range(FREE, len(made)) if flown[k] - flown[k - FREE] <= relaxation]
     if crowded:
-        first = made[crowded[0] - CROWD]
+        first = made[crowded[0] - FREE]
         yield (
-            f"more than {CROWD} transitions within the relaxation of flow from t = {show(first.time)} on "
+            f"more than {FREE} transitions within the relaxation of flow from t = {show(first.time)} on "
             f"({first.edge}): a Zeno point, rest or sliding, which the theorem is not about"
         )
