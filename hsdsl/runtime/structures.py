@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-HEADERS = ("hs.h", "hs_simulate.h", "hs_sample.h", "hs_ensemble.h")
+HEADERS = ("hs.h", "hs_simulate.h")
 FOLDER = Path(__file__).parent / "c"
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 ENUMERATION = re.compile(r"typedef enum \{([^}]*)\} (\w+);")

@@ -6,7 +6,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "hs_ensemble.h"
 #include "run.h"
 
 enum { RAISED = -1 };

@@ -207,4 +207,57 @@ HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, h
 HS_EXPORT void hs_simulate(hs_task *task);
 HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
 
+/* A run's values at many times: what a caller gives, all of it the caller's own memory. */
+typedef struct {
+  const hs_model *model; /* these two for outputs alone */
+  const hs_timeline *timeline;
+  int64_t rows, arcs, samples;
+  int32_t width, degree; /* of values and pieces; pieces of degree 0 are the straight lines between rows */
+  int32_t outputs;       /* 0 for none */
+  int32_t columns;       /* states to evaluate */
+  int32_t left;          /* at a jump take the first value, not the last */
+  const double *times, *values, *recorded, *pieces; /* by row; a row's piece leaves it */
+  const hs_arc *arc;
+  const int32_t *layout;    /* of each arc, by its states; 0 where there is only one */
+  const int32_t *dimension; /* of each layout */
+  const int32_t *column;    /* (layouts, columns): which of the arc's states it is, -1 for none */
+  double *time;             /* (samples), in any order; moved to the run's ends where outside to round-off */
+  int64_t *row;             /* (samples): where the piece begins */
+  double *states;           /* (columns, samples) */
+  double *results;          /* (samples, outputs) */
+  double *scratch;          /* 2 width */
+} hs_sampling;
+
+/* The number of the first time that is outside the run by more than the tie tolerance, or -1. */
+HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
+
+/* Many instances of one model: `task` must come first; of each run only the results below are kept. */
+typedef struct {
+  hs_task task;
+  hs_sampling sampling; /* of one chunk, with memory for all samples of an instance */
+  int64_t instances, samples, most_transitions;
+  const hs_timeline *timeline; /* (instances) */
+  const hs_settings *settings; /* (instances) */
+  const double *start;         /* (instances, dimension) */
+  const double *time;          /* (instances, samples), never decreasing */
+  const int32_t *layout_of;    /* of each mode, -1 where it keeps that of the mode before; 0 where there is only one */
+  const int32_t *stop;         /* not 0: end as soon as possible */
+  int32_t *reason, *mode;      /* (instances) */
+  int32_t *kind;               /* (instances): layout of the last arc */
+  int64_t *transitions;        /* (instances): how many were made */
+  double *ended;               /* (instances): the last time */
+  double *final;               /* (instances, width) */
+  double *outputs;             /* (instances, outputs) */
+  double *crossed;             /* (instances, most_transitions): times of the first transitions */
+  double *states;              /* (instances, columns, samples); untouched beyond a run's end */
+  double *results;             /* (instances, samples, outputs), likewise */
+  int64_t done;
+  int64_t base, made, next;    /* of the instance under way: the chunk's first row, transitions, samples */
+  int32_t layout;              /* of its last arc, the first one's being 0 */
+  int32_t *layouts;            /* (arc_room) */
+} hs_ensemble;
+
+/* Run the instances one after the other; those from `done` on were not run to their end. */
+HS_EXPORT void hs_run_ensemble(hs_ensemble *ensemble);
+
 #endif
