@@ -6,16 +6,13 @@ constants only by number, so nothing a model file says reaches the interpreter a
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.backends.text import compile_routines
 from hsdsl.kernel import ModeKernel, Routine, Taylor, Vector
-from hsdsl.program import Program, Routines
-
-_CONSTANT = re.compile(r"\bq_(m?)(\d+)_(\d+)\b")
+from hsdsl.program import Program
 
 
 class PythonKernel:
@@ -87,7 +84,7 @@ class PythonKernel:
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
-        from hsdsl.backends.taylor import compile_tape  # only runs that ask for it pay for it
+        from hsdsl.backends.taylor import compile_tape  # only Taylor's method needs it
 
         program = self._program.modes[mode]
         if program.tape is None:
@@ -147,23 +144,3 @@ def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..
         return (True,)
 
     return holds
-
-
-def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> Callable[..., tuple[Routine, ...]]:
-    """Compile generated text; returns its ``bind``.
-
-    Floats are written into the text as literals (the interpreter is fastest on those); other numbers are names.
-    """
-    namespace: dict[str, Any] = {"__builtins__": {}, "inf": float("inf"), **arithmetic.functions}
-    literal = arithmetic.name == "float64"
-
-    def replace(match: re.Match[str]) -> str:
-        value = arithmetic.constant(Fraction(int(match[2]) * (-1 if match[1] else 1), int(match[3])))
-        if literal:
-            return f"({value!r})" if match[1] else repr(value)
-        namespace[match[0]] = value
-        return match[0]
-
-    text = _CONSTANT.sub(replace, routines.source)
-    exec(compile(text, f"<hsdsl {name}>", "exec"), namespace)
-    return namespace["bind"]

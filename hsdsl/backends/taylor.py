@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.backends.python import compile_routines
 from hsdsl.backends.recurrences import behind, few, power, product, root, square
 from hsdsl.backends.tape import Language, coefficient_of, value_of
+from hsdsl.backends.text import compile_routines
 from hsdsl.kernel import Taylor
 from hsdsl.program import Tape
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
-from hsdsl.backends.python import compile_routines
+from hsdsl.backends.text import compile_routines
 from hsdsl.enclosures import ENCLOSED, Array, as_range, hull
 from hsdsl.metrics.rounding import UNIT
 from hsdsl.program import Routines

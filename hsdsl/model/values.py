@@ -12,7 +12,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.backends.python import PythonKernel, compile_routines
+from hsdsl.backends.python import PythonKernel
+from hsdsl.backends.text import compile_routines
 from hsdsl.errors import UsageError
 from hsdsl.model.options import KEYS
 from hsdsl.names import did_you_mean
