@@ -6,6 +6,7 @@ The loop returns codes; the functions of the Python loop turn them into sentence
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -70,6 +71,11 @@ class CompiledPlan:
         task.mode, (task.dimension, task.x) = self._mode, self._start
 
 
+def _doubles(numbers: Sequence[Number] | None) -> Any:
+    """Numbers in memory that a field keeps alive; None where there are none."""
+    return structures.address((ctypes.c_double * len(numbers))(*numbers)) if numbers else None
+
+
 def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
     """Write settings as the runtime takes them; ``states`` are those of all modes."""
     control = make_control(settings, FLOAT64)
@@ -82,7 +88,9 @@ def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
         settings.until,
         min(settings.max_transitions, 2**62),
         structures.SCHEMES.index(settings.scheme),
-        scale and structures.address((ctypes.c_double * len(scale))(*scale)),
+        _doubles(scale),
+        len(settings.first_steps),
+        _doubles(settings.first_steps),
     )
 
 

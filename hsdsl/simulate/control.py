@@ -21,7 +21,7 @@ been no more than the tolerance times what it is then does not count.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Arithmetic, Number
@@ -65,6 +65,12 @@ class Control:
     closer: bool = False
     reach: dict[str, Number] = field(default_factory=dict[str, Number])
     lost: set[str] = field(default_factory=set[str])
+    first_steps: Iterator[Number] | None = None  # of the arcs of flow to come; 0 where there is no bound
+
+    def begin_arc(self, mode: str) -> None:
+        """Begin an arc of flow in a mode."""
+        if self.first_steps is not None and (bound := next(self.first_steps, 0)) > 0:
+            self.reach[mode] = self.within_reach(mode, bound)
 
     def within_reach(self, mode: str, h: Number) -> Number:
         """Cut a step to what the surfaces of a mode allow."""
@@ -158,5 +164,6 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
         largest = min(largest, settings.longest_step)
     implicit = settings.method is not None and settings.method.implicit
     control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control.first_steps = iter(settings.first_steps) if settings.first_steps else None
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
     return control

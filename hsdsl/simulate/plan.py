@@ -8,9 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from hsdsl.arithmetic import Number
 from hsdsl.execution import Array, Execution, Stop
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
@@ -57,7 +54,7 @@ class Prepared(Problem):
     """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
 
     plan: CompiledPlan | None
-    finer: dict[Number, Prepared] = field(default_factory=dict["Number", "Prepared"])  # by the run's longest step
+    finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
     def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
         """Run to the end.
@@ -84,11 +81,11 @@ class Prepared(Problem):
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
-        longest: Number = max(np.diff(execution.times).tolist(), default=self.settings.until) or self.settings.until
-        if longest not in self.finer:
-            problem = self.with_settings(finer_settings(self.settings, longest, self.arithmetic))
-            self.finer[longest] = prepare(problem, self.plan and self.plan.compiled)
-        return self.finer[longest].simulate()
+        rows = len(execution.times)  # fewer where a run was interrupted
+        if rows not in self.finer:
+            problem = self.with_settings(finer_settings(self.settings, execution, self.arithmetic))
+            self.finer[rows] = prepare(problem, self.plan and self.plan.compiled)
+        return self.finer[rows].simulate()
 
     @cached_property
     def _about(self) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Settings of the same run made finer: the difference of the two runs estimates the error of the first.
 
 The tolerance falls to a tenth, so the finer run is wrong by about a tenth of what the run is. Steps that the tolerance
-does not bound, but the run's length or samples of inputs, become shorter in the same way. A fixed step is halved;
+does not bound become shorter in the same way: the run's longest step, and with `located` the first one of each arc of
+flow, which a transition or a sample of an input may have cut. A fixed step is halved;
 a method of order 1 needs a quarter, or the difference would be no larger than the error of the finer run. The
 relaxed scheme's strips shrink to a tenth: the delay of a transition is known only up to a factor. Below round-off the
 other run is coarser instead, and the difference is that much larger than the error.
@@ -11,15 +12,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.execution import Execution
 from hsdsl.simulate.settings import Settings
 
 FINER = 10
 LEAST_UNITS = 32  # of round-off: a tolerance that a finer run may still have
 
 
-def finer_settings(settings: Settings, longest: Number, arithmetic: Arithmetic) -> Settings:
-    """Return the settings of the run to compare with; ``longest`` is the longest step of the run."""
+def longest_steps(execution: Execution) -> list[Number]:
+    """The longest step of each arc of flow."""
+    table = execution.arc_table
+    steps = np.append(np.diff(execution.times), 0)
+    return np.maximum.reduceat(steps, table.first)[table.kind == "flow"].tolist() if len(table.first) else []
+
+
+def finer_settings(settings: Settings, execution: Execution, arithmetic: Arithmetic) -> Settings:
+    """Return the settings of the run to compare an execution with."""
     finer = settings
     if settings.scheme != "located":
         finer = replace(finer, relaxation=settings.relaxation / FINER)
@@ -31,6 +42,9 @@ def finer_settings(settings: Settings, longest: Number, arithmetic: Arithmetic) 
     tolerance = smaller if smaller >= LEAST_UNITS * arithmetic.unit else settings.tolerance * FINER
     method = settings.method
     assert method is not None
-    longest = longest * float(FINER) ** (-1 / method.order)
-    method = method.for_tolerance(tolerance, arithmetic)
-    return replace(finer, tolerance=tolerance, method=method, longest_step=longest)
+    share = float(FINER) ** (-1 / method.order)
+    bounds = [share * step for step in longest_steps(execution)]
+    finer = replace(finer, longest_step=max(bounds, default=0) or None)
+    if settings.scheme == "located":
+        finer = replace(finer, first_steps=bounds)
+    return replace(finer, tolerance=tolerance, method=method.for_tolerance(tolerance, arithmetic))

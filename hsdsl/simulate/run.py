@@ -88,6 +88,7 @@ class Run(Problem):
         outputs = kernel.outputs if program.states == states else None
         if outputs is None and before is not None and before.mode.states == states:
             outputs = before.kernel.outputs
+        self.control.begin_arc(program.name)
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
         surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
         return ModeState(mode, program, kernel, surfaces, segment, arc, t, x)

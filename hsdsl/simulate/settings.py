@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,7 +39,8 @@ class Settings:
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` are the values given beyond the model's file, as written, by the names of `--set`.
     ``memory`` is how many bytes of rows a run may keep.
-    ``longest_step`` bounds the steps of an adaptive method further.
+    ``longest_step`` bounds the steps of an adaptive method further, ``first_steps`` the first ones of each arc of flow,
+    0 where it does not: by this number, then twice, then four times as much.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -57,6 +58,7 @@ class Settings:
     overrides: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False)
     memory: int = DEFAULT.memory
     longest_step: Number | None = None
+    first_steps: Sequence[Number] = ()
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

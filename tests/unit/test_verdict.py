@@ -5,6 +5,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from engines import needs_compiler
 
 import hsdsl
 
@@ -221,3 +222,29 @@ def test_verdicts_do_not_depend_on_units(tmp_path, scale):
     run = hsdsl.load(file).simulate()
     assert len(run.transitions) == 1
     assert run.verdict.theorem == "holds", run.verdict
+
+
+TICKS = """hsdsl: 1
+parameters: {h: 0.35, g: 0.9964827331225057, N: 16000}
+modes:
+  m:
+    flow: {x: v, v: -x, q: 1}
+    transitions:
+      - {name: tick, when: q >= h, to: m, reset: {q: 0}}
+      - {name: late, when: t >= (N + 0.5)*h, to: z}
+  z: {flow: {x: v, v: -x}, transitions: [{name: hit, when: x >= g, to: e}]}
+  e: {flow: {x: 0, v: 0}}
+initial: {mode: m, x: 1, v: 0, q: 0}
+experiment: {until: (N + 0.5)*h + 7, method: dopri5}
+"""
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("tolerance", "h", "count", "guard"), [(1e-4, 0.35, 16000, 0.9964827331225057), (1e-6, 0.14, 20000, 0.9999795452)]
+)
+def test_steps_that_ticks_cut_are_made_finer(tolerance: float, h: float, count: int, guard: float) -> None:
+    """The numerical amplitude shrinks over the ticks to just below a guard that the exact one of 1 crosses."""
+    parameters = {"h": h, "N": count, "g": guard}
+    run = hsdsl.loads(TICKS).simulate(parameters=parameters, tolerance=tolerance)
+    assert run.transitions[-1].edge == "hit" or run.verdict.theorem == "unknown"

@@ -80,6 +80,8 @@ typedef struct {
   int64_t max_transitions;
   int64_t scheme;
   const double *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
+  int64_t arcs;              /* that have a bound on their first step */
+  const double *first_steps; /* of each arc of flow, 0 where there is no bound */
 } hs_settings;
 
 typedef enum { HS_FLOW, HS_STRIP } hs_arc_kind;

@@ -21,6 +21,15 @@ static void hand_on_scales(hs_run *run, const hs_mode *from, const hs_mode *to) 
   for (int s = 0; s < run->width; s++) run->scales[s] = s < to->dimension ? run->known[to->state[s]] : 0.0;
 }
 
+/* Bound the first step of an arc of flow that begins in a mode; further ones may be twice as long each. */
+static void bound_first_step(hs_run *run, int mode) {
+  const hs_settings *settings = &run->task->settings;
+  const double bound = run->placed < settings->arcs ? settings->first_steps[run->placed] : 0.0;
+  double *const reach = &run->reach[mode];
+  run->placed++;
+  if (bound > 0) *reach = *reach > 0 ? hs_min(*reach, bound) : bound;
+}
+
 /* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
    A final mode without a flow has the states, and so the outputs, of the mode before it. */
 static void place(hs_run *run, int mode, int dimension, double t, const hs_mode_state *before) {
@@ -41,6 +50,7 @@ static void place(hs_run *run, int mode, int dimension, double t, const hs_mode_
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
   run->resting = -1;
+  if (run->task->settings.arcs) bound_first_step(run, mode);
   begin(run, HS_FLOW);
   append(run, t, run->x, 0);
   copy(run->entered, run->x, dimension);

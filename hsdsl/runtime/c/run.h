@@ -148,6 +148,7 @@ typedef struct {
   hs_mode_state here;
   hs_trial trial;
   hs_control control;
+  int64_t placed; /* arcs of flow that were begun */
   hs_stall stall;
   hs_cascade cascade;
   int chatter;
