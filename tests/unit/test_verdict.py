@@ -248,3 +248,19 @@ def test_steps_that_ticks_cut_are_made_finer(tolerance: float, h: float, count: 
     parameters = {"h": h, "N": count, "g": guard}
     run = hsdsl.loads(TICKS).simulate(parameters=parameters, tolerance=tolerance)
     assert run.transitions[-1].edge == "hit" or run.verdict.theorem == "unknown"
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "dop853", "radau"])
+def test_a_flow_that_is_zero_until_a_ramp_begins_is_seen(method: str) -> None:
+    """Y = (t - d)**2/2 meets 1 at t = d + sqrt(2)."""
+    text = """hsdsl: 1
+parameters: {d: 1}
+inputs: {u: "max(0, t - d)"}
+modes: {m: {flow: {y: u}, transitions: [{name: a, when: y >= 1, to: m, reset: {y: 0}}]}}
+initial: {mode: m, y: 0}
+experiment: {until: 1.9 + d}
+"""
+    for d in (1, 0.7):
+        run = hsdsl.loads(text).simulate(method=method, parameters={"d": d})
+        assert [t.time for t in run.transitions] == [pytest.approx(d + 2**0.5)]
+        assert run.verdict.theorem == "holds", run.verdict

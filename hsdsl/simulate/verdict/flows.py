@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hsdsl.enclosures import as_range
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
@@ -61,11 +62,13 @@ def _unseen(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     number[steps.row] = np.arange(len(steps))
     below, above = steps.slopes()
     enough = np.maximum(_beyond(run, steps), above - below) / RESOLVED
+    names = run.problem.program.modes[steps.mode].states
+    digits = ROUNDOFF_UNITS * float(run.arithmetic.unit) * np.array([run.sizes.get(name, 0.0) for name in names])
 
     def decides(parts: Parts) -> NDArray[np.bool_]:
         beyond = _beyond(run, parts)
         effect = beyond * (parts.width * parts.length)[:, None]
-        return ~((beyond <= enough[number[parts.row]]) | (effect <= parts.error))
+        return ~((beyond <= enough[number[parts.row]]) | (effect <= np.maximum(parts.error, digits)))
 
     return undecided(steps, decides, HALVINGS)
 
