@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
 
-from hsdsl.cli.completion import model_files
+from hsdsl.cli.completion import model_files, override_names
 from hsdsl.cli.console import errors_reported
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
@@ -39,6 +39,17 @@ Json = Annotated[bool, Option("--json", help="Print one JSON object on standard 
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print no summary and no progress.")]
 FOLDER = "Let models read data files from here too. May be repeated."
 LIMIT = f"Let a model ask for more: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
+SET = (
+    "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
+    " (experiment.step=1e-3). May be repeated; values are expressions of parameters."
+)
+Overrides = Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)]
+Until = Annotated[str | None, option("T", "End of the run.")]
+SchemeName = Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")]
+MethodName = Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")]
+StepSize = Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")]
+Tolerance = Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")]
+Relaxation = Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")]
 AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
 Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]
 
@@ -78,6 +89,13 @@ def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], 
     from hsdsl.model import split_overrides
 
     return split_overrides(overrides or ())
+
+
+def settings_of(overrides: list[str] | None, **settings: Any) -> dict[str, Any]:
+    """Arguments of `Model.simulate` from ``--set`` and options."""
+    parameters, initial, below = split(overrides)
+    settings["method"] = settings["method"] and str(settings["method"])
+    return settings | {"parameters": parameters, "initial": initial, "settings": below}
 
 
 def names_of(text: str | None) -> list[str]:

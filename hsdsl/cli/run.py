@@ -9,22 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Exit, Option
 
-from hsdsl.cli.completion import override_names
 from hsdsl.cli.console import Text, print_json, progress, say
 from hsdsl.cli.options import (
     AllowPath,
     Engine,
     Json,
     Limit,
-    Method,
+    MethodName,
     Model,
+    Overrides,
     Quiet,
-    Scheme,
+    Relaxation,
+    SchemeName,
+    StepSize,
+    Tolerance,
+    Until,
     answering,
     check_target,
     names_of,
     option,
-    split,
+    settings_of,
 )
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
@@ -36,10 +40,6 @@ if TYPE_CHECKING:
     from hsdsl.model.stream import Streamed
 
 STOPPED = 3
-SET = (
-    "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
-    " (experiment.step=1e-3). May be repeated; values are expressions of parameters."
-)
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
 ESTIMATE = "Run again, finer, and give the distance of the runs."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
@@ -48,13 +48,13 @@ OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".h
 
 def run(
     model: Model,
-    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
-    until: Annotated[str | None, option("T", "End of the run.")] = None,
-    scheme: Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")] = None,
-    method: Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")] = None,
-    step: Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")] = None,
-    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")] = None,
-    relaxation: Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")] = None,
+    overrides: Overrides = None,
+    until: Until = None,
+    scheme: SchemeName = None,
+    method: MethodName = None,
+    step: StepSize = None,
+    tolerance: Tolerance = None,
+    relaxation: Relaxation = None,
     engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
     precision: Annotated[int | None, option("DIGITS", PRECISION)] = None,
     outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
@@ -68,15 +68,16 @@ def run(
     limit: Limit = None,
 ) -> None:
     """Simulate a model and summarise what happened."""
-    settings: dict[str, Any] = {"until": until, "scheme": scheme, "method": method and str(method), "step": step}
-    settings |= {"tolerance": tolerance, "relaxation": relaxation, "engine": engine, "precision": precision}
     with answering(json, allow_path, limit):
         check_target(out, "--out", OUT_SUFFIXES)
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         check_target(plot, "--plot", PLOT_SUFFIXES)
-        loaded = _load(model, settings)
-        settings |= zip(("parameters", "initial", "settings"), split(overrides), strict=True)
+        loaded = _load(model, engine, precision, scheme)
+        settings = settings_of(
+            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
+            relaxation=relaxation, engine=engine, precision=precision,
+        )  # fmt: skip
         names = chosen_names(outputs, loaded.columns)
         result: Any
         with progress(quiet or json) as show:
@@ -99,13 +100,13 @@ def run(
         raise Exit(INTERRUPTED if stop.reason == "interrupted" else STOPPED)
 
 
-def _load(path: Path, settings: dict[str, Any]) -> LoadedModel:
+def _load(path: Path, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:
     """Load a model, and its compiled code at the same time."""
     from hsdsl.files import read_bytes
     from hsdsl.model import engines, load
 
     text = read_bytes(path)
-    engines.begin(settings["engine"], settings["precision"], settings["scheme"])
+    engines.begin(engine, precision, scheme)
     return load(path, text=text)
 
 

@@ -16,7 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED, WORD
 from hsdsl.names import did_you_mean, visible
 
-VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "schema", "doctor")
+VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "export", "schema", "doctor")
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 

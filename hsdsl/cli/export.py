@@ -1,0 +1,77 @@
+"""``hsdsl export``: write a model as code or as a document for another tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from typer import Option
+
+from hsdsl.cli.console import print_json, say
+from hsdsl.cli.options import (
+    AllowPath,
+    Json,
+    Limit,
+    MethodName,
+    Model,
+    Overrides,
+    Quiet,
+    Relaxation,
+    SchemeName,
+    StepSize,
+    Tolerance,
+    Until,
+    answering,
+    names_of,
+    option,
+    settings_of,
+)
+from hsdsl.errors import UsageError
+from hsdsl.export import TARGETS, check_folder, files_of, source_of, write
+
+TO = f"The target: {', '.join(TARGETS)}."
+OUT = "The folder for the files; left out, a target with one file of text prints it."
+KEEP = "Only these states and outputs, with what they depend on."
+
+
+def export(
+    model: Model,
+    to: Annotated[str, option("TARGET", TO, "--to", complete=lambda: list(TARGETS.items()))],
+    out: Annotated[Path | None, option("DIR", OUT)] = None,
+    force: Annotated[bool, Option("--force", help="Write into a folder that is not empty.")] = False,
+    overrides: Overrides = None,
+    until: Until = None,
+    scheme: SchemeName = None,
+    method: MethodName = None,
+    step: StepSize = None,
+    tolerance: Tolerance = None,
+    relaxation: Relaxation = None,
+    outputs: Annotated[str | None, option("A,B", KEEP)] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
+) -> None:
+    """Export a model with its settings: code for other tools, or a document."""
+    with answering(json, allow_path, limit):
+        from hsdsl.model import load
+
+        if out is not None:
+            check_folder(out, force)
+        settings = settings_of(
+            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation
+        )
+        loaded = load(model)
+        source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
+        files = files_of(source, to)
+        if out is None:
+            if len(files) > 1:
+                raise UsageError(f"{to} has {len(files)} files: expected --out DIR")
+            print(next(iter(files.values())).decode(), end="")
+            return
+        written = write(files, out, force)
+        if json:
+            print_json({"target": to, "files": [str(path) for path in written]})
+        elif not quiet:
+            for path in written:
+                say(f"wrote {path}")

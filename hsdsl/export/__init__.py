@@ -1,0 +1,61 @@
+"""Registry of export targets, each a function from a model with its settings to files.
+
+A target is a package of the same name with a function ``files(source)``. It returns every file by its path relative to
+the output folder, or raises `UsageError` where the target cannot keep the model: nothing is written before that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path, PurePosixPath
+
+from hsdsl.errors import UsageError
+from hsdsl.export.source import Source, source_of
+from hsdsl.names import did_you_mean
+from hsdsl.store.atomic import replacing
+
+__all__ = ["TARGETS", "Source", "check_folder", "files_of", "source_of", "write"]
+
+TARGETS = {"mermaid": "the mode graph as a Mermaid diagram"}
+
+
+def files_of(source: Source, target: str) -> dict[str, bytes]:
+    """The files of a target by their relative paths, in memory.
+
+    Raises UsageError: an unknown target, or a model that the target cannot keep.
+    """
+    if target not in TARGETS:
+        raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS) or _choices())
+    return import_module(f"hsdsl.export.{target}").files(source)
+
+
+def _choices() -> str:
+    return f"choose from {', '.join(TARGETS)}"
+
+
+def check_folder(folder: Path, force: bool) -> None:
+    """Refuse an output folder that is no folder, or that has entries and no ``force``."""
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"--out {folder}: expected a folder, got a file")
+    if folder.is_dir() and not force and any(folder.iterdir()):
+        raise UsageError(f"--out {folder}: the folder is not empty", "--force writes over the files of an export")
+
+
+def write(files: Mapping[str, bytes], folder: Path, force: bool = False) -> list[Path]:
+    """Write files into a folder, which is made; each of them appears whole.
+
+    Raises UsageError: the folder has entries and ``force`` is not given, or it cannot be written.
+    """
+    check_folder(folder, force)
+    written: list[Path] = []
+    for name, content in files.items():
+        path = folder / PurePosixPath(name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        with replacing(path) as file:
+            file.write(content)
+        written.append(path)
+    return written

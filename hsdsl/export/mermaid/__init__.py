@@ -1,0 +1,54 @@
+"""The mode graph of a model as a Mermaid state diagram: modes with their flow, transitions with guard and reset."""
+
+from __future__ import annotations
+
+from hsdsl.export.source import Source
+from hsdsl.names import visible
+from hsdsl.system import Edge, Mode
+
+
+def files(source: Source) -> dict[str, bytes]:
+    """One diagram."""
+    return {f"{source.name}.mmd": diagram(source).encode()}
+
+
+def diagram(source: Source) -> str:
+    """The text of the diagram.
+
+    Modes are ``m0, m1, ...``, since a name of the model may be a word of the diagram's language.
+    """
+    numbers = {mode.name: f"m{k}" for k, mode in enumerate(source.system.modes)}
+    lines = [*(f"%% {_comment(line)}" for line in source.heading), "stateDiagram-v2"]
+    for mode in source.system.modes:
+        lines.append(f"    {numbers[mode.name]} : {_label(_mode_lines(mode))}")
+    lines.append(f"    [*] --> {numbers[source.system.modes[source.problem.mode].name]}")
+    for mode in source.system.modes:
+        lines += [f"    {numbers[mode.name]} --> {numbers[e.target]} : {_label(_edge_lines(e))}" for e in mode.edges]
+        lines += [f"    {numbers[mode.name]} --> [*]"] if mode.final else []
+    return "\n".join(lines) + "\n"
+
+
+def _mode_lines(mode: Mode) -> list[str]:
+    flow = [f"d{name}/dt = {text}" for name, text in zip(mode.states, mode.flow_texts, strict=True)]
+    return [mode.name, *flow, *(f"domain {wall.text}" for wall in mode.walls)]
+
+
+def _edge_lines(edge: Edge) -> list[str]:
+    resets = zip(edge.target_states, edge.reset_texts, strict=True)
+    condition = [] if edge.condition is None else [f"if {edge.condition}"]
+    changed = [f"{name} := {text}" for name, text in resets if text != name]
+    return [edge.name, f"when {edge.surface.text}", *condition, *changed]
+
+
+def _label(lines: list[str]) -> str:
+    """Lines of a label: every sign but letters, digits and a few others is an entity, so that no text is syntax."""
+    return "<br/>".join("".join(map(_entity, visible(line))) for line in lines)
+
+
+def _entity(sign: str) -> str:
+    return sign if sign.isascii() and (sign.isalnum() or sign in " _.,+-*/()") else f"#{ord(sign)};"
+
+
+def _comment(text: str) -> str:
+    """A comment; braces would open a directive."""
+    return text.replace("{", "(").replace("}", ")")

@@ -1,0 +1,64 @@
+"""Exports as files: names, headings, folders, refusals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import hsdsl
+from hsdsl.cli.verbs import obey
+from hsdsl.export import TARGETS, files_of, source_of
+from hsdsl.export.identifiers import identifiers
+
+MODELS = Path(__file__).parents[2] / "models"
+BALL = str(MODELS / "bouncing-ball.yaml")
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_same_model_gives_same_bytes_and_settings_change_them(target: str) -> None:
+    model = hsdsl.load(BALL)
+    files = files_of(source_of(model, {}), target)
+    assert files == files_of(source_of(hsdsl.load(BALL), {}), target)
+    changed = files_of(source_of(model, {"parameters": {"e": "1/2"}}), target)
+    assert changed != files
+    assert any(b"e=1/2" in content for content in changed.values())
+
+
+def test_unknown_target_and_full_folder_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert obey(["export", BALL, "--to", "mermad", "--out", str(out)]) == 2
+    assert not out.exists()
+    out.mkdir()
+    (out / "mine").write_text("kept")
+    assert obey(["export", BALL, "--to", "mermaid", "--out", str(out)]) == 2
+    assert [path.name for path in out.iterdir()] == ["mine"]
+    assert obey(["export", BALL, "--to", "mermaid", "--out", str(out), "--force"]) == 0
+    assert (out / "mine").read_text() == "kept"
+
+
+def test_bad_settings_are_refused_like_those_of_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert obey(["export", BALL, "--to", "mermaid", "--set", "ee=1"]) == 2
+    assert "did you mean" in capsys.readouterr().err
+
+
+def test_identifiers_are_ascii_distinct_and_not_reserved() -> None:
+    assert identifiers(["θ", "theta", "x", "int", "x", "é"], {"int"}) == {
+        "θ": "theta", "theta": "theta_", "x": "x", "int": "int_", "é": "e",
+    }  # fmt: skip
+
+
+def test_no_text_of_a_model_leaves_a_label() -> None:
+    text = """
+hsdsl: 1
+title: "x %%{init: {}}%% <script>"
+modes:
+  end: {flow: {x: 1}, transitions: [{name: state, when: x >= 1, to: end, reset: {x: 0}}]}
+initial: {mode: end, x: 0}
+experiment: {until: 1}
+"""
+    diagram = files_of(source_of(hsdsl.loads(text), {}), "mermaid")["n_text_.mmd"].decode()
+    assert "{" not in diagram
+    body = [line for line in diagram.splitlines() if not line.startswith("%%")]
+    assert not any("<script" in line for line in body)
+    assert "m0 --> m0 : state" in diagram
