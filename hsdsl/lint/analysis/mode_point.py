@@ -7,8 +7,9 @@ a jump or a value that may be 0 decides, nothing is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf, perm
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,11 @@ class ModePoint:
 
     def sign(self, expr: Any) -> int:
         """-1, 0 or 1; 0 where round-off and the search's own error may be all there is."""
+        value, error = self._valued(expr)
+        return 0 if abs(value) <= error else 1 if value > 0 else -1
+
+    def _valued(self, expr: Any) -> tuple[float, float]:
+        """A value, and how much of it round-off and the search's own error may be."""
         names = sorted(expr.free_symbols, key=str)
         program = self.dynamics.remembered(
             ("terms", expr), lambda: StraightLine([expr, *sp.Add.make_args(expr)], names)
@@ -63,8 +69,7 @@ class ModePoint:
         value, terms, slopes = values[0, 0], values[1:, 0], (values[0, 1:] - values[0, 0]) / _STEP
         if not np.isfinite(value):
             raise Unsure
-        size = max(np.abs(terms).sum(), np.nansum(np.abs(slopes)))
-        return 0 if abs(value) <= NEAR * size else 1 if value > 0 else -1
+        return float(value), NEAR * float(max(np.abs(terms).sum(), np.nansum(np.abs(slopes))))
 
     def changes_sign_nearby(self, expr: Any) -> bool:
         """Whether an expression changes its sign within the error of a point where a derivative vanishes doubly."""
@@ -88,19 +93,34 @@ class ModePoint:
         Raises
         ------
         Unsure
-            The flow or the surface has a kink or a jump here, or depends on an input in a way that is not known.
+            The flow or the surface has a kink or a jump here, or depends on an input in a way that is not known. Or
+            what the errors of lower derivatives hide may outweigh this one, until the next one does.
         """
         piece = self.piece(residual, self.dynamics.flow(self.mode))
-        expr = piece.residual
+        expr, errors = piece.residual, list[float]()
         for order in range(1, DEEPEST + 1):
             expr = self.dynamics.along(expr, piece.flow)
             if expr is None or too_large([expr], MOST_PARTS):
                 raise Unsure
-            if sign := self.sign(expr):
-                return order, sign
+            value, error = self._valued(expr)
+            if abs(value) > error:
+                if any(errors) and not self._outgrows(abs(value), errors, self.dynamics.along(expr, piece.flow)):
+                    raise Unsure
+                return order, 1 if value > 0 else -1
+            errors.append(error)
             if expr.is_zero:
                 break
         return DEEPEST, 0
+
+    def _outgrows(self, value: float, errors: Sequence[float], following: Any) -> bool:
+        """Whether a derivative outweighs the errors of lower ones before the next derivative outweighs it."""
+        order = len(errors) + 1
+        bend = 0.0 if following is None or too_large([following], MOST_PARTS) else abs(self._valued(following)[0])
+        time = (order + 1) * value / bend if bend else inf
+        return all(
+            error == 0 or error * perm(order, order - k) < value * time ** (order - k)
+            for k, error in enumerate(errors, 1)
+        )
 
     def piece(self, residual: Any, flow: Mapping[Any, Any]) -> SmoothPiece:
         """The piece that the point is inside of, and on which surface and flow have all derivatives here.

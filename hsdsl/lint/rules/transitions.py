@@ -9,7 +9,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.crossing import fires
 from hsdsl.lint.analysis.dynamics import Dynamics, bounding
 from hsdsl.lint.analysis.landing import Landing, landings
-from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
+from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.analysis.proof import Proof
 from hsdsl.lint.analysis.question import Answer, at_most_zero, positive, zero
 from hsdsl.lint.analysis.wording import at, within
@@ -37,8 +37,7 @@ def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -
         proof, guard = Proof(dynamics, mode), dynamics.guard(edge.edge)
         always = guard is not None and proof.never(guard, at_most_zero(carried))
         residual = dynamics.residual(edge.edge.surface)
-        others = (dynamics.carried(dynamics.residual(other), edge.edge) for other, _ in bounding(target))
-        about = [residual, carried, *([] if always else [dynamics.rate(mode, residual), *others])]
+        about = [residual, carried, *_deciding(dynamics, mode, edge.edge, after, always)]
         where = at(dynamics, mode, answer, about)
         beyond = f"the guard of '{after.name}'" if after else f"the wall '{surface.text}' of '{target.name}'"
         lands = f"lands{within(proof.searched)}" if always else "can land"
@@ -47,6 +46,16 @@ def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -
         decided, severity = (proof.decided, "warning") if always else (answer.decided, "note")
         finding = Finding(edge.document.to.place.span, message, None, decided, severity=severity)
         alike.add((carried, edge.edge.surface.residual), finding)
+
+
+def _deciding(dynamics: Dynamics, mode: Mode, edge: Edge, after: Edge | None, always: bool) -> list[Any]:
+    """What decides how a run goes on after a landing beyond a surface; where it always is, only edges that go first."""
+    target = dynamics.modes[edge.target]
+    free = ranked(e for e in target.edges if e.condition is None)
+    first = [e.surface for e in free[: free.index(after) if after else None]]
+    surfaces = first if always else [surface for surface, _ in bounding(target)]
+    rate = [] if always else [dynamics.rate(mode, dynamics.residual(edge.surface))]
+    return [*rate, *(dynamics.carried(dynamics.residual(surface), edge) for surface in surfaces)]
 
 
 def _next(here: ModePoint, edge: EdgePart) -> str:
