@@ -15,7 +15,7 @@ from hsdsl.names import shown
 from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_compiler
 
 RUNTIME = Path(__file__).parent / "c"
-PRINTER = Path(__file__).parents[1] / "backends" / "c"
+BACKENDS = Path(__file__).parents[1] / "backends"
 KIND = "compiled"
 
 
@@ -58,7 +58,8 @@ def _key(content: str, compiler: Compiler, effort: Effort) -> str:
 @cache
 def _our_text() -> bytes:
     """The hand-written C and what writes the rest: closer than a version to what a library was made by."""
-    paths = (*sorted(RUNTIME.glob("*.[ch]")), *sorted(PRINTER.glob("*.py")))
+    printers = (BACKENDS / "printer.py", *sorted((BACKENDS / "c").glob("*.py")))
+    paths = (*sorted(RUNTIME.glob("*.[ch]")), *printers)
     return b"".join(path.read_bytes() for path in paths)
 
 
