@@ -17,7 +17,10 @@ from hsdsl.store.atomic import replacing
 
 __all__ = ["TARGETS", "Source", "check_folder", "files_of", "source_of", "write"]
 
-TARGETS = {"mermaid": "the mode graph as a Mermaid diagram"}
+TARGETS = {
+    "c": "a program in C99 that allocates nothing",
+    "mermaid": "the mode graph as a Mermaid diagram",
+}
 
 
 def files_of(source: Source, target: str) -> dict[str, bytes]:

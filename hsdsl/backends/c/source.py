@@ -16,6 +16,7 @@ from hsdsl.backends.c.series import flow_lines, line_count, surface_lines
 from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
+_GIVEN = re.compile(r"^ +p\d+ = given\[\d+\]\n", re.MULTILINE)
 _HEAD = """\
 /* Generated from a model; see hs.h for what the tables mean. */
 
@@ -79,6 +80,17 @@ def width(program: Program) -> int:
 def lines(program: Program) -> int:
     """How many lines the largest tape has."""
     return max((line_count(m.tape, len(m.states)) for m in program.modes if m.tape), default=0)
+
+
+def constant_bodies(program: Program) -> dict[str, str]:
+    """The bodies of `Program.constants`' routines in C, of parameters ``p``, by their names."""
+    names = {f"p{i}": f"p[{i}]" for i in range(len(program.parameters))}
+    found: dict[str, str] = {}
+    for name, text in _DEFINITION.findall(program.constants.source):
+        definition = ast.parse(dedent(f"    def routine{_GIVEN.sub('', text)}")).body[0]
+        assert isinstance(definition, ast.FunctionDef)
+        found[name] = function_body(definition, names)
+    return found
 
 
 class _Writer:

@@ -18,11 +18,6 @@ enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or 
 #define MOST_CREEPING 2000
 #define ROUNDOFF_UNITS 32
 #define ROUNDING 8
-#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
-#define MOST_SPLITS 30
-#define MOST_PIECES 1000
-#define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
-#define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
 
 typedef int hs_functions(hs_run *run, double s, double *values);
 typedef int hs_allowed(hs_run *run, int k, double *allowed);

@@ -9,12 +9,16 @@
 #include "table.c"
 #include "taylor.c"
 #include "scales.c"
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("O2")
+#endif
 #include "linear.c"
 #include "radau.c"
 #include "newton.c"
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
+#endif
 #include "stepper.c"
 
 #include "control.c"

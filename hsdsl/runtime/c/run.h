@@ -18,6 +18,13 @@
 #define HS_UNIT 0x1p-53
 #define HS_TIE 1e-12
 #define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
+#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
+#define MOST_SPLITS 30
+#ifndef MOST_PIECES
+#define MOST_PIECES 1000 /* of a push over time; who lacks memory takes fewer */
+#endif
+#define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
+#define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
 
 enum { NO_VALUE = 1, NO_CONVERGENCE = 2 }; /* why a step has no end */
 

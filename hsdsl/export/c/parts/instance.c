@@ -1,0 +1,160 @@
+/* An instance: its memory laid out for the runtime, and its output handed to a sink. */
+
+#include "instance.h"
+
+#include <string.h>
+
+#include "hs_math.h"
+
+/* The arc that a row is in, as written: the last one of the chunk that begins not after it. */
+static const hs_arc *arc_of(const hs_instance *instance, int64_t row, int64_t *at) {
+  const hs_chunk *chunk = &instance->task.chunk;
+  while (*at < chunk->arcs && chunk->arc[*at].first <= row) ++*at;
+  return *at > 0 ? &chunk->arc[*at - 1] : &instance->last;
+}
+
+static int dimension_of(const hs_instance *instance, const double *x) {
+  int dimension = instance->task.model->width;
+  while (dimension > 0 && x[dimension - 1] != x[dimension - 1]) dimension--; /* not-a-number where a mode has none */
+  return dimension;
+}
+
+static int hand_over_rows(hs_instance *instance) {
+  const hs_chunk *chunk = &instance->task.chunk;
+  const int w = instance->task.model->width, m = instance->task.model->outputs, degree = instance->task.method->degree;
+  int64_t at = 0;
+  int answer = 0;
+  for (int64_t i = 0; i < chunk->rows && !answer; i++) {
+    const hs_arc *arc = arc_of(instance, instance->rows, &at);
+    const hs_row_written row = {instance->rows++,
+                                arc->jump,
+                                arc->mode,
+                                arc->kind,
+                                dimension_of(instance, chunk->values + i * w),
+                                chunk->times[i],
+                                chunk->depth[i],
+                                chunk->values + i * w,
+                                chunk->outputs + i * m,
+                                chunk->pieces + i * degree * w};
+    if (instance->sink.row) answer = instance->sink.row(instance->sink.context, &row);
+  }
+  if (chunk->arcs) instance->last = chunk->arc[chunk->arcs - 1];
+  return answer;
+}
+
+static int hand_over_transitions(hs_instance *instance) {
+  const hs_chunk *chunk = &instance->task.chunk;
+  const int w = instance->task.model->width;
+  const int32_t *alternatives = chunk->alternatives;
+  int answer = 0;
+  for (int64_t i = 0; i < chunk->transitions && !answer; i++) {
+    const hs_transition *made = &chunk->transition[i];
+    const hs_transition_written written = {instance->jumps++, made, chunk->before + i * w,
+                                           made->resumed == made->resumed ? chunk->after + i * w : 0, alternatives};
+    if (instance->sink.transition) answer = instance->sink.transition(instance->sink.context, &written);
+    alternatives += made->alternatives;
+  }
+  return answer;
+}
+
+/* Hand over what is in the chunk and empty it; not 0 where the sink ends the run. */
+static int flush(hs_task *task) {
+  hs_instance *instance = (hs_instance *)task;
+  hs_chunk *chunk = &task->chunk;
+  const int rows = hand_over_rows(instance), transitions = hand_over_transitions(instance);
+  chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
+  return rows || transitions;
+}
+
+static int never_stops(hs_task *task) {
+  (void)task;
+  return 0;
+}
+
+static int has_no_more_room(hs_task *task, hs_visited *larger) {
+  (void)task, (void)larger;
+  return 1;
+}
+
+static void lay_out_chunk(hs_instance *instance) {
+  const hs_chunk chunk = {PROBLEM_ROWS, 0, PROBLEM_ARCS, 0, PROBLEM_TRANSITIONS, 0, PROBLEM_TRANSITIONS, 0,
+                          instance->times, instance->values, instance->outputs, instance->depth, instance->pieces,
+                          instance->arc, instance->transition, instance->before, instance->after,
+                          instance->alternatives, 0, instance->note};
+  const hs_visited visited = {PROBLEM_VISITED, 0, instance->visited_mode, instance->visited, instance->slot};
+  instance->task.chunk = chunk;
+  instance->task.visited = visited;
+}
+
+void hs_open(hs_instance *instance) {
+  hs_task *task = &instance->task;
+  memset(instance, 0, sizeof *instance);
+  lay_out_chunk(instance);
+  instance->timeline = problem_timeline;
+#if defined(PROBLEM_TUNABLE)
+  memcpy(instance->data, problem_timeline.data, PROBLEM_SEGMENTS * PROBLEM_DATA * sizeof *instance->data);
+  instance->timeline.data = instance->data;
+#endif
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) instance->parameters[i] = problem_timeline.data[i];
+  for (int i = 0; i < problem_dimension; i++) instance->x[i] = problem_x[i];
+  task->model = &hs_the_model;
+  task->method = &problem_method;
+  task->timeline = &instance->timeline;
+  task->settings = problem_settings;
+  task->interpolation = problem_interpolation;
+  task->mode = problem_mode;
+  task->dimension = problem_dimension;
+  task->x = instance->x;
+  task->workspace = instance->workspace;
+  task->flush = flush;
+  task->poll = never_stops;
+  task->grow = has_no_more_room;
+  task->stop.x = instance->stop_x;
+  task->stop.slope = instance->stop_slope;
+  task->stop.scales = instance->stop_scales;
+}
+
+#if defined(PROBLEM_TUNABLE)
+int hs_tune(hs_instance *instance) {
+  if (problem_derive(instance->parameters)) return 1;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) {
+    if (!hs_finite(instance->parameters[i])) return 1;
+    for (int64_t k = 0; k < instance->timeline.segments; k++)
+      instance->data[k * PROBLEM_DATA + i] = instance->parameters[i];
+  }
+  return 0;
+}
+
+int hs_start(hs_instance *instance) {
+  if (problem_start(instance->parameters, instance->x)) return 1;
+  for (int i = 0; i < problem_dimension; i++)
+    if (!hs_finite(instance->x[i])) return 1;
+  return 0;
+}
+#endif
+
+void hs_run_instance(hs_instance *instance) {
+  hs_task *task = &instance->task;
+  instance->rows = instance->jumps = 0;
+  hs_simulate(task);
+  flush(task);
+}
+
+const char *hs_stop_word(const hs_stop *stop) {
+  switch (stop->reason) {
+    case HS_UNTIL:
+    case HS_UNTIL_IN_STRIP:
+    case HS_UNTIL_ON_GUARD: return "until";
+    case HS_FINAL: return "final";
+    case HS_ZENO:
+    case HS_ACCUMULATED: return "zeno";
+    case HS_LIMIT: return "transition_limit";
+    case HS_RESET_NOT_FINITE:
+    case HS_HERE_NOT_FINITE:
+    case HS_STEP_NOT_FINITE: return "not_finite";
+    case HS_ENTERED_OUTSIDE:
+    case HS_LEFT: return "left_domain";
+    case HS_INTERRUPTED: return "interrupted";
+    default: return stop->failure == HS_WALL ? "left_domain" : "step_underflow";
+  }
+}

@@ -1,0 +1,88 @@
+/* One run of the exported model with all of its memory: nothing is allocated. */
+
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include "problem.h"
+#include "workspace.h"
+
+#ifndef PROBLEM_ROWS
+#define PROBLEM_ROWS 64 /* of a chunk; what is written goes to the sink when a chunk is full */
+#endif
+#ifndef PROBLEM_VISITED
+#define PROBLEM_VISITED 64 /* modes that one chain of transitions at an instant may enter */
+#endif
+
+typedef struct hs_instance hs_instance;
+
+/* A row of the run: times and states never wait for more than a chunk. `mode` is that of its arc, `kind` whether it is
+   a strip, `piece` the interpolant from the row before to this one. */
+typedef struct {
+  int64_t number, jump;
+  int mode, kind, dimension;
+  double time, depth;
+  const double *x, *outputs, *piece;
+} hs_row_written;
+
+/* A transition; `after` is 0 where the run ended before it was made. */
+typedef struct {
+  int64_t number;
+  const hs_transition *made;
+  const double *before, *after;
+  const int32_t *alternatives;
+} hs_transition_written;
+
+/* What takes the output of a run. Either function may be 0; one that does not return 0 ends the run. */
+typedef struct {
+  void *context;
+  int (*row)(void *context, const hs_row_written *row);
+  int (*transition)(void *context, const hs_transition_written *transition);
+} hs_sink;
+
+enum { PROBLEM_ARCS = PROBLEM_ROWS / 2 + 8, PROBLEM_TRANSITIONS = PROBLEM_ROWS / 4 + 8 };
+
+struct hs_instance {
+  hs_task task; /* first: the runtime hands its address back */
+  hs_sink sink;
+  hs_timeline timeline;
+  int64_t rows, jumps; /* handed to the sink */
+  hs_arc last;
+  double x[PROBLEM_WIDTH + 1];
+  double parameters[PROBLEM_PARAMETERS + 1];
+#if defined(PROBLEM_TUNABLE)
+  double data[PROBLEM_SEGMENTS * PROBLEM_DATA + 1];
+#endif
+  double stop_x[PROBLEM_WIDTH + 1], stop_slope[PROBLEM_WIDTH + 1], stop_scales[PROBLEM_WIDTH + 1];
+  double workspace[PROBLEM_WORKSPACE];
+  double times[PROBLEM_ROWS], depth[PROBLEM_ROWS], values[PROBLEM_ROWS * PROBLEM_WIDTH + 1];
+  double outputs[PROBLEM_ROWS * PROBLEM_OUTPUTS + 1];
+  double pieces[(PROBLEM_ROWS + 1) * PROBLEM_DEGREE * PROBLEM_WIDTH + 1];
+  hs_arc arc[PROBLEM_ARCS];
+  hs_transition transition[PROBLEM_TRANSITIONS];
+  double before[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1], after[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1];
+  int32_t alternatives[PROBLEM_TRANSITIONS * PROBLEM_EDGES + 1];
+  hs_note note[PROBLEM_TRANSITIONS];
+  int32_t visited_mode[PROBLEM_VISITED];
+  double visited[PROBLEM_VISITED * PROBLEM_WIDTH + 1];
+  int64_t slot[2 * PROBLEM_VISITED];
+};
+
+/* Make an instance ready: the problem as the model's file has it. */
+void hs_open(hs_instance *instance);
+
+#if defined(PROBLEM_TUNABLE)
+/* Derive the parameters that others decide, and put all of them where the routines read them; not 0 where one has no
+   finite value. `instance->parameters` has the values of the others. */
+int hs_tune(hs_instance *instance);
+
+/* Derive the initial state from the parameters; not 0 where it has no finite value. */
+int hs_start(hs_instance *instance);
+#endif
+
+/* Run to the end; everything that is written goes to the sink. */
+void hs_run_instance(hs_instance *instance);
+
+/* A word for why the run ended. */
+const char *hs_stop_word(const hs_stop *stop);
+
+#endif

@@ -1,0 +1,37 @@
+"""A model with its runtime and its numbers as C that builds alone; every target that compiles C begins with these."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hsdsl.backends.c import model_source
+from hsdsl.errors import UsageError
+from hsdsl.export.c.problem import header, numbers
+from hsdsl.export.c.text import comment
+from hsdsl.export.source import Source
+from hsdsl.runtime.compiler import FLAGS
+from hsdsl.runtime.library import RUNTIME
+
+PARTS = Path(__file__).parent / "parts"
+COMPILED = ("model.c", "problem.c", "instance.c", "runtime/hs.c")  # with -I. -Iruntime, and linked with -lm
+
+# those that decide the bits of a run
+EXACT_FLAGS = tuple(flag for flag in FLAGS if flag.startswith(("-ffp-", "-fno-math-", "-fno-builtin-")))
+
+
+def c_sources(source: Source) -> dict[str, bytes]:
+    """The files by their paths: ``model.c`` and ``problem.[ch]`` generated, ``instance.[ch]`` and ``runtime/``.
+
+    Raises UsageError: the runtime has no such scheme.
+    """
+    settings = source.problem.settings
+    if settings.method is None:
+        raise UsageError(f"the C runtime has no scheme {settings.scheme}", "choose --scheme located or relaxed")
+    files = {
+        "model.c": comment(source.heading) + model_source(source.problem.program),
+        "problem.h": header(source),
+        "problem.c": numbers(source),
+    }
+    runtime = {f"runtime/{path.name}": path.read_bytes() for path in sorted(RUNTIME.glob("*.[ch]"))}
+    parts = {path.name: path.read_bytes() for path in sorted(PARTS.glob("instance.[ch]"))}
+    return {name: text.encode() for name, text in files.items()} | parts | runtime

@@ -1,0 +1,94 @@
+"""Parameters by what a change of them needs: which others decide, which decide when inputs change; as C functions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from hsdsl.backends.c import constant_bodies, width
+from hsdsl.export.c.text import array
+from hsdsl.program import Program
+from hsdsl.simulate import Problem
+
+_ROUTINE = re.compile(r"^    def (\w+)\(\*?\w*\):\n(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
+_GIVEN = re.compile(r"\bgiven\[(\d+)\]")
+_NUMBERED = re.compile(r"\bp(\d+)\b")
+
+_DERIVE = """
+int problem_derive(double *p) {{
+  int bad = 0;
+  (void)p;
+{calls}
+  return bad;
+}}
+
+int problem_start(const double *p, double *x) {{
+  double out[{width}] = {{0}};
+  if (initial(p, out)) return 1;
+  (void)x;
+{start}
+  return 0;
+}}
+"""
+
+
+def derived(problem: Problem) -> set[str]:
+    """The parameters that are expressions of others, and not overridden."""
+    program = problem.program
+    used = _used(program)
+    return {
+        name
+        for i, name in enumerate(program.parameters)
+        if used.get(f"parameter_{i}") and name not in problem.settings.overrides
+    }
+
+
+def structural(problem: Problem) -> set[str]:
+    """The parameters that decide the samples of inputs or when switches of time change; such times are data."""
+    program, own = problem.program, derived(problem)
+    used = _used(program)
+    direct = {i for name, needed in used.items() if name.startswith("input_") for i in needed}
+    body = program.switching.source.partition("\n")[2]
+    direct |= {int(i) for i in _NUMBERED.findall(body)}
+    return {program.parameters[i] for i in _closed(program, used, own, direct)}
+
+
+def _used(program: Program) -> dict[str, set[int]]:
+    """The parameters that each constant is computed from."""
+    texts: Iterable[tuple[str, str]] = _ROUTINE.findall(program.constants.source)
+    return {name: {int(i) for i in _GIVEN.findall(body)} for name, body in texts}
+
+
+def _closed(program: Program, used: dict[str, set[int]], own: set[str], direct: set[int]) -> set[int]:
+    """Parameters with those that they are derived from, which come before them."""
+    found = set(direct)
+    for i in reversed(range(len(program.parameters))):
+        if i in found and program.parameters[i] in own:
+            found |= used[f"parameter_{i}"]
+    return found
+
+
+def derivations(problem: Problem) -> str:
+    """The definitions of ``problem_derive`` and ``problem_start``, and of what kind each parameter is."""
+    program, overrides = problem.program, problem.settings.overrides
+    bodies, own, fixed = constant_bodies(program), derived(problem), structural(problem)
+    flags = array("const int", "problem_derived", (str(int(name in own)) for name in program.parameters))
+    flags += array("const int", "problem_structural", (str(int(name in fixed)) for name in program.parameters))
+    functions, calls = list[str](), list[str]()
+    for i, name in enumerate(program.parameters):
+        if name in own:
+            functions.append(_function(f"parameter_{i}", bodies[f"parameter_{i}"]))
+            calls.append(f"  bad |= parameter_{i}(p, p + {i});")
+    start = [
+        f"  x[{i}] = out[{program.initial_states.index(name)}];"
+        for i, name in enumerate(problem.states)
+        if f"initial.{name}" not in overrides
+    ]
+    functions.append(_function("initial", bodies["initial"]))
+    text = _DERIVE.format(calls="\n".join(calls), start="\n".join(start), width=width(program) + 1)
+    return flags + "".join(functions) + text
+
+
+def _function(name: str, body: str) -> str:
+    head = f"static int {name}(const double *p, double *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
+    return f"{head}{body}\n  return bad;\n}}\n"

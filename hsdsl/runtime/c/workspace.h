@@ -1,0 +1,37 @@
+/* What hs_workspace() gives, as a constant expression: so the memory of a run can be static.
+
+   The terms are those of lay_out() and lay_out_located() in hs.c, array by array. */
+
+#ifndef HS_WORKSPACE_H
+#define HS_WORKSPACE_H
+
+#include "run.h"
+
+#define HS_LARGER(a, b) ((a) > (b) ? (a) : (b))
+#define HS_TAKEN(count, type) (((count) * (int)sizeof(type) + (int)sizeof(double) - 1) / (int)sizeof(double))
+#define HS_NUMBERS(count) HS_TAKEN(count, double)
+
+/* w: states of the largest mode; m, e: surfaces and edges of the mode with most; modes, lines, states: see hs_model.
+   kind, stages, extra, order, degree: see hs_method. */
+#define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
+#define HS_STAGES(w, all) (HS_TAKEN(all, double *) + ((all)-1) * HS_NUMBERS(w))
+#define HS_SPAN(w, degree) (2 * HS_NUMBERS(w) + HS_PIECE(w, degree))
+#define HS_RADAU_SPACE(w) (5 * HS_NUMBERS((w) * (w)) + 21 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
+#define HS_SPACE(w, m, e, lines, states, kind, stages, extra, order, degree)                                       \
+  (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
+   ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + ((kind) == HS_RADAU ? HS_RADAU_SPACE(w) : 0) + \
+   4 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 3 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
+   (2 + (m)) * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
+
+#define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
+#define HS_LOCATED_SPACE_OF(w, m, modes, lines, stages, extra, degree, most)                                       \
+  (HS_NUMBERS((w) * (w)) + 2 * HS_SPAN(w, degree) + 2 * HS_NUMBERS(w) + HS_STAGES(w, (stages) + 1 + (extra)) +     \
+   3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) + HS_NUMBERS(4 * (lines)) +                       \
+   (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
+   HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
+   2 * HS_NUMBERS(MOST_PARTS) + HS_NUMBERS(MOST_PARTS * (m) * ((most) + 1)) + HS_NUMBERS(MOST_PARTS * (m)) +       \
+   2 * HS_TAKEN(MOST_PARTS * (m), int))
+#define HS_LOCATED_SPACE(w, m, modes, lines, stages, extra, order, degree) \
+  HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, lines, stages, extra, degree, HS_MOST_DEGREE(order, degree))
+
+#endif

@@ -1,0 +1,65 @@
+"""Exports built by a C compiler and run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+from hsdsl.export import files_of, source_of, write
+from hsdsl.export.c.sources import COMPILED, EXACT_FLAGS
+from hsdsl.model import Model
+from hsdsl.runtime.library import RUNTIME
+
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+COMPILERS: dict[str, list[str]] = {name: [path] for name in ("gcc", "clang") if (path := which(name))}
+if find_spec("ziglang") and "clang" not in COMPILERS:
+    COMPILERS["clang"] = [sys.executable, "-m", "ziglang", "cc", "-Wno-unused-command-line-argument"]
+
+
+def exported(model: Model, folder: Path, target: str = "c", **arguments: Any) -> Path:
+    """Export a model to a folder."""
+    write(files_of(source_of(model, arguments), target), folder, force=True)
+    return folder
+
+
+@cache
+def _objects() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="hsdsl-objects-")
+
+
+@cache
+def runtime_object(command: tuple[str, ...]) -> str:
+    """The runtime compiled by a command, once for all tests: it is the same in every export."""
+    target = Path(_objects().name) / f"hs{runtime_object.cache_info().currsize}.o"
+    _run([*command, f"-I{RUNTIME}", "-c", "-o", str(target), str(RUNTIME / "hs.c")])
+    return str(target)
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:4000]
+    assert not done.stderr
+
+
+def built(folder: Path, compiler: list[str], *options: str, main: str = "main.c") -> Path:
+    """Compile an export with all warnings as errors."""
+    program, command = folder / "model", [*compiler, "-O1", *WARNINGS, *EXACT_FLAGS, *options]
+    sources = [str(folder / name) for name in (main, *COMPILED) if name != "runtime/hs.c"]
+    includes = (f"-I{folder}", f"-I{folder / 'runtime'}")
+    assert all((folder / "runtime" / path.name).read_bytes() == path.read_bytes() for path in RUNTIME.glob("*.[ch]"))
+    _run([*command, *includes, "-o", str(program), *sources, runtime_object(tuple(command)), "-lm"])
+    return program
+
+
+def output(program: Path) -> Any:
+    """What a program prints, read as JSON."""
+    done = subprocess.run([str(program)], capture_output=True, text=True, timeout=300)
+    assert done.returncode in (0, 1), done
+    return json.loads(done.stdout)

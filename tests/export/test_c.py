@@ -1,0 +1,118 @@
+"""Programs in C against runs: every digit of every transition."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import pytest
+from export.c_builds import COMPILERS, built, exported, output
+
+import hsdsl
+from hsdsl.cli.verbs import obey
+from hsdsl.report import as_json
+
+MODELS = Path(__file__).parents[2] / "models"
+FAST = {"bouncing-ball", "thermostat", "digital-control"}
+NAMES = [
+    pytest.param(path.stem, marks=() if path.stem in FAST else pytest.mark.slow)
+    for path in sorted(MODELS.glob("*.yaml"))
+]
+# schemes and methods on models where each of them has something to do
+OTHERS: list[tuple[str, dict[str, Any]]] = [
+    ("bouncing-ball", {"scheme": "relaxed", "method": "rk4", "step": 1e-2, "relaxation": 1e-4}),
+    ("bouncing-ball", {"method": "dopri5", "tolerance": 1e-6, "until": 14}),
+    ("thermostat", {"method": "dop853"}),
+    ("digital-control", {"scheme": "relaxed", "method": "euler", "step": 1e-2, "relaxation": 1e-3}),
+    ("stiff-switch", {"method": "radau", "tolerance": 1e-5}),
+]
+INPUTS = """
+hsdsl: 1
+title: "*/ int main; /* ??/ \\\\ \\" %s"
+parameters: {k: 2, half: k/2}
+inputs:
+  u: {times: [0, 1, 2.5], values: [1, -1, half], hold: zero}
+  w: {times: [0, 3], values: [0, 1], hold: linear}
+modes:
+  on:
+    flow: {x: u + w + sign(sin(k*t)), y: -y}
+    transitions:
+      - {name: "a \\"b\\" \\\\ %d ??/ ü", when: x >= 1, to: on, reset: {x: -half}}
+      - {when: y <= 1/20, to: off, reset: {z: y}}
+  off: {flow: {z: 1}, transitions: [{when: z >= 2, to: end}]}
+  end: {final: true}
+outputs: {sum: x + y}
+initial: {mode: on, x: 0, y: k}
+experiment: {until: 12, method: dopri5}
+"""
+
+
+def same(folder: Path, model: Any, compiler: list[str], **arguments: Any) -> Any:
+    """A run and the exported program's output, which must be equal."""
+    run = as_json(model.simulate(**arguments, engine="c"))
+    found = output(built(exported(model, folder, **arguments), compiler))
+    for key in ("transitions", "final"):
+        assert found[key] == run[key], key
+    assert found["stop"] == {key: run["stop"][key] for key in ("reason", "time")}
+    return found
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_model_prints_the_transitions_of_its_run(name: str, compiler: str, tmp_path: Path) -> None:
+    found = same(tmp_path, hsdsl.load(MODELS / f"{name}.yaml"), COMPILERS[compiler])
+    assert found["transitions"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "arguments"), OTHERS)
+def test_other_schemes_and_methods(name: str, arguments: dict[str, Any], tmp_path: Path) -> None:
+    same(tmp_path, hsdsl.load(MODELS / f"{name}.yaml"), next(iter(COMPILERS.values())), **arguments)
+
+
+def test_inputs_switches_final_modes_and_hostile_texts(tmp_path: Path) -> None:
+    found = same(tmp_path, hsdsl.loads(INPUTS), next(iter(COMPILERS.values())))
+    assert {made["edge"] for made in found["transitions"]} == {'a "b" \\ %d ??/ ü', "on->off", "off->end"}
+
+
+CHECK = """
+#include <stdio.h>
+#include "instance.h"
+int main(void) {
+  long space = (long)hs_workspace(&hs_the_model, &problem_method, (hs_scheme)problem_settings.scheme);
+  printf("[%ld, %ld]\\n", space, (long)PROBLEM_WORKSPACE);
+  return 0;
+}
+"""
+SPACES = [("bouncing-ball", {}), ("stiff-switch", {"method": "radau"}), ("pronking-runner", {"method": "dop853"}),
+          ("constrained-pendulum", {"scheme": "relaxed", "method": "euler", "step": 0.1})]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "arguments"), SPACES)
+def test_static_memory_is_what_the_runtime_takes(name: str, arguments: dict[str, Any], tmp_path: Path) -> None:
+    folder = exported(hsdsl.load(MODELS / f"{name}.yaml"), tmp_path, **arguments)
+    (folder / "check.c").write_text(CHECK)
+    taken, given = output(built(folder, next(iter(COMPILERS.values())), main="check.c"))
+    assert taken == given > 0
+
+
+@pytest.mark.slow
+def test_cmake_builds_it(tmp_path: Path) -> None:
+    if not (cmake := which("cmake")):
+        pytest.skip("no cmake here")
+    model = hsdsl.load(MODELS / "thermostat.yaml")
+    folder = exported(model, tmp_path / "export")
+    for step in (["-S", str(folder), "-B", str(tmp_path / "build")], ["--build", str(tmp_path / "build")]):
+        done = subprocess.run([cmake, *step], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert output(tmp_path / "build" / "model")["transitions"] == as_json(model.simulate(engine="c"))["transitions"]
+
+
+def test_a_scheme_without_a_c_loop_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    ball = str(MODELS / "oscillator-with-stop-1.yaml")
+    assert obey(["export", ball, "--to", "c", "--scheme", "paoli-schatzman", "--out", str(out)]) == 2
+    assert "paoli-schatzman" in capsys.readouterr().err
+    assert not out.exists()
