@@ -86,11 +86,31 @@ class Edge:
     priority: int = 0
 
 
+SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape of the scene: a key of :data:`SIZES`, and how many points it has.
+
+    Its numbers are the coordinates x, y of each point, and then its sizes.
+    """
+
+    kind: str
+    points: int
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it has."""
+        return 2 * self.points + len(SIZES[self.kind])
+
+
 @dataclass(frozen=True)
 class Mode:
-    """A mode: states in file order, their flow, walls, outgoing edges in file order, and outputs.
+    """A mode: states in file order, their flow, walls, outgoing edges in file order, outputs and scene.
 
-    ``outputs`` has one entry for each output of the system, None where the mode does not define it.
+    ``outputs`` has one entry for each output of the system, None where the mode does not define it. ``scene`` likewise
+    has the numbers of the system's shapes, one shape behind the other.
     A final mode without flow has ``states == ()`` here: it has the states it is entered with.
     """
 
@@ -102,6 +122,7 @@ class Mode:
     edges: tuple[Edge, ...]
     outputs: tuple[sp.Expr | None, ...]
     final: bool = False
+    scene: tuple[sp.Expr | None, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.states) == len(self.flow) == len(self.flow_texts):
@@ -187,6 +208,7 @@ class HybridSystem:
     experiment: Experiment
     reference: tuple[Reference, ...]
     files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
+    scene: tuple[Shape, ...] = ()
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hsdsl import limits
@@ -15,6 +15,7 @@ from hsdsl.elaborate.inputs import define_inputs
 from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
+from hsdsl.elaborate.scene import elaborate_scene, scene_of
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
@@ -100,6 +101,8 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     define_lets(symbols)
     outputs = elaborate_outputs(symbols)
     modes = elaborate_modes(symbols, outputs)
+    scene, numbers = elaborate_scene(symbols)
+    modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
     initial = elaborate_initial(symbols)
     experiment = elaborate_experiment(symbols)
     units = elaborate_units(symbols)
@@ -119,6 +122,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         experiment=experiment,
         reference=reference,
         files=symbols.data,
+        scene=scene,
     )
 
 

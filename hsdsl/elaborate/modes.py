@@ -15,7 +15,7 @@ from hsdsl.elaborate.resolver import all_of
 from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.schema import ModeDocument
-from hsdsl.source import Key
+from hsdsl.source import Key, Scalar
 from hsdsl.system import Mode
 
 
@@ -74,9 +74,7 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
 
     A `let` name that some mode defines means itself, like a state, until the mode is known.
     """
-    scope = symbols.scope(
-        ("time", "parameters", "inputs", "states", "let"), "", {name: state(name) for name in symbols.inner_lets}
-    )
+    scope = output_scope(symbols)
     outputs: dict[str, Value | None] = {}
     for name, scalar in symbols.document.outputs.items():
         _check_name(symbols, name)
@@ -87,6 +85,12 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
     return outputs
 
 
+def output_scope(symbols: SymbolTable) -> Scope:
+    """The names that can be used in an output of the whole model."""
+    inner: Meanings = {name: state(name) for name in symbols.inner_lets}
+    return symbols.scope(("time", "parameters", "inputs", "states", "let"), "", inner)
+
+
 def _check_name(symbols: SymbolTable, name: Key) -> None:
     if symbols.names.get(name) == "states":
         message = f"the output '{name}' has the name of a state"
@@ -95,19 +99,20 @@ def _check_name(symbols: SymbolTable, name: Key) -> None:
 
 def outputs_of(symbols: SymbolTable, shared: dict[str, Value | None], document: ModeDocument, scope: Scope) -> tuple:
     """The outputs of a mode, in the order of `SymbolTable.all_outputs`; None for one that it does not have."""
-    outputs = {name: _here(symbols, name, value, scope) for name, value in shared.items()}
+    given = {str(name): scalar for name, scalar in symbols.document.outputs.items()}
+    outputs = {name: output_here(symbols, given[name], value, scope) for name, value in shared.items()}
     outputs |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
     values = (outputs.get(name) for name in symbols.all_outputs)
     return tuple(None if value is None else value.expr for value in values)
 
 
-def _here(symbols: SymbolTable, name: str, value: Value | None, scope: Scope) -> Value | None:
-    """An output of the whole model in one mode."""
+def output_here(symbols: SymbolTable, scalar: Scalar, value: Value | None, scope: Scope) -> Value | None:
+    """An output of the whole model in one mode; None where it has no value there."""
     if value is None:
         return None
     inner = value.uses & symbols.inner_lets
     if any(isinstance(scope.values[name], Refusal) for name in inner):
         return None
     if inner:
-        value = symbols.number(symbols.document.outputs[name], replace(scope, states=None))  # pyright: ignore[reportArgumentType]
+        value = symbols.number(scalar, replace(scope, states=None))  # pyright: ignore[reportArgumentType]
     return value if value is not None and value.uses <= (scope.states or frozenset()) else None

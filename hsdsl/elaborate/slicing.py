@@ -99,6 +99,7 @@ def _states(mode: Mode, expressions: Iterable[sp.Basic]) -> Iterator[Node]:
 
 def _mode(mode: Mode, needed: set[Node], outputs: list[int], own: set[str]) -> Mode:
     kept = [k for k, state in enumerate(mode.states) if (mode.name, state) in needed]
+    gone = {(mode.name, state) for state in mode.states} - needed
     return replace(
         mode,
         states=tuple(mode.states[k] for k in kept),
@@ -106,6 +107,7 @@ def _mode(mode: Mode, needed: set[Node], outputs: list[int], own: set[str]) -> M
         flow_texts=tuple(mode.flow_texts[k] for k in kept),
         edges=tuple(_edge(edge, needed, own) for edge in mode.edges),
         outputs=tuple(mode.outputs[k] for k in outputs),
+        scene=tuple(None if value is None or gone & {*_states(mode, [value])} else value for value in mode.scene),
     )
 
 

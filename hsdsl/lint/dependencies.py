@@ -49,7 +49,7 @@ class _Names:
 
     def used(self, expression: SourceExpression) -> Iterator[Definition]:
         """The definitions that an expression names."""
-        everywhere = expression.role == "output" and expression.mode is None  # every mode reads it
+        everywhere = expression.role in ("output", "scene") and expression.mode is None  # every mode reads it
         inner = self.own.values() if everywhere else [self.own.get(expression.mode or "", {})]
         for name in expression.names:
             own = [table[name] for table in inner if name in table]
@@ -79,7 +79,7 @@ class Influence:
     Attributes
     ----------
     observed : frozenset of str
-        The names in guards, conditions, walls and outputs.
+        The names in guards, conditions, walls, outputs and the scene.
     needed : frozenset of str
         The names that can change the value of an observed one, or a setting of the experiment.
     read : frozenset of str
@@ -110,7 +110,7 @@ def _names(expr: Any) -> Iterator[str]:
 def _observed(system: HybridSystem) -> Iterator[Any]:
     for mode in system.modes:
         yield from (surface.residual for surface in mode.walls)
-        yield from (output for output in mode.outputs if output is not None)
+        yield from (value for value in (*mode.outputs, *mode.scene) if value is not None)
         for edge in mode.edges:
             yield edge.surface.residual
             if edge.condition is not None:

@@ -100,6 +100,7 @@ def _meaning(system: HybridSystem) -> tuple[Any, ...]:
             mode.flow,
             mode.final,
             mode.outputs,
+            mode.scene,
             [(e.name, e.target, e.surface.residual, e.condition, e.reset) for e in mode.edges],
         )
         for mode in system.modes

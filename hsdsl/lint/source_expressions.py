@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 from hsdsl.errors import Span
@@ -23,6 +24,7 @@ Role = Literal[
     "if",  # its condition
     "reset",  # its new value of the state `name`
     "output",  # the output `name`, of `mode` or of the whole model
+    "scene",  # a number of a shape
     "initial",  # the initial value of the state `name`
     "scale",  # the size of the state `name`
     "experiment",  # the setting `name`
@@ -89,6 +91,8 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
         yield from _of_mode(str(name), mode)
     for name, scalar in document.outputs.items():
         yield SourceExpression("output", scalar, name)
+    for shape in document.scene:
+        yield from _each("scene", (*chain.from_iterable(shape.points), *shape.sizes), "")
     for name, scalar in document.initial.__pydantic_extra__.items():
         yield SourceExpression("initial", scalar, name)
     experiment = document.experiment

@@ -32,6 +32,7 @@ from hsdsl.schema.fields import (
     optional,
     required,
 )
+from hsdsl.schema.shapes import BoxShape, CircleShape, LineShape, PointShape, Shape, SpringShape
 from hsdsl.source import Scalar
 
 
@@ -232,6 +233,11 @@ class ModelDocument(Document):
         "mode that lacks one of its names.",
         {"energy": "m*g*h + m*v**2/2"},
     )
+    scene: Items[Shape] = items(
+        "Shapes that show the states, drawn in this order; x goes right and y up. Their numbers are read as outputs "
+        "are; in a mode that lacks one of its numbers a shape is not drawn.",
+        [{"line": [[0, 0], ["x", "y"]]}, {"circle": ["x", "y"], "radius": "0.1"}],
+    )
     units: OpenTable[Text] = mapping("Unit of a state, parameter, input or output, or of `t`.", {"h": "m", "v": "m/s"})
     initial: InitialDocument = required(
         "Where a run starts: `mode`, and a value for each of its states.", {"mode": "fall", "h": 10, "v": 0}
@@ -250,6 +256,11 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     ("inputs", "*", "<file>"): (InputFile, "an input"),
     ("modes", "*"): (ModeDocument, "a mode"),
     ("modes", "*", "transitions", "*"): (TransitionDocument, "a transition"),
+    ("scene", "*", "<point>"): (PointShape, "a point"),
+    ("scene", "*", "<line>"): (LineShape, "a line"),
+    ("scene", "*", "<circle>"): (CircleShape, "a circle"),
+    ("scene", "*", "<spring>"): (SpringShape, "a spring"),
+    ("scene", "*", "<box>"): (BoxShape, "a box"),
     ("initial",): (InitialDocument, "`initial`"),
     ("experiment",): (ExperimentDocument, "`experiment`"),
     ("reference", "*"): (ReferenceDocument, "a reference"),

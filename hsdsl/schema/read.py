@@ -15,13 +15,15 @@ from hsdsl.schema.fields import described
 from hsdsl.schema.idioms import translate_idioms
 from hsdsl.schema.indentation import correct_indentation
 from hsdsl.schema.recovery import recover
+from hsdsl.schema.shapes import KINDS
 from hsdsl.schema.spelling import correct_spelling
 from hsdsl.schema.suggestions import key_meant, missing_key_hint, part_of_transition, path_meant, unknown_key_hint
 from hsdsl.schema.value_suggestions import assigned, undifferentiated
 from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange, descend, keys
 
 _MOST_READINGS = 8
-_TAG = re.compile(r"<(?:expression|mapping|list|samples|file)>|function-\w+\[.*")  # of a union; no key in the file
+_TAGS = "|".join(("expression", "mapping", "list", "samples", "file", *KINDS))  # of a union; no key in the file
+_TAG = re.compile(rf"<(?:{_TAGS})>|function-\w+\[.*")
 
 
 def read(root: Node, findings: Findings) -> ModelDocument:

@@ -13,7 +13,10 @@ from hsdsl.source import Key, Mapping, Node, Scalar, child, children, keys
 
 _WORD = re.compile(r"[^\W\d]\w*")
 _FOR_PEOPLE = ("title", "source", "units")
-_OF_STATES = ("modes", "initial", "experiment", "outputs", "units", "reference", "flow", "transitions", "reset")
+_OF_STATES = (
+    *("modes", "initial", "experiment", "outputs", "scene", "units", "reference"),
+    *("flow", "transitions", "reset"),
+)
 
 
 def correct_spelling(root: Node, findings: Findings) -> None:

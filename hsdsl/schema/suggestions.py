@@ -57,6 +57,7 @@ _ADD = {
     "values": "write values: and one value for each of the times",
     "file": "write file: and the name of a CSV file",
     "time": "write time: and when that is",
+    **{size: f"write {size}: and a number or an expression" for size in ("radius", "width", "height")},
 }
 _MODE = ("modes", "*")
 _MOST_PARTS = 6  # a transition has so many keys

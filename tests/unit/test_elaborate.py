@@ -8,6 +8,7 @@ import pytest
 import sympy as sp
 
 from hsdsl.elaborate import elaborate, parameter_expression
+from hsdsl.elaborate.slicing import only
 from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
 from hsdsl.system import TIME, HybridSystem, KnownState, KnownTransition, Reference
 
@@ -329,3 +330,42 @@ def test_a_header_of_samples_is_told_what_it_should_be(tmp_path, header, hint):
         elaborate(tmp_path / "m.yaml", text=text.encode())
     (fault,) = refusal.value.diagnostics
     assert fault.code == "HS312" and hint in f"{fault.message} {fault.hint}"
+
+
+SCENE = """hsdsl: 1
+parameters: {r: 0.1}
+let: {up: x + r}
+modes:
+  A: {flow: {x: 1}, let: {foot: up}, transitions: [{when: x >= 1, to: B, reset: {y: 0}}]}
+  B: {flow: {x: 1, y: 1}, let: {foot: y}}
+scene:
+  - point: [x, t]
+  - line: [[0, 0], [up, foot], [1, y]]
+  - {circle: [x, 0], radius: r}
+  - spring: [[0, 0], [x, 0]]
+  - {box: [x, 0], width: 1, height: 2}
+initial: {mode: A, x: 0}
+experiment: {until: 2}
+"""
+
+
+def test_scenes_are_read_in_each_mode_like_outputs():
+    made = system(SCENE)
+    y, r = (sp.Symbol(n, real=True) for n in "yr")
+    assert [(shape.kind, shape.points, shape.numbers) for shape in made.scene] == [
+        ("point", 1, 2),
+        ("line", 3, 6),
+        ("circle", 1, 3),
+        ("spring", 2, 4),
+        ("box", 1, 5),
+    ]
+    rest = (X, 0, r, 0, 0, X, 0, X, 0, 1, 2, 0)
+    assert made.modes[0].scene == (X, TIME, 0, 0, X + r, X + r, 1, None, *rest)
+    assert made.modes[1].scene == (X, TIME, 0, 0, X + r, y, 1, y, *rest)
+
+
+def test_slices_keep_what_they_can_of_a_scene():
+    """Without y, which nothing else needs, its coordinates have no value."""
+    sliced = only(system(SCENE), ["x"])
+    assert sliced.modes[1].states == ("x",) and len(sliced.modes[1].scene) == 20
+    assert sliced.modes[1].scene[5] is None and sliced.modes[1].scene[7] is None and sliced.modes[1].scene[0] == X

@@ -68,7 +68,7 @@ def _behaviour(mode: Mode) -> Any:
         (e.surface.residual, e.condition, None if e.target == mode.name else e.target, e.reset, e.priority)
         for e in mode.edges
     )
-    return (mode.states, mode.flow, tuple(wall.residual for wall in mode.walls), edges, mode.outputs)
+    return (mode.states, mode.flow, tuple(wall.residual for wall in mode.walls), edges, mode.outputs, mode.scene)
 
 
 def repeated_default(subject: Subject) -> Iterator[Finding]:

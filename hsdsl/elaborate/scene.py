@@ -1,0 +1,31 @@
+# pyright: basic
+"""Scenes: shapes, and their numbers in each mode, read as outputs are."""
+
+from __future__ import annotations
+
+from hsdsl.elaborate.modes import output_here, output_scope
+from hsdsl.elaborate.symbols import SymbolTable
+from hsdsl.expression.scope import Scope, Value
+from hsdsl.source import Scalar
+from hsdsl.system import Shape
+
+Numbers = list[tuple[Scalar | None, Value | None]]  # each with what it means to the whole model; 0 where left out
+_ZERO = 0
+
+
+def elaborate_scene(symbols: SymbolTable) -> tuple[tuple[Shape, ...], Numbers]:
+    """The shapes of a model, and the numbers of all of them."""
+    shapes: list[Shape] = []
+    numbers: Numbers = []
+    scope = output_scope(symbols)
+    for document in symbols.document.scene:
+        shapes.append(Shape(document.kind, len(document.points)))
+        scalars = [*(scalar for point in document.points for scalar in point), *document.sizes]
+        numbers += [(s, None if s is None else symbols.number(s, scope)) for s in scalars]
+    return tuple(shapes), numbers
+
+
+def scene_of(symbols: SymbolTable, numbers: Numbers, scope: Scope) -> tuple:
+    """The numbers of a scene in a mode; None for one that it does not have."""
+    found = (_ZERO if s is None else output_here(symbols, s, value, scope) for s, value in numbers)
+    return tuple(value.expr if isinstance(value, Value) else value for value in found)
