@@ -43,7 +43,8 @@ def _fields(text: str, types: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 def _read() -> tuple[dict[str, Any], dict[str, tuple[Any, ...]]]:
     """Structures and enumerations by their names in C."""
     text = COMMENT.sub("", "".join((FOLDER / name).read_text() for name in HEADERS))
-    types: dict[str, Any] = {"int": c_int, "double": c_double, "int32_t": c_int32, "int64_t": c_int64}
+    types: dict[str, Any] = {"int": c_int, "int32_t": c_int32, "int64_t": c_int64}
+    types |= dict.fromkeys(("double", "hs_real", "hs_time"), c_double)
     structures: dict[str, Any] = {}
     for body, name in STRUCTURE.findall(text):
         structure = type(name, (ctypes.Structure,), {"_fields_": [*_fields(body, types)]})

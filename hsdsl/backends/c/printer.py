@@ -17,13 +17,19 @@ def literal(value: float) -> str:
     return f"({value.hex()})" if value < 0 else value.hex()
 
 
+def constant(value: float) -> str:
+    """Write a number of a routine, of the type that it computes with."""
+    text = literal(value)
+    return text if text.endswith(("NAN", "INFINITY", "INFINITY)")) else f"((hs_real){text.strip('()')})"
+
+
 def _results(values: Sequence[str]) -> list[str]:
     return [f"out[{i}] = {value};" for i, value in enumerate(values)]
 
 
 C = Language(
-    literal=literal,
-    assign="const double {name} = {value};",
+    literal=constant,
+    assign="const hs_real {name} = {value};",
     results=_results,
     divide="hs_div({left}, {right}, &bad)",
     choose="({test} ? {body} : {other})",

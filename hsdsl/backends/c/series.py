@@ -14,8 +14,8 @@ from hsdsl.program import Tape
 
 _LINE = re.compile(r"\bl(\d+)\b")
 _FLOW = """\
-static int NAME(const double *restrict c, int order, double t, const double *restrict x,
-                double *restrict lines) {{
+static int NAME(const hs_real *restrict c, int order, hs_real t, const hs_real *restrict x,
+                hs_real *restrict lines) {{
   int bad = 0;
   const int length = order + 2;
   (void)c, (void)t, (void)x;
@@ -32,7 +32,7 @@ static int NAME(const double *restrict c, int order, double t, const double *res
 }}
 """
 _SURFACES = """\
-static int NAME(const double *restrict c, int order, double *restrict lines) {{
+static int NAME(const hs_real *restrict c, int order, hs_real *restrict lines) {{
   int bad = 0;
   const int length = order + 2;
 {pointers}
@@ -67,9 +67,9 @@ def flow_lines(tape: Tape, dimension: int) -> str:
 
     own = range(first, first + tape.needed)
     values = [f"l{i}[0] = {value(i)};" for i in states] + _values(tape, own, first, value)
-    values += [f"double w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
+    values += [f"hs_real w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
     coefficients = _coefficients(tape, own, first, newest)
-    coefficients += [f"const double u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
+    coefficients += [f"const hs_real u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
     coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
     return _filled(_FLOW, values, coefficients)
 
@@ -95,7 +95,7 @@ def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], 
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
         names[f"c{operation.constant}"] = f"c[{operation.constant}]"
-        found.append(f"const double v{i} = {expression(value_of(operation, language), names)};")
+        found.append(f"const hs_real v{i} = {expression(value_of(operation, language), names)};")
         found.append(f"l{i}[0] = v{i};")
     return found
 
@@ -104,7 +104,7 @@ def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[
     found: list[str] = []
     language = _language("c[{}]".format, name, "0.0")
     for i in lines:
-        found.append(f"const double v{i} = {coefficient_of(i, tape.operations[i - first], language)};")
+        found.append(f"const hs_real v{i} = {coefficient_of(i, tape.operations[i - first], language)};")
         found.append(f"l{i}[k] = v{i};")
     return found
 
@@ -125,7 +125,7 @@ def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: 
 def _filled(template: str, values: list[str], coefficients: list[str]) -> str:
     used = sorted({0, *(int(i) for text in (*values, *coefficients) for i in _LINE.findall(text))})
     return template.format(
-        pointers="\n".join(f"  double *const l{i} = lines + {i} * length;" for i in used),
+        pointers="\n".join(f"  hs_real *const l{i} = lines + {i} * length;" for i in used),
         values="\n".join(f"  {text}" for text in values),
         coefficients="\n".join(f"    {text}" for text in coefficients),
     )

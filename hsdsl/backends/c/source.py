@@ -25,7 +25,7 @@ _HEAD = """\
 
 """
 _FUNCTION = """\
-static int {name}(const double *restrict p, double t, const double *restrict x, double *restrict out) {{
+static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
   int bad = 0;
   (void)p, (void)t, (void)x, (void)out;
 {body}
@@ -33,7 +33,7 @@ static int {name}(const double *restrict p, double t, const double *restrict x, 
 }}
 """
 _JACOBIAN = """\
-static int NAME(const double *restrict p, double t, const double *restrict x, double *restrict out) {{
+static int NAME(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
   static const int place[] = {{{places}}};
   int i = {count};
   if ({routine}(p, t, x, out)) return 1;
@@ -42,15 +42,15 @@ static int NAME(const double *restrict p, double t, const double *restrict x, do
 }}
 """
 _SERIES = """\
-static int NAME(const double *p, int order, double t, const double *x, double *lines) {{
-  double c[{size}] = {{0.0}};
+static int NAME(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines) {{
+  hs_real c[{size}] = {{0.0}};
   (void)p;
   return order > HS_MOST_ORDER || {constants}{core}(c, order, t, x, lines);
 }}
 """
 _SURFACE_SERIES = """\
-static int NAME(const double *p, int order, double *lines) {{
-  double c[{size}] = {{0.0}};
+static int NAME(const hs_real *p, int order, hs_real *lines) {{
+  hs_real c[{size}] = {{0.0}};
   (void)p;
   return order > HS_MOST_ORDER || {constants}{core}(c, order, lines);
 }}

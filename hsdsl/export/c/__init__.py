@@ -15,6 +15,10 @@ def files(source: Source) -> dict[str, bytes]:
     Raises UsageError: the C runtime has no such scheme.
     """
     sources = c_sources(source)
-    cmake = (PARTS / "CMakeLists.txt").read_text().replace("@EXACT@", "\n    ".join(wrap(" ".join(EXACT_FLAGS), 110)))
+    cmake = (
+        (PARTS / "CMakeLists.txt")
+        .read_text()
+        .replace("@EXACT@", "\n    ".join(wrap(" ".join(EXACT_FLAGS), 110, break_on_hyphens=False)))
+    )
     texts = {"README.md": readme(source), "CMakeLists.txt": cmake, "main.c": (PARTS / "main.c").read_text()}
     return {name: text.encode() for name, text in texts.items()} | sources

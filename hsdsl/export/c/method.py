@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hsdsl.arithmetic import Number
-from hsdsl.backends.c.printer import literal
+from hsdsl.backends.c.printer import constant
 from hsdsl.runtime import structures
 from hsdsl.runtime.structures import Row, array_at
 from hsdsl.simulate.interpolation import Interpolation
@@ -19,14 +19,14 @@ def method_text(table: Any) -> str:
     count = table.stages + 1 + table.extra if table.c else 0
     own = table.dense and structures.INTERPOLANTS[table.interpolant] == "dense"
     c = _numbers(array_at(ctypes.c_double, table.c, count))
-    parts = [f"static const double method_c[] = {{{c or '0'}}};\n"]
+    parts = [f"static const hs_real method_c[] = {{{c or '0'}}};\n"]
     for name, length in (("a", count), ("dense", table.degree if own else 0)):
         listed = ",\n  ".join(rows.row(row) for row in array_at(Row, getattr(table, name), length))
         parts.append(f"static const hs_row method_{name}[] = {{\n  {listed or '{0, 0, 0}'}}};\n")
     single = ", ".join(rows.row(getattr(table, name)) for name in ("b", "error", "coarse"))
     collocation = _collocation(table)
     numbers = f"{table.kind}, {table.stages}, {table.extra}, {table.order}, {table.interpolant}, {table.degree}"
-    last = f"method_dense, {literal(table.gain)}, {'&method_collocation' if collocation else 0}"
+    last = f"method_dense, {constant(table.gain)}, {'&method_collocation' if collocation else 0}"
     method = f"const hs_method problem_method = {{\n  {numbers}, method_c, method_a, {single}, {last}}};\n"
     return "".join([*rows.tables, *parts, collocation, method])
 
@@ -45,7 +45,7 @@ class _Rows:
         stages = ", ".join(map(str, array_at(ctypes.c_int, row.stage, row.terms)))
         weights = _numbers(array_at(ctypes.c_double, row.weight, row.terms))
         self.tables.append(f"static const int stages_{number}[] = {{{stages}}};\n")
-        self.tables.append(f"static const double weights_{number}[] = {{{weights}}};\n")
+        self.tables.append(f"static const hs_real weights_{number}[] = {{{weights}}};\n")
         return f"{{{row.terms}, stages_{number}, weights_{number}}}"
 
 
@@ -58,11 +58,11 @@ def _collocation(table: Any) -> str:
 
 
 def _nested(value: Any) -> str:
-    return literal(value) if isinstance(value, float) else f"{{{', '.join(map(_nested, value))}}}"
+    return constant(value) if isinstance(value, float) else f"{{{', '.join(map(_nested, value))}}}"
 
 
 def _numbers(values: Sequence[Number]) -> str:
-    return ", ".join(map(literal, values))
+    return ", ".join(map(constant, values))
 
 
 def interpolation_text(pair: Sequence[tuple[Interpolation, Number]]) -> str:
@@ -70,7 +70,7 @@ def interpolation_text(pair: Sequence[tuple[Interpolation, Number]]) -> str:
     tables, rows = list[str](), list[str]()
     for k, (by, share) in enumerate(pair):
         columns = {"nodes": by.nodes, "tests": by.tests, "matrix": [number for line in by.matrix for number in line]}
-        tables += [f"static const double {name}_{k}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items()]
-        rows.append(f"{{{len(by.nodes) - 1}, nodes_{k}, tests_{k}, matrix_{k}, {literal(share + by.rounding)}}}")
+        tables += [f"static const hs_real {name}_{k}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items()]
+        rows.append(f"{{{len(by.nodes) - 1}, nodes_{k}, tests_{k}, matrix_{k}, {constant(share + by.rounding)}}}")
     listed = ",\n  ".join(rows)
     return "".join(tables) + f"const hs_interpolation problem_interpolation[2] = {{\n  {listed}}};\n"

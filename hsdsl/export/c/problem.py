@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from hsdsl.arithmetic import FLOAT64
+from typing import Any
+
+from hsdsl.arithmetic import Arithmetic
 from hsdsl.backends.c import lines, width
-from hsdsl.backends.c.printer import literal
+from hsdsl.backends.c.printer import constant, literal
 from hsdsl.export.c.method import interpolation_text, method_text
 from hsdsl.export.c.names import names_text
+from hsdsl.export.c.precision import PRECISIONS, in_both, in_single
 from hsdsl.export.c.text import array, comment
 from hsdsl.export.c.tuning import derivations
 from hsdsl.export.source import Source
@@ -30,7 +33,7 @@ extern const hs_timeline problem_timeline;
 extern const hs_settings problem_settings;
 extern const hs_interpolation problem_interpolation[2];
 extern const int problem_mode, problem_dimension; /* the start */
-extern const double problem_x[];
+extern const hs_real problem_x[];
 
 /* Names, for people: of the model; of each mode, its states and its edges; of the states that an edge leads to; of
    parameters, outputs and all states. */
@@ -47,8 +50,8 @@ extern const char *const problem_output[];
 extern const int problem_derived[], problem_structural[];
 
 /* Derive parameters from the ones before them, and the initial state from parameters. Not 0 where one has no value. */
-int problem_derive(double *p);
-int problem_start(const double *p, double *x);
+int problem_derive(hs_real *p);
+int problem_start(const hs_real *p, hs_real *x);
 
 #endif
 """
@@ -60,56 +63,73 @@ def header(source: Source) -> str:
 
 
 def _sizes(problem: Problem) -> str:
-    program, settings = problem.program, problem.settings
-    assert settings.method is not None
-    table = method_table(settings.method)
-    data = len(problem.timeline.segments[0].data)
-    surfaces = max(len(mode.edges) + len(mode.walls) for mode in program.modes)
-    edges = max(len(mode.edges) for mode in program.modes)
-    w, n, states = width(program), lines(program), len(program.all_states)
-    modes, kind = len(program.modes), f"HS_{METHOD_KINDS[table.kind].upper()}"
-    space = f"HS_SPACE({w}, {surfaces}, {edges}, {n}, {states}, {kind}, {table.stages}, {table.extra}, {table.order}, "
-    space += f"{table.degree})"
-    if settings.scheme == "located":
-        space += f" + HS_LOCATED_SPACE({w}, {surfaces}, {modes}, {n}, {table.stages}, {table.extra}, {table.order}, "
-        space += f"{table.degree})"
+    program, modes = problem.program, problem.program.modes
     sizes = {
-        "MODES": modes,
-        "WIDTH": w,
-        "EDGES": edges,
+        "MODES": len(modes),
+        "WIDTH": width(program),
+        "SURFACES": max(len(mode.edges) + len(mode.walls) for mode in modes),
+        "EDGES": max(len(mode.edges) for mode in modes),
+        "LINES": lines(program),
+        "STATES": len(program.all_states),
         "OUTPUTS": len(program.outputs),
         "PARAMETERS": len(program.parameters),
         "INPUTS": len(program.inputs),
-        "DATA": data,
+        "DATA": len(problem.timeline.segments[0].data),
         "SEGMENTS": len(problem.timeline.segments),
-        "DEGREE": table.degree,
     }
-    named = "".join(f"#define PROBLEM_{name} {size}\n" for name, size in sizes.items())
-    return f"{named}#define PROBLEM_WORKSPACE ({space})\n"
+    located = f" + {_LOCATED}" if problem.settings.scheme == "located" else ""
+    own = in_both(*(_of_method(settings) for settings in _both(problem.settings)))
+    return f"{_defined(sizes)}{own}#define PROBLEM_WORKSPACE ({_SPACE}{located})\n"
+
+
+_SPACE = """HS_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_EDGES, PROBLEM_LINES, PROBLEM_STATES, \\
+  PROBLEM_KIND, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
+_LOCATED = """HS_LOCATED_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_MODES, \\
+  PROBLEM_LINES, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
+
+
+def _defined(sizes: dict[str, Any]) -> str:
+    return "".join(f"#define PROBLEM_{name} {size}\n" for name, size in sizes.items())
+
+
+def _of_method(settings: Settings) -> str:
+    assert settings.method is not None
+    table = method_table(settings.method)
+    kind = f"HS_{METHOD_KINDS[table.kind].upper()}"
+    sizes = {"STAGES": table.stages, "EXTRA": table.extra, "ORDER": table.order, "DEGREE": table.degree}
+    return _defined({"KIND": kind} | sizes)
+
+
+def _both(settings: Settings) -> tuple[Settings, Settings]:
+    return in_single(settings), settings
 
 
 def numbers(source: Source) -> str:
     """The text of ``problem.c``."""
     problem = source.problem
-    settings, program = problem.settings, problem.program
-    assert settings.method is not None
+    pair = tuple(zip(_both(problem.settings), PRECISIONS, strict=True))
     parts = [
         comment(source.heading),
         '\n#include "problem.h"\n\n#include "hs_math.h"\n\n',
-        method_text(method_table(settings.method)),
-        _interpolations(settings),
+        in_both(*(_method(settings) for settings, _ in pair)),
+        in_both(*(_interpolations(settings, arithmetic) for settings, arithmetic in pair)),
         _timeline(problem),
-        _settings(settings, program),
+        in_both(*(_settings(settings, problem.program, arithmetic) for settings, arithmetic in pair)),
         f"const int problem_mode = {problem.mode}, problem_dimension = {len(problem.x)};\n",
-        array("const double", "problem_x", map(literal, problem.x)),
+        array("const hs_real", "problem_x", map(constant, problem.x)),
         names_text(problem, source.name),
         derivations(problem),
     ]
     return "".join(parts)
 
 
-def _interpolations(settings: Settings) -> str:
-    pair = [(interpolation(degree, FLOAT64), share) for degree, share in (along_steps(settings), OVER_TIME)]
+def _method(settings: Settings) -> str:
+    assert settings.method is not None
+    return method_text(method_table(settings.method))
+
+
+def _interpolations(settings: Settings, arithmetic: Arithmetic) -> str:
+    pair = [(interpolation(degree, arithmetic), share) for degree, share in (along_steps(settings), OVER_TIME)]
     return interpolation_text(pair)
 
 
@@ -117,21 +137,21 @@ def _timeline(problem: Problem) -> str:
     segments = problem.timeline.segments
     rows = [number for segment in segments for number in segment.data]
     return (
-        array("static const double", "starts", (literal(s.start) for s in segments))
-        + array("static const double", "ends", (literal(s.end) for s in segments))
+        array("static const hs_time", "starts", (literal(s.start) for s in segments))
+        + array("static const hs_time", "ends", (literal(s.end) for s in segments))
         + array("static const int32_t", "jumps", (str(int(s.jump)) for s in segments))
-        + array("static const double", "data", map(literal, rows))
+        + array("static const hs_real", "data", map(constant, rows))
         + f"const hs_timeline problem_timeline = {{{len(segments)}, starts, ends, jumps, data}};\n"
     )
 
 
-def _settings(settings: Settings, program: Program) -> str:
-    control = make_control(settings, FLOAT64)
+def _settings(settings: Settings, program: Program, arithmetic: Arithmetic) -> str:
+    control = make_control(settings, arithmetic)
     scale = [settings.scale.get(name, 0.0) for name in program.all_states] if settings.scale else []
-    values = [control.h, control.tolerance or 0.0, control.largest, settings.relaxation, settings.until]
+    values = [control.h, control.tolerance or 0.0, control.largest, settings.relaxation]
     return (
-        (array("static const double", "scales", map(literal, scale)) if scale else "")
-        + f"const hs_settings problem_settings = {{\n  {', '.join(map(literal, values))}, "
+        (array("static const hs_real", "scales", map(constant, scale)) if scale else "")
+        + f"const hs_settings problem_settings = {{\n  {', '.join(map(constant, values))}, {literal(settings.until)}, "
         + f"{min(settings.max_transitions, 2**62)}, {SCHEMES.index(settings.scheme)}, {'scales' if scale else 0}, "
         + "0, 0};\n"
     )

@@ -15,15 +15,15 @@ _GIVEN = re.compile(r"\bgiven\[(\d+)\]")
 _NUMBERED = re.compile(r"\bp(\d+)\b")
 
 _DERIVE = """
-int problem_derive(double *p) {{
+int problem_derive(hs_real *p) {{
   int bad = 0;
   (void)p;
 {calls}
   return bad;
 }}
 
-int problem_start(const double *p, double *x) {{
-  double out[{width}] = {{0}};
+int problem_start(const hs_real *p, hs_real *x) {{
+  hs_real out[{width}] = {{0}};
   if (initial(p, out)) return 1;
   (void)x;
 {start}
@@ -90,5 +90,5 @@ def derivations(problem: Problem) -> str:
 
 
 def _function(name: str, body: str) -> str:
-    head = f"static int {name}(const double *p, double *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
+    head = f"static int {name}(const hs_real *p, hs_real *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
     return f"{head}{body}\n  return bad;\n}}\n"

@@ -21,12 +21,12 @@ static int returns(hs_run *run, int flowed) {
 }
 
 /* Whether one direction is opposite to another that is not zero, relative to each component's size. */
-static int takes_back(const double *slope, const double *back, const double *size, const double *noise, int n) {
+static int takes_back(const hs_real *slope, const hs_real *back, const hs_real *size, const hs_real *noise, int n) {
   int along = -1;
   for (int s = 0; s < n; s++)
     if (slope[s] != 0 && (along < 0 || fabs(slope[s]) / size[s] > fabs(slope[along]) / size[along])) along = s;
   if (along < 0) return 0;
-  const double share = back[along] / slope[along];
+  const hs_real share = back[along] / slope[along];
   if (!(share < 0)) return 0;
   for (int s = 0; s < n; s++)
     if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * size[s] + noise[s])) return 0;

@@ -12,23 +12,22 @@
 #define BAND_TO 1.2
 #define LEAST_SEEN 1e-10
 #define LEAST_BEFORE 0.3
-#define NOTHING 0x1p-960
 
 /* Error ratio of a step of length h to run->z, errors held against these scales. */
-HS_INLINE double ratio_to(const hs_run *run, double h, const double *scales) {
-  const double tolerance = run->control.tolerance;
+HS_INLINE hs_real ratio_to(const hs_run *run, hs_real h, const hs_real *scales) {
+  const hs_real tolerance = run->control.tolerance;
   const int tiny = h <= run->control.least;
-  double worst = run->control.h * 0;
+  hs_real worst = run->control.h * 0;
   for (int s = 0; s < run->here.dimension; s++) {
-    const double end = fabs(run->z[s]), size = hs_max(scales[s], end), error = run->error[s];
-    if (fabs(error) <= NOTHING || (tiny && run->scales[s] <= tolerance * end)) continue;
+    const hs_real end = fabs(run->z[s]), size = hs_max(scales[s], end), error = run->error[s];
+    if (fabs(error) <= HS_NOTHING || (tiny && run->scales[s] <= tolerance * end)) continue;
     worst = hs_max(worst, size > 0 ? fabs(error) / (tolerance * size) : 1 / tolerance);
   }
   return worst;
 }
 
 /* The same with a look at what the flow is computed from; see hsdsl/simulate/scales.py. */
-static double ratio_closer(hs_run *run, double h, double ratio) {
+static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
   hs_control *const control = &run->control;
   const int again = run->here.t == control->failed_at;
   control->failed_at = run->here.t;
@@ -45,12 +44,12 @@ static double ratio_closer(hs_run *run, double h, double ratio) {
 }
 
 /* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */
-HS_INLINE double error_ratio(hs_run *run, double h) {
-  const double ratio = ratio_to(run, h, run->method->kind == HS_RADAU ? run->radau.scales : run->scales);
+HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
+  const hs_real ratio = ratio_to(run, h, run->method->kind == HS_RADAU ? run->radau.scales : run->scales);
   return !(ratio > 1) || run->here.table->jumps ? ratio : ratio_closer(run, h, ratio);
 }
 
-static double factor(const hs_control *control, double ratio) {
+static hs_real factor(const hs_control *control, hs_real ratio) {
   if (ratio == 0) return MOST;
   return hs_min(MOST, hs_max(LEAST, SAFETY * pow(ratio, -1 / (ratio * 0 + control->order))));
 }
@@ -60,20 +59,20 @@ static void begin_steps(hs_run *run) {
   hs_control *control = &run->control;
   control->before = 0.0;
   if (!control->implicit || !(control->tolerance > 0)) return;
-  const double share = pow(control->tolerance, 1 / (control->h * 0 + control->order));
+  const hs_real share = pow(control->tolerance, 1 / (control->h * 0 + control->order));
   for (int s = 0; s < run->here.dimension; s++) {
-    const double size = run->scales[s], slope = fabs(run->slope[s]);
+    const hs_real size = run->scales[s], slope = fabs(run->slope[s]);
     if (size > 0 && control->h * slope > share * size)
       control->h = hs_max(hs_min(control->h, control->least), share * size / slope);
   }
 }
 
 /* Factor from one step to the next for an implicit method. */
-static double predicted(hs_control *control, double taken, double ratio) {
-  const double root = pow(hs_max(LEAST_SEEN, ratio), 1 / (ratio * 0 + control->order));
-  double found = hs_min(MOST, hs_max(LEAST, SAFETY / root));
+static hs_real predicted(hs_control *control, hs_real taken, hs_real ratio) {
+  const hs_real root = pow(hs_max(LEAST_SEEN, ratio), 1 / (ratio * 0 + control->order));
+  hs_real found = hs_min(MOST, hs_max(LEAST, SAFETY / root));
   if (control->before > 0) {
-    const double ahead = SAFETY * (taken / control->before) * (control->root_before / (root * root));
+    const hs_real ahead = SAFETY * (taken / control->before) * (control->root_before / (root * root));
     found = hs_min(found, hs_max(LEAST, ahead));
   }
   control->before = taken;
@@ -81,39 +80,39 @@ static double predicted(hs_control *control, double taken, double ratio) {
   return BAND_FROM <= found && found <= BAND_TO ? 1.0 : found;
 }
 
-static void accept(hs_control *control, double taken, double ratio) {
+static void accept(hs_control *control, hs_real taken, hs_real ratio) {
   control->accepted++;
   control->stretch = control->stretch + taken;
   if (control->stretch > control->largest * STRETCH) control->accepted = control->rejected = 0, control->stretch = 0.0;
-  const double proposed = taken * (control->implicit ? predicted(control, taken, ratio) : factor(control, ratio));
+  const hs_real proposed = taken * (control->implicit ? predicted(control, taken, ratio) : factor(control, ratio));
   control->h = hs_min(control->largest, taken < control->h ? hs_max(proposed, control->h) : proposed);
 }
 
 /* Shrink after a rejected, unhalved step; without a ratio (not-a-number) it has no end at all. */
-static void reject(hs_control *control, double taken, double ratio) {
+static void reject(hs_control *control, hs_real taken, hs_real ratio) {
   control->rejected++;
   control->h = ratio != ratio ? taken / 2 : taken * hs_min(1.0, factor(control, ratio));
 }
 
 /* End of a step of length h from t, which is stretched to the limit where it nearly gets there. */
-static double end_of_step(double t, double *h, double limit) {
+static hs_time end_of_step(hs_time t, hs_real *h, hs_time limit) {
   if (*h < (limit - t) * ALMOST) return t + *h;
   *h = limit - t;
   return limit;
 }
 
 /* Cut a step to what the surfaces of the mode allow. */
-static double within_reach(const hs_run *run, double h) {
-  const double reach = run->reach[run->here.mode];
+static hs_real within_reach(const hs_run *run, hs_real h) {
+  const hs_real reach = run->reach[run->here.mode];
   return reach > 0 ? hs_min(h, reach) : h;
 }
 
 /* Learn that surfaces vary too fast for a step. */
-static void too_fast(hs_run *run, double tried) { run->reach[run->here.mode] = tried / 2; }
+static void too_fast(hs_run *run, hs_real tried) { run->reach[run->here.mode] = tried / 2; }
 
 /* Learn that they do not for another one. */
-static void slow_enough(hs_run *run, double taken) {
-  double *const reach = &run->reach[run->here.mode];
+static void slow_enough(hs_run *run, hs_real taken) {
+  hs_real *const reach = &run->reach[run->here.mode];
   if (*reach > 0 && taken >= *reach) *reach = 2 * taken;
 }
 

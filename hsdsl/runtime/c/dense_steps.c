@@ -9,8 +9,8 @@
 #define TERM_BEFORE 32
 
 /* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter step. */
-static void aside(hs_run *run, double **end) {
-  double **const kept = run->k;
+static void aside(hs_run *run, hs_real **end) {
+  hs_real **const kept = run->k;
   run->k = run->other_k;
   run->other_k = kept;
   swap(&run->end, &run->other_end);
@@ -20,7 +20,7 @@ static void aside(hs_run *run, double **end) {
 }
 
 /* Time and state at the share s of the step: of a table those of a step that ends there. */
-static int span_point(hs_run *run, double s, double *time, double **state) {
+static int span_point(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
   const hs_span *span = &run->span;
   const int n = run->here.dimension;
   *time = s == 1 ? span->t1 : span->t + s * span->h;
@@ -34,15 +34,15 @@ static int span_point(hs_run *run, double s, double *time, double **state) {
   return status ? RAISED : 0;
 }
 
-static int shorter_piece(hs_run *run, double s, hs_polynomial *piece) {
+static int shorter_piece(hs_run *run, hs_real s, hs_polynomial *piece) {
   const hs_span *span = &run->span;
-  const double h = s * span->h;
+  const hs_real h = s * span->h;
   return part_of_step(run, run->here.dimension, span->t, h) ||
          run->here.table->flow(run->here.p, span->t + h, run->z, run->end) || method_piece(run, span->t, h, piece);
 }
 
 /* The interpolant of the states up to the share s of the step, over [0, 1]. */
-static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
+static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece) {
   int status = 1;
   if (run->method->kind != HS_TAYLOR && run->resting < 0) {
     aside(run, &run->q);
@@ -53,16 +53,16 @@ static void span_cut(hs_run *run, double s, hs_polynomial *piece) {
 }
 
 /* The sums of the absolute terms that the state at the share s of a step is computed from. */
-HS_INLINE double span_size(const hs_run *run, const hs_span *span, double s, int state) {
+HS_INLINE hs_real span_size(const hs_run *run, const hs_span *span, hs_real s, int state) {
   if (run->method->kind == HS_TABLE)
     return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
   const int w = run->width, last = span->piece.degree - 1;
-  double v = fabs(span->piece.c[last * w + state]) * s;
+  hs_real v = fabs(span->piece.c[last * w + state]) * s;
   for (int m = last - 1; m >= 0; m--) v = (fabs(span->piece.c[m * w + state]) + v) * s;
   return fabs(span->x[state]) + v;
 }
 
-static void begin_span(hs_run *run, double h, double t1) {
+static void begin_span(hs_run *run, hs_real h, hs_time t1) {
   hs_span *const span = &run->span;
   span->t = run->here.t;
   span->h = h;
@@ -71,23 +71,23 @@ static void begin_span(hs_run *run, double h, double t1) {
 }
 
 /* Let no rise count that is lower than what the step's error moves a surface by. */
-static int blur(hs_run *run, int n, double t1) {
+static int blur(hs_run *run, int n, hs_time t1) {
   const hs_curves *curves = &run->curves;
   for (int s = 0; s < n; s++) run->at[s] = run->z[s] + BLUR * run->error[s];
   if (run->here.table->values(run->here.p, t1, run->at, run->middle)) return RAISED;
   for (int part = 0; part < curves->parts; part++)
     for (int k = 0; k < curves->count; k++) {
-      double *const off = off_of(curves, part, k);
+      hs_real *const off = off_of(curves, part, k);
       *off = *off + fabs(run->middle[k] - run->ends[k]);
     }
   return 0;
 }
 
 /* Try a step of a table or of Radau IIA, or say what is in its way. */
-HS_INLINE hs_step_failure try_table(hs_run *run, const int n, double h, double t1) {
+HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time t1) {
   hs_span *const span = &run->span;
   const hs_mode *mode = run->here.table;
-  const double *p = run->here.p;
+  const hs_real *p = run->here.p;
   begin_span(run, h, t1);
   const int status = step(run, n, span->t, h);
   if (status == NO_CONVERGENCE) return HS_UNSOLVED;
@@ -109,14 +109,15 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, double h, double t
 }
 
 /* Make one step of a table or of Radau IIA: rejected by the error estimate, halved where something has no value. */
-HS_INLINE hs_step_failure next_table(hs_run *run, const int n, double limit) {
+HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
   hs_control *const control = &run->control;
-  const double t = run->here.t;
+  const hs_time t = run->here.t;
   int halvings = 0;
   if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
   if (!run->sloped) begin_steps(run);
   run->sloped = 1;
-  double h = within_reach(run, control->h), t1;
+  hs_real h = within_reach(run, control->h);
+  hs_time t1;
   for (;;) {
     t1 = end_of_step(t, &h, limit);
     run->refused = 0;
@@ -140,14 +141,14 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, double limit) {
 }
 
 /* The smaller of two steps; of not-a-number and another one the other. */
-static double smaller(double least, double h) { return h != h ? least : least != least ? h : hs_min(h, least); }
+static hs_real smaller(hs_real least, hs_real h) { return h != h ? least : least != least ? h : hs_min(h, least); }
 
 /* The step at which the first terms of a state that are left out stay below the tolerance beside the first that is not
    0; not-a-number where there are none. */
-static double from_zero(const hs_run *run, int s, double tolerance) {
+static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
   const int order = run->method->order;
-  const double *c = series_of(run, s);
-  double least = NAN;
+  const hs_real *c = series_of(run, s);
+  hs_real least = NAN;
   int first = 1;
   while (first < order && c[first] == 0) first++;
   if (first == order) return NAN;
@@ -158,11 +159,11 @@ static double from_zero(const hs_run *run, int s, double tolerance) {
 
 /* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
    See hsdsl/integrators/taylor.py. */
-static double proposed_step(const hs_run *run, int n, double tolerance) {
+static hs_real proposed_step(const hs_run *run, int n, hs_real tolerance) {
   const int order = run->method->order;
-  double least = NAN, before = 0.0;
+  hs_real least = NAN, before = 0.0;
   for (int m = order; m <= order + 1; m++) {
-    double largest = 0.0;
+    hs_real largest = 0.0;
     for (int s = 0; s < n; s++)
       if (run->scales[s] > 0) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
     if (largest > 0 && (least != least || largest * least > before)) least = smaller(least, root(largest, m));
@@ -173,22 +174,22 @@ static double proposed_step(const hs_run *run, int n, double tolerance) {
   return least;
 }
 
-static double longest(const hs_run *run, int n) {
+static hs_real longest(const hs_run *run, int n) {
   const hs_control *control = &run->control;
   if (!(control->tolerance > 0)) return control->h;
-  const double proposed = proposed_step(run, n, hs_max(control->tolerance, HS_UNIT));
+  const hs_real proposed = proposed_step(run, n, hs_max(control->tolerance, HS_UNIT));
   return proposed != proposed ? control->largest : hs_min(control->largest, proposed);
 }
 
-static int noise_at_end(hs_run *run, int k, double *allowed) {
-  double noise;
+static int noise_at_end(hs_run *run, int k, hs_real *allowed) {
+  hs_real noise;
   if (roundoff_bound(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
   *allowed = 4 * noise;
   return 0;
 }
 
 /* Whether the polynomial c gives surface k to round-off in the middle of the step, by its interpolant. */
-static int meets_middle(hs_run *run, const double *c, int n, int k, double noise, int *answer) {
+static int meets_middle(hs_run *run, const hs_real *c, int n, int k, hs_real noise, int *answer) {
   if (!run->has_middle && surfaces_along(run, 0.5, run->middle)) return RAISED;
   run->has_middle = 1;
   *answer = fabs(value_of(c, n, 0.5) - run->middle[k]) <= noise;
@@ -197,14 +198,14 @@ static int meets_middle(hs_run *run, const double *c, int n, int k, double noise
 
 /* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step.
    One of a surface that is linear in the states need not run out: it is known by giving the surface to round-off. */
-static int converges(hs_run *run, const double *c, int n, int k, int *answer) {
-  const double given = run->control.tolerance, end = run->ends[k];
-  const double tolerance = given > 0 ? hs_max(given, HS_UNIT) : UNKNOWN_TOLERANCE;
-  double most = fabs(c[0]);
+static int converges(hs_run *run, const hs_real *c, int n, int k, int *answer) {
+  const hs_real given = run->control.tolerance, end = run->ends[k];
+  const hs_real tolerance = given > 0 ? hs_max(given, HS_UNIT) : hs_max(UNKNOWN_TOLERANCE, HS_UNIT);
+  hs_real most = fabs(c[0]);
   for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
   *answer = fabs(c[n]) <= LAST_TERM * tolerance * most && fabs(c[n - 1]) <= TERM_BEFORE * tolerance * most;
-  const double off = fabs(value_at_end(c, n) - end);
-  double noise;
+  const hs_real off = fabs(value_at_end(c, n) - end);
+  hs_real noise;
   if (*answer) return settles(run, off, tolerance * most, noise_at_end, k, answer);
   if (noise_at_end(run, k, &noise)) return RAISED;
   return off <= noise ? meets_middle(run, c, n, k, noise, answer) : 0;
@@ -215,7 +216,7 @@ static int series_curves(hs_run *run) {
   const hs_mode *mode = run->here.table;
   const int order = run->method->order, length = series_length(run->method);
   hs_curves *const found = &run->curves;
-  const double h = run->span.h, *p = run->here.p;
+  const hs_real h = run->span.h, *p = run->here.p;
   int known;
   if (mode->values(p, run->span.t, run->x, run->values)) return RAISED;
   if (!mode->surfaces) return 0;
@@ -224,9 +225,9 @@ static int series_curves(hs_run *run) {
   run->has_middle = 0;
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
-    double *const c = coefficients_of(found, 0, k), power = 1.0;
+    hs_real *const c = coefficients_of(found, 0, k), power = 1.0;
     if (!known || mode->surface_line[k] < 0) return curves_along(run);
-    const double *line = run->lines + mode->surface_line[k] * length;
+    const hs_real *line = run->lines + mode->surface_line[k] * length;
     for (int m = 0; m <= order; m++) {
       c[m] = line[m] * power;
       power = power * h;
@@ -243,9 +244,9 @@ static int series_curves(hs_run *run) {
 }
 
 /* Try a step of Taylor's method, or say what is in its way. */
-HS_INLINE hs_step_failure try_series(hs_run *run, const int n, double h, double t1) {
+HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_time t1) {
   const hs_mode *mode = run->here.table;
-  const double *p = run->here.p, tolerance = run->control.tolerance;
+  const hs_real *p = run->here.p, tolerance = run->control.tolerance;
   const hs_polynomial *piece = &run->span.piece;
   begin_span(run, h, t1);
   taylor_piece(run, n, h, &run->span.piece);
@@ -261,10 +262,11 @@ HS_INLINE hs_step_failure try_series(hs_run *run, const int n, double h, double 
 
 /* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
    equation. */
-HS_INLINE hs_step_failure next_series(hs_run *run, const int n, double limit) {
-  const double t = run->here.t;
+HS_INLINE hs_step_failure next_series(hs_run *run, const int n, hs_time limit) {
+  const hs_time t = run->here.t;
   if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
-  double h = within_reach(run, longest(run, n)), t1;
+  hs_real h = within_reach(run, longest(run, n));
+  hs_time t1;
   for (int i = 0; i < MOST_HALVINGS; i++) {
     t1 = end_of_step(t, &h, limit);
     if (!(t1 > t)) break;
@@ -277,6 +279,6 @@ HS_INLINE hs_step_failure next_series(hs_run *run, const int n, double limit) {
 }
 
 /* Make one step that the error allows, not beyond `limit`; or return what is in the way. */
-HS_INLINE hs_step_failure next_span(hs_run *run, const int n, double limit) {
+HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit) {
   return run->method->kind == HS_TAYLOR ? next_series(run, n, limit) : next_table(run, n, limit);
 }

@@ -4,13 +4,13 @@
 
 /* A set of (mode, state): those that a chain of transitions at one instant has been in. */
 
-static int same_state(const double *a, const double *b, int n) {
+static int same_state(const hs_real *a, const hs_real *b, int n) {
   for (int s = 0; s < n; s++)
     if (a[s] != b[s]) return 0;
   return 1;
 }
 
-static uint64_t hash_of(int mode, const double *x, int n) {
+static uint64_t hash_of(int mode, const hs_real *x, int n) {
   uint64_t hash = 1469598103934665603u ^ (uint64_t)mode;
   for (int s = 0; s < n; s++) {
     union {
@@ -30,7 +30,7 @@ static void forget(hs_visited *visited) {
 }
 
 /* Add a state; 1 where it was there. */
-static int visit(hs_visited *visited, int width, int mode, const double *x, int n) {
+static int visit(hs_visited *visited, int width, int mode, const hs_real *x, int n) {
   const uint64_t slots = 2 * (uint64_t)visited->room;
   uint64_t i = hash_of(mode, x, n) % slots;
   for (; visited->slot[i]; i = (i + 1) % slots) {
@@ -56,13 +56,13 @@ static int make_room(hs_run *run) {
   return 0;
 }
 
-static int entered_outside(hs_run *run, int surface, double t) {
+static int entered_outside(hs_run *run, int surface, hs_time t) {
   run->task->stop.surface = surface;
   return stopped(run, HS_ENTERED_OUTSIDE, t);
 }
 
 /* Choose among edges the state is beyond: the highest priority, then the file's order. */
-static void choose_entry(hs_run *run, const int *beyond, double t) {
+static void choose_entry(hs_run *run, const int *beyond, hs_time t) {
   const hs_mode *mode = run->here.table;
   int chosen = -1;
   for (int k = 0; k < mode->edges; k++)
@@ -81,8 +81,8 @@ static void choose_entry(hs_run *run, const int *beyond, double t) {
    A surface that the flow passes within the time `since` counts as stood on: tied transitions share one point. So does
    one that moved past the state while it waited in a strip, where it was reset before t, at `reset_at`. One of an edge
    that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
-static int enter(hs_run *run, int mode, int dimension, double t, int from_here, double since, int jumped,
-                 double reset_at) {
+static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here, hs_real since, int jumped,
+                 hs_time reset_at) {
   hs_mode_state before = run->here;
   forget(&run->task->visited);
   for (;; from_here = 1, jumped = 0, reset_at = t) {

@@ -38,8 +38,10 @@
 #include "zeno.c"
 #include "touching.c"
 #include "located.c"
+#if !defined(HS_FLOAT32) /* for callers that keep whole runs */
 #include "sample.c"
 #include "pack.c"
+#endif
 
 /* What is left of the caller's memory. Counted without memory first, then given out. */
 typedef struct {
@@ -53,7 +55,7 @@ static void *take(hs_store *store, int64_t count, size_t size) {
   return start;
 }
 
-static double *numbers(hs_store *store, int64_t count) { return take(store, count, sizeof(double)); }
+static hs_real *numbers(hs_store *store, int64_t count) { return take(store, count, sizeof(hs_real)); }
 
 static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
   const int degree = run->method->degree > 3 ? run->method->degree : 3;
@@ -64,8 +66,8 @@ static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
 }
 
 static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
-  double **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
-  double **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
+  hs_real **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
+  hs_real **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
   for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, (int64_t)w * w);
   for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
   radau->largest = numbers(store, w);
@@ -79,17 +81,17 @@ static void lay_out_radau(hs_radau *radau, int w, hs_store *store) {
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
   const int stages = run->method->stages, all = stages + 1 + run->method->extra;
-  double **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
+  hs_real **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
                        &run->entered, &run->after, &run->landed, &run->error, 0};
-  for (double ***state = states; *state; state++) **state = numbers(store, w);
-  double **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby,
+  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
+  hs_real **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby,
                     &run->flow_sizes, 0};
-  for (double ***each = own; *each; each++) **each = numbers(store, w);
+  for (hs_real ***each = own; *each; each++) **each = numbers(store, w);
   run->known = numbers(store, run->model->states);
   run->lifted = take(store, w, sizeof(int));
-  run->k = take(store, all, sizeof(double *));
+  run->k = take(store, all, sizeof(hs_real *));
   for (int i = 1; i < all; i++) {
-    double *stage = numbers(store, w);
+    hs_real *stage = numbers(store, w);
     if (store->numbers) run->k[i] = stage;
   }
   if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
@@ -113,7 +115,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->cubic = polynomial(store, run);
   run->crossings = take(store, m, sizeof(hs_crossing));
   for (int i = 0; i < m; i++) {
-    double *state = numbers(store, w);
+    hs_real *state = numbers(store, w);
     const hs_polynomial piece = polynomial(store, run);
     if (store->numbers) run->crossings[i].state = state, run->crossings[i].piece = piece;
   }
@@ -140,11 +142,11 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->jacobian = numbers(store, (int64_t)w * w);
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
-  double **states[] = {&run->q, &run->other_end, 0};
-  for (double ***state = states; *state; state++) **state = numbers(store, w);
-  run->other_k = take(store, all, sizeof(double *));
+  hs_real **states[] = {&run->q, &run->other_end, 0};
+  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
+  run->other_k = take(store, all, sizeof(hs_real *));
   for (int i = 1; i < all; i++) {
-    double *stage = numbers(store, w);
+    hs_real *stage = numbers(store, w);
     if (store->numbers) run->other_k[i] = stage;
   }
   run->ends = numbers(store, m);
@@ -158,7 +160,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   if (store->numbers) fill_binomials(run->binomials, most);
   run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));
   for (int i = 0; i < MOST_CUTS; i++) {
-    double *b = numbers(store, most + 1);
+    hs_real *b = numbers(store, most + 1);
     if (store->numbers) run->cuts[i].b = b;
   }
   run->doubted = take(store, (int64_t)run->model->modes * m, sizeof(int));
@@ -222,4 +224,6 @@ void hs_simulate(hs_task *task) {
     relaxed(&run, entered);
 }
 
+#if !defined(HS_FLOAT32)
 #include "ensemble.c"
+#endif

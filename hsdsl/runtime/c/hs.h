@@ -14,16 +14,24 @@
 #define HS_EXPORT __attribute__((visibility("default")))
 #endif
 
-typedef int hs_routine(const double *p, double t, const double *x, double *out);
+/* Numbers of states, parameters and surfaces. Instants are doubles in any case: a sum of steps in 32 bits is none. */
+#if defined(HS_FLOAT32)
+typedef float hs_real;
+#else
+typedef double hs_real;
+#endif
+typedef double hs_time;
+
+typedef int hs_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
 
 /* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
    lines[l*(order + 2) + m]. Line 0 is time, lines 1 to n are the states, with coefficients 0 to order + 1; the others
    have those from 0 to order. No value where one of them has none. */
 #define HS_MOST_ORDER 30 /* round-off is below the terms of any order that is higher */
-typedef int hs_series(const double *p, int order, double t, const double *x, double *lines);
+typedef int hs_series(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines);
 
 /* The same of the further lines, which surfaces need: coefficients 0 to order. */
-typedef int hs_surface_series(const double *p, int order, double *lines);
+typedef int hs_surface_series(const hs_real *p, int order, hs_real *lines);
 
 typedef struct {
   int target;           /* index of the target mode */

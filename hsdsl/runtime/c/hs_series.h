@@ -10,13 +10,13 @@
 
 #define HS_INTEGER_POWERS 64
 
-static const double hs_inverse[HS_MOST_ORDER + 2] = {
+static const hs_real hs_inverse[HS_MOST_ORDER + 2] = {
   0.0, 1.0 / 1, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10, 1.0 / 11, 1.0
   / 12, 1.0 / 13, 1.0 / 14, 1.0 / 15, 1.0 / 16, 1.0 / 17, 1.0 / 18, 1.0 / 19, 1.0 / 20, 1.0 / 21, 1.0 / 22, 1.0
   / 23, 1.0 / 24, 1.0 / 25, 1.0 / 26, 1.0 / 27, 1.0 / 28, 1.0 / 29, 1.0 / 30, 1.0 / 31};
 
-static inline double hs_pairs(int k, const double *a, const double *b, int first) {
-  double low = 0.0, high = k % 2 ? 0.0 : a[k / 2] * b[k / 2];
+static inline hs_real hs_pairs(int k, const hs_real *a, const hs_real *b, int first) {
+  hs_real low = 0.0, high = k % 2 ? 0.0 : a[k / 2] * b[k / 2];
   for (int j = (k - 1) / 2; j >= first; j--) {
     low = low + a[j] * b[k - j];
     high = high + a[k - j] * b[j];
@@ -24,34 +24,34 @@ static inline double hs_pairs(int k, const double *a, const double *b, int first
   return low + high;
 }
 
-static inline double hs_product(int k, const double *a, const double *b) { return hs_pairs(k, a, b, 0); }
+static inline hs_real hs_product(int k, const hs_real *a, const hs_real *b) { return hs_pairs(k, a, b, 0); }
 
-static inline double hs_behind(int k, const double *a, const double *b) {
+static inline hs_real hs_behind(int k, const hs_real *a, const hs_real *b) {
   return hs_pairs(k, a, b, 1) + a[k] * b[0];
 }
 
-static inline double hs_few(int k, const double *a, const double *b, int last) {
-  double total = a[last] * b[k - last];
+static inline hs_real hs_few(int k, const hs_real *a, const hs_real *b, int last) {
+  hs_real total = a[last] * b[k - last];
   for (int j = last - 1; j > 0; j--) total = total + a[j] * b[k - j];
   return total;
 }
 
-static inline double hs_symmetric(int k, const double *a, int first) {
-  double total = 0.0;
+static inline hs_real hs_symmetric(int k, const hs_real *a, int first) {
+  hs_real total = 0.0;
   for (int j = (k - 1) / 2; j >= first; j--) total = total + a[j] * a[k - j];
   total = 2 * total;
   return k % 2 ? total : total + a[k / 2] * a[k / 2];
 }
 
-static inline double hs_square(int k, const double *a) { return hs_symmetric(k, a, 0); }
+static inline hs_real hs_square(int k, const hs_real *a) { return hs_symmetric(k, a, 0); }
 
-static inline double hs_root(int k, const double *z, double a, int *bad) {
+static inline hs_real hs_root(int k, const hs_real *z, hs_real a, int *bad) {
   return hs_div(a - hs_symmetric(k, z, 1), 2 * z[0], bad);
 }
 
 /* In place, from the last coefficient down: each asks for those before it only. */
-static inline double hs_repeated(int k, const double *a, int c) {
-  double z[HS_MOST_ORDER + 1] = {1.0};
+static inline hs_real hs_repeated(int k, const hs_real *a, int c) {
+  hs_real z[HS_MOST_ORDER + 1] = {1.0};
   for (int n = 0; n < c; n++) {
     for (int i = k; i > 0; i--) z[i] = hs_product(i, a, z);
     z[0] = z[0] * a[0];
@@ -59,12 +59,12 @@ static inline double hs_repeated(int k, const double *a, int c) {
   return z[k];
 }
 
-static inline double hs_power(int k, const double *z, const double *a, double c, int *bad) {
+static inline hs_real hs_power(int k, const hs_real *z, const hs_real *a, hs_real c, int *bad) {
   if (a[0] == 0) {
     *bad |= !hs_finite(c);
     if (c == trunc(c) && 0 <= c && c <= HS_INTEGER_POWERS) return hs_repeated(k, a, (int)c);
   }
-  double total = c * a[k] * k * z[0];
+  hs_real total = c * a[k] * k * z[0];
   for (int j = k - 1; j > 0; j--) total = total + (c * j - (k - j)) * a[j] * z[k - j];
   return hs_div(total, k * a[0], bad);
 }

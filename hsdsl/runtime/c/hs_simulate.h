@@ -15,7 +15,7 @@
 typedef struct {
   int terms;
   const int *stage;
-  const double *weight;
+  const hs_real *weight;
 } hs_row;
 
 typedef enum { HS_SECANT, HS_HERMITE, HS_DENSE } hs_interpolant;
@@ -24,10 +24,10 @@ typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_method_kind;
 
 /* The coefficients of Radau IIA: see Coefficients in hsdsl/integrators/collocation.py. */
 typedef struct {
-  double node[3], power[3][3];
-  double gamma, alpha, beta, mix[3][3], unmix[3][3];
-  double estimate[3];
-  double share, value[3], slope[3];
+  hs_real node[3], power[3][3];
+  hs_real gamma, alpha, beta, mix[3][3], unmix[3][3];
+  hs_real estimate[3];
+  hs_real share, value[3], slope[3];
 } hs_collocation;
 
 /* Fields between `degree` and `collocation` are those of tables; `collocation` is that of Radau IIA. */
@@ -38,23 +38,23 @@ typedef struct {
   int order;  /* the power of h that the error estimate falls with; of Taylor's method the degree */
   int interpolant;
   int degree; /* of the pieces that are kept; 0 for straight lines */
-  const double *c;
+  const hs_real *c;
   const hs_row *a;
   hs_row b;
   hs_row error;  /* weights less those of the embedded method */
   hs_row coarse; /* and less those of a second one; no terms where there is none */
   const hs_row *dense;
-  double gain; /* by how much a step can enlarge the round-off of its stages */
+  hs_real gain; /* by how much a step can enlarge the round-off of its stages */
   const hs_collocation *collocation;
 } hs_method;
 
 /* Time cut at the samples of inputs; segment i has the numbers data[i*model->data ...] to bind routines to. */
 typedef struct {
   int64_t segments;
-  const double *start;
-  const double *end;
+  const hs_time *start;
+  const hs_time *end;
   const int32_t *jump; /* whether an input jumps at its start */
-  const double *data;
+  const hs_real *data;
 } hs_timeline;
 
 enum { HS_TESTS = 3 };
@@ -63,8 +63,8 @@ enum { HS_TESTS = 3 };
    functions at the tests. */
 typedef struct {
   int degree;
-  const double *nodes, *tests, *matrix;
-  double share; /* how far a function may be off, relative to its largest value */
+  const hs_real *nodes, *tests, *matrix;
+  hs_real share; /* how far a function may be off, relative to its largest value */
 } hs_interpolation;
 
 enum { HS_ALONG_STEPS, HS_OVER_TIME };
@@ -72,16 +72,16 @@ enum { HS_ALONG_STEPS, HS_OVER_TIME };
 typedef enum { HS_RELAXED, HS_LOCATED } hs_scheme;
 
 typedef struct {
-  double step;      /* the first one, of an adaptive method */
-  double tolerance; /* 0 for a fixed step */
-  double largest;
-  double relaxation;
-  double until;
+  hs_real step;      /* the first one, of an adaptive method */
+  hs_real tolerance; /* 0 for a fixed step */
+  hs_real largest;
+  hs_real relaxation;
+  hs_time until;
   int64_t max_transitions;
   int64_t scheme;
-  const double *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
+  const hs_real *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
   int64_t arcs;              /* that have a bound on their first step */
-  const double *first_steps; /* of each arc of flow, 0 where there is no bound */
+  const hs_real *first_steps; /* of each arc of flow, 0 where there is no bound */
 } hs_settings;
 
 typedef enum { HS_FLOW, HS_STRIP } hs_arc_kind;
@@ -94,8 +94,8 @@ typedef struct {
 } hs_arc;
 
 typedef struct {
-  double time;
-  double resumed; /* not-a-number where the run ended first */
+  hs_time time;
+  hs_time resumed; /* not-a-number where the run ended first */
   int32_t mode;
   int32_t edge;
   int32_t entry;
@@ -110,8 +110,8 @@ typedef struct {
   int32_t mode;
   int64_t surface;
   int64_t number;
-  double time;
-  double other;
+  hs_time time;
+  hs_time other;
 } hs_note;
 
 typedef struct {
@@ -119,14 +119,14 @@ typedef struct {
   int64_t arc_room, arcs;
   int64_t transition_room, transitions;
   int64_t note_room, notes;
-  double *times;   /* (row) */
-  double *values;  /* (row, width) */
-  double *outputs; /* (row, outputs) */
-  double *depth;   /* (row) */
-  double *pieces;  /* (row, degree, width) */
+  hs_time *times;   /* (row) */
+  hs_real *values;  /* (row, width) */
+  hs_real *outputs; /* (row, outputs) */
+  hs_real *depth;   /* (row) */
+  hs_real *pieces;  /* (row, degree, width) */
   hs_arc *arc;
   hs_transition *transition;
-  double *before, *after;  /* (transition, width) */
+  hs_real *before, *after;  /* (transition, width) */
   int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's behind the other's */
   int64_t alternatives_used;
   hs_note *note;
@@ -136,7 +136,7 @@ typedef struct {
 typedef struct {
   int64_t room, count; /* of states; there are twice as many slots */
   int32_t *mode;
-  double *state;
+  hs_real *state;
   int64_t *slot; /* one more than the place of a state, or 0 */
 } hs_visited;
 
@@ -181,9 +181,9 @@ typedef struct {
   int32_t failure;
   int32_t surface; /* -1 for none */
   int64_t segment;
-  double time;
-  double h;
-  double *x, *slope, *scales;
+  hs_time time;
+  hs_time h;
+  hs_real *x, *slope, *scales;
 } hs_stop;
 
 typedef struct hs_task {
@@ -193,21 +193,21 @@ typedef struct hs_task {
   hs_settings settings;
   const hs_interpolation *interpolation; /* two of them, for the located scheme */
   int32_t mode, dimension; /* the start */
-  const double *x;
+  const hs_real *x;
   double *workspace; /* hs_workspace() numbers */
   hs_chunk chunk;
   hs_visited visited;
   int (*flush)(struct hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
   int (*poll)(struct hs_task *);                       /* called now and then: not 0 to stop */
   int (*grow)(struct hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
-  double now;                                   /* to be looked at while it runs */
+  hs_time now;                                   /* to be looked at while it runs */
   int64_t made;
   hs_stop stop;
 } hs_task;
 
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
-HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
+HS_EXPORT int64_t hs_pack(const hs_task *task, hs_real *to);
 
 /* A run's values at many times: what a caller gives, all of it the caller's own memory. */
 typedef struct {

@@ -3,7 +3,7 @@
 #include "functions.h"
 
 /* The segment that time is in; at a boundary the later one. */
-static int64_t segment_at(const hs_timeline *timeline, double t) {
+static int64_t segment_at(const hs_timeline *timeline, hs_time t) {
   int64_t low = 0, high = timeline->segments;
   while (low < high) {
     const int64_t middle = (low + high) / 2;
@@ -15,6 +15,6 @@ static int64_t segment_at(const hs_timeline *timeline, double t) {
   return low > 0 ? low - 1 : 0;
 }
 
-static const double *segment_data(const hs_run *run, int64_t segment) {
+static const hs_real *segment_data(const hs_run *run, int64_t segment) {
   return run->task->timeline->data + segment * run->model->data;
 }

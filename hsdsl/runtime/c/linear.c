@@ -2,10 +2,10 @@
 
 #include "functions.h"
 
-static void exchange_rows(double *a, int n, int i, int k) {
+static void exchange_rows(hs_real *a, int n, int i, int k) {
   if (i == k) return;
   for (int j = 0; j < n; j++) {
-    const double kept = a[i * n + j];
+    const hs_real kept = a[i * n + j];
     a[i * n + j] = a[k * n + j];
     a[k * n + j] = kept;
   }
@@ -18,13 +18,13 @@ static void exchange_places(int *order, int i, int k) {
 }
 
 /* Whether a is larger than b, each relative to the scale of the unknown of its row; without one only than zero. */
-HS_INLINE int is_larger(double a, double of_a, double b, double of_b) {
+HS_INLINE int is_larger(hs_real a, hs_real of_a, hs_real b, hs_real of_b) {
   return of_a > 0 && of_b > 0 ? a * of_b > b * of_a : b == 0 && a > 0;
 }
 
 /* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. `scales` are
    those of the unknowns. */
-HS_INLINE int factored(int n, double *restrict a, int *restrict order, const double *scales) {
+HS_INLINE int factored(int n, hs_real *restrict a, int *restrict order, const hs_real *scales) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
@@ -36,7 +36,7 @@ HS_INLINE int factored(int n, double *restrict a, int *restrict order, const dou
     a[k * n + k] = 1 / a[k * n + k];
     for (int i = k + 1; i < n; i++) {
       if (a[i * n + k] == 0) continue;
-      const double share = a[i * n + k] = a[i * n + k] * a[k * n + k];
+      const hs_real share = a[i * n + k] = a[i * n + k] * a[k * n + k];
       for (int j = k + 1; j < n; j++) a[i * n + j] = a[i * n + j] - share * a[k * n + j];
     }
   }
@@ -44,8 +44,8 @@ HS_INLINE int factored(int n, double *restrict a, int *restrict order, const dou
 }
 
 /* Solve for a right-hand side, to `found`. */
-HS_INLINE void solve(int n, const double *restrict a, const int *restrict order, const double *restrict right,
-                     double *restrict found) {
+HS_INLINE void solve(int n, const hs_real *restrict a, const int *restrict order, const hs_real *restrict right,
+                     hs_real *restrict found) {
   for (int i = 0; i < n; i++) found[i] = right[order[i]];
   for (int i = 0; i < n; i++)
     for (int j = 0; j < i; j++) found[i] = found[i] - a[i * n + j] * found[j];
@@ -56,8 +56,8 @@ HS_INLINE void solve(int n, const double *restrict a, const int *restrict order,
 }
 
 /* The same of a complex matrix, real and imaginary parts apart; the size of a pivot is the sum of its parts' sizes. */
-HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, int *restrict order,
-                               const double *scales) {
+HS_INLINE int factored_complex(int n, hs_real *restrict re, hs_real *restrict im, int *restrict order,
+                               const hs_real *scales) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
@@ -68,15 +68,15 @@ HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, 
     exchange_rows(re, n, k, pivot);
     exchange_rows(im, n, k, pivot);
     exchange_places(order, k, pivot);
-    const double size = re[k * n + k] * re[k * n + k] + im[k * n + k] * im[k * n + k];
+    const hs_real size = re[k * n + k] * re[k * n + k] + im[k * n + k] * im[k * n + k];
     if (!(size > 0)) return 1;
-    const double c = re[k * n + k] = re[k * n + k] / size, d = im[k * n + k] = -im[k * n + k] / size;
+    const hs_real c = re[k * n + k] = re[k * n + k] / size, d = im[k * n + k] = -im[k * n + k] / size;
     for (int i = k + 1; i < n; i++) {
-      const double a = re[i * n + k], b = im[i * n + k];
+      const hs_real a = re[i * n + k], b = im[i * n + k];
       if (a == 0 && b == 0) continue;
-      const double p = re[i * n + k] = c * a - d * b, q = im[i * n + k] = c * b + d * a;
+      const hs_real p = re[i * n + k] = c * a - d * b, q = im[i * n + k] = c * b + d * a;
       for (int j = k + 1; j < n; j++) {
-        const double u = re[k * n + j], v = im[k * n + j];
+        const hs_real u = re[k * n + j], v = im[k * n + j];
         re[i * n + j] = re[i * n + j] - (p * u - q * v);
         im[i * n + j] = im[i * n + j] - (p * v + q * u);
       }
@@ -86,21 +86,22 @@ HS_INLINE int factored_complex(int n, double *restrict re, double *restrict im, 
 }
 
 /* Take the products of row i with what is known off its right-hand side a + i b. */
-HS_INLINE void take_off(int n, const double *re, const double *im, double *a, double *b, int i, int first, int end) {
+HS_INLINE void take_off(int n, const hs_real *re, const hs_real *im, hs_real *a, hs_real *b, int i, int first,
+                        int end) {
   for (int j = first; j < end; j++) {
-    const double c = re[i * n + j], d = im[i * n + j];
+    const hs_real c = re[i * n + j], d = im[i * n + j];
     a[i] = a[i] - (c * a[j] - d * b[j]);
     b[i] = b[i] - (c * b[j] + d * a[j]);
   }
 }
 
-HS_INLINE void solve_complex(int n, const double *restrict re, const double *restrict im, const int *restrict order,
-                             const double *const right[2], double *restrict a, double *restrict b) {
+HS_INLINE void solve_complex(int n, const hs_real *restrict re, const hs_real *restrict im, const int *restrict order,
+                             const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b) {
   for (int i = 0; i < n; i++) a[i] = right[0][order[i]], b[i] = right[1][order[i]];
   for (int i = 0; i < n; i++) take_off(n, re, im, a, b, i, 0, i);
   for (int i = n - 1; i >= 0; i--) {
     take_off(n, re, im, a, b, i, i + 1, n);
-    const double c = re[i * n + i], d = im[i * n + i], p = a[i], q = b[i];
+    const hs_real c = re[i * n + i], d = im[i * n + i], p = a[i], q = b[i];
     a[i] = c * p - d * q;
     b[i] = c * q + d * p;
   }

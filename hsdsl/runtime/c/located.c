@@ -16,17 +16,17 @@ static int is_passed_by(hs_run *run, int k) {
 }
 
 /* Surface k at the share s of the step; the state there is run->q. */
-static int residual_of(hs_run *run, const hs_polynomial *piece, int k, double s, double *r) {
-  double time;
+static int residual_of(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {
+  hs_time time;
   (void)piece;
   return span_point(run, s, &time, &run->q) || surface(run, k, time, run->q, r) ? RAISED : 0;
 }
 
 /* Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there. */
-static int bracketed(hs_run *run, int k, double *s) {
-  double width = 8 * HS_UNIT * hs_max(*s, HS_UNIT), below, above;
+static int bracketed(hs_run *run, int k, hs_real *s) {
+  hs_real width = 8 * HS_UNIT * hs_max(*s, HS_UNIT), below, above;
   while (width < 1) {
-    const double low = hs_max(*s * 0, *s - width), high = hs_min(1.0, *s + width);
+    const hs_real low = hs_max(*s * 0, *s - width), high = hs_min(1.0, *s + width);
     if (residual_of(run, 0, k, low, &below) || residual_of(run, 0, k, high, &above)) return RAISED;
     if (below < 0 && above == 0) return *s = high, 0;
     if (below <= 0 && 0 < above)
@@ -38,7 +38,7 @@ static int bracketed(hs_run *run, int k, double *s) {
 
 /* Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket. */
 static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossing) {
-  double s = rise->share, best = s, least = NAN, r, noise;
+  hs_real s = rise->share, best = s, least = NAN, r, noise;
   for (int i = 0; i < MOST_CORRECTIONS; i++) {
     if (span_point(run, s, &crossing->time, &crossing->state) || surface(run, k, crossing->time, crossing->state, &r))
       return RAISED;
@@ -58,7 +58,7 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
 /* Find the first point of the step where surface k is crossed and its condition holds: 1, or 0. */
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
-  double first, last;
+  hs_real first, last;
   if (is_passed_by(run, k)) return touched(run, k, crossing);
   if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last))
     return RAISED;
@@ -84,7 +84,7 @@ static void largest(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
   sizes(run, run->x, crossing->state);
   for (int s = 0; s < run->here.dimension; s++) {
-    double *const found = &run->landed[s];
+    hs_real *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
     if (run->active_surfaces[crossing->edge]) *found = hs_max(*found, run->scale[s]);
@@ -106,7 +106,7 @@ static int walked_out(hs_run *run, const hs_crossing *wall) {
 
 /* A wall is reached before any guard: take the guards that it is reached together with, how many there are. */
 static int guards_at(hs_run *run, const hs_crossing *wall) {
-  const double time = wall->time, theta = wall->theta, depth = wall->depth;
+  const hs_time time = wall->time, theta = wall->theta, depth = wall->depth;
   int count = 0;
   copy(run->q, wall->state, run->here.dimension);
   standing(run, time, run->q, tie(run, time), run->tied);
@@ -180,7 +180,7 @@ HS_INLINE void go_to_end(hs_run *run) {
 }
 
 /* Step until a surface is crossed, or to a time in the segment. */
-static int follow(hs_run *run, double limit) {
+static int follow(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
   const int n = here->dimension;
   run->sloped = run->creeping = run->has_before = run->chatter = 0;
@@ -201,9 +201,9 @@ static int follow(hs_run *run, double limit) {
 }
 
 /* Rest until a surface is crossed, to the segment's end, or until the guard of edge k lets go of the state. */
-static int rest(hs_run *run, int k, double until) {
+static int rest(hs_run *run, int k, hs_time until) {
   hs_mode_state *const here = &run->here;
-  const double from = here->t;
+  const hs_time from = here->t;
   run->resting = k;
   const int outcome = follow(run, until);
   note(run, HS_AT_REST, k, 0, from, run->task->now);
@@ -216,25 +216,25 @@ static int rest(hs_run *run, int k, double until) {
 
 /* Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state. */
 static int located_flow(hs_run *run) {
-  const double limit = run->task->timeline->end[run->here.segment];
+  const hs_time limit = run->task->timeline->end[run->here.segment];
   const int edge = rests(run);
-  double until;
+  hs_time until;
   if (edge >= 0 && release(run, edge, &until)) return rest(run, edge, until);
   return follow(run, limit);
 }
 
 /* Whether the transition before this one was made at the same instant. */
-static int same_instant(const hs_run *run, double t) {
+static int same_instant(const hs_run *run, hs_time t) {
   if (!run->jump) return 0;
-  const double resumed = made_before(run, 0)->resumed;
+  const hs_time resumed = made_before(run, 0)->resumed;
   return resumed == resumed && t - resumed <= tie(run, t);
 }
 
 /* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit. */
-static int crowded(const hs_run *run, double t) {
-  double flight, ratio;
+static int crowded(const hs_run *run, hs_time t) {
+  hs_real flight, ratio;
   if (run->jump < FREE || contraction(run, &flight, &ratio)) return 0;
-  double flown = t - made_before(run, FREE - 1)->time;
+  hs_time flown = t - made_before(run, FREE - 1)->time;
   for (int i = FREE - 1; i >= 0; i--) {
     const hs_made *made = made_before(run, i);
     flown = flown - (made->resumed == made->resumed ? made->resumed - made->time : 0);
@@ -245,12 +245,12 @@ static int crowded(const hs_run *run, double t) {
 /* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */
 static int jump(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
-  const double t = crossing->time, until = run->until;
+  const hs_time t = crossing->time, until = run->until;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
-  const double arc_start = run->here.entered_at;
+  const hs_time arc_start = run->here.entered_at;
   const int mode = run->here.mode;
-  double resumed = t;
+  hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   const int without_value = reset(run, run->landed);
   if (crowded(run, t)) {
@@ -258,19 +258,19 @@ static int jump(hs_run *run) {
     run->noted_crowded = 1;
     resumed = t + run->epsilon;
     if (resumed > until + tie(run, until)) {
-      double rows[2][2] = {{t, 0.0}, {until, until - t}};
+      hs_time rows[2][2] = {{t, 0.0}, {until, until - t}};
       strip(run, 2, rows, crossing->state);
       record(run, crossing, NAN, 0, 0);
       return in_strip(run, HS_UNTIL_IN_STRIP, until);
     }
-    resumed = hs_min(resumed, until);
+    resumed = earlier(resumed, until);
   }
   if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);
   if (resumed > t) {
-    double rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
+    hs_time rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
     strip(run, 2, rows, crossing->state);
   }
-  const double since = run->alternatives_count || same_instant(run, t) ? tie(run, t) : 0.0;
+  const hs_real since = run->alternatives_count || same_instant(run, t) ? tie(run, t) : 0.0;
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
@@ -281,7 +281,7 @@ static int jump(hs_run *run) {
 
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int located_at_boundary(hs_run *run) {
-  const double t = run->here.t;
+  const hs_time t = run->here.t;
   if (t < run->until) return go_on(run);
   run->resting = rests(run);
   const int count = standing_on(run);

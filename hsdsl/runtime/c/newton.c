@@ -3,7 +3,7 @@
 #include "functions.h"
 
 #define MOST_ITERATIONS 7
-#define MOST_TO_ROUNDOFF 122 /* 16 - 2 log2(u) */
+#define MOST_TO_ROUNDOFF (16 + 2 * HS_BITS)
 #define RENEWED 1e-3
 #define FEW 2
 #define LEAST_LEFT 1e-3
@@ -14,15 +14,15 @@
 #define NEWTON_SHARE 1e-2
 
 /* The largest change relative to the scales; of a state that has been zero so far, to where it is now. */
-HS_INLINE double scaled(const hs_run *run, int n) {
+HS_INLINE hs_real scaled(const hs_run *run, int n) {
   const hs_radau *const radau = &run->radau;
-  double size = 0.0;
+  hs_real size = 0.0;
   for (int s = 0; s < n; s++) {
-    const double change = radau->largest[s];
-    double reach = radau->scales[s];
+    const hs_real change = radau->largest[s];
+    hs_real reach = radau->scales[s];
     if (!(change > 0)) continue;
     for (int i = 0; i < 3 && !(radau->scales[s] > 0); i++) {
-      const double at = fabs(run->x[s] + radau->z[i][s]);
+      const hs_real at = fabs(run->x[s] + radau->z[i][s]);
       reach = i ? hs_max(reach, at) : at;
     }
     size = hs_max(size, reach > 0 ? change / reach : reach + 1);
@@ -44,19 +44,19 @@ static int unsettled(hs_convergence *convergence) {
 }
 
 /* Iterate until what is left is a small share of the tolerance. */
-HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
+HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h) {
   hs_convergence *const convergence = &run->radau.convergence;
-  const double tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
-  const double enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
-  double left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
+  const hs_real tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
+  const hs_real enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
+  hs_real left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
   const int late = followers(run, n);
   for (int count = 1;; count++) {
     const int rated = count > 1 + late;
     const int status = iterate(run, n, t, h);
     if (status) return status;
-    const double size = scaled(run, n) / tolerance;
+    const hs_real size = scaled(run, n) / tolerance;
     if (rated) {
-      const double rate = size / before;
+      const hs_real rate = size / before;
       if (rate >= DIVERGING) {
         if (size <= noise) return 0;
         break;
@@ -65,7 +65,7 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
       left = rate / (1 - rate);
     }
     convergence->aged = count > FEW && convergence->rate > RENEWED;
-    double ahead = left * size;
+    hs_real ahead = left * size;
     if (size == 0 || ahead <= enough) {
       convergence->left = left;
       return 0;
@@ -80,10 +80,10 @@ HS_INLINE int to_tolerance(hs_run *run, int n, double t, double h) {
 }
 
 /* Whether the next corrections would be below the last digits of x and of all stages. */
-HS_INLINE int below_digits(const hs_run *run, int n, double rate) {
+HS_INLINE int below_digits(const hs_run *run, int n, hs_real rate) {
   const hs_radau *radau = &run->radau;
   for (int s = 0; s < n; s++) {
-    double reach = fabs(run->x[s]);
+    hs_real reach = fabs(run->x[s]);
     for (int i = 0; i < 3; i++) reach = hs_max(reach, fabs(run->x[s] + radau->z[i][s]));
     if (!(rate * radau->largest[s] <= HS_UNIT * reach)) return 0;
   }
@@ -91,15 +91,15 @@ HS_INLINE int below_digits(const hs_run *run, int n, double rate) {
 }
 
 /* Iterate until the next correction would be below the last digit, or they are all noise. */
-HS_INLINE int to_roundoff(hs_run *run, int n, double t, double h) {
+HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h) {
   hs_convergence *const convergence = &run->radau.convergence;
-  const double allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
-  double before = 0.0;
+  const hs_real allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
+  hs_real before = 0.0;
   const int late = followers(run, n);
   for (int count = 1; count <= MOST_TO_ROUNDOFF; count++) {
     const int status = iterate(run, n, t, h);
     if (status) return status;
-    const double size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
+    const hs_real size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
     if (size == 0 || (rate < SLOW_RATE && below_digits(run, n, rate))) {
       convergence->rate = rate;
       convergence->aged = rate > RENEWED;

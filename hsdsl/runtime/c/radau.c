@@ -3,34 +3,34 @@
 #include "functions.h"
 
 /* The weighted sum of three vectors. */
-HS_INLINE void weighted3(int n, const double *w, double *const v[3], double *out) {
+HS_INLINE void weighted3(int n, const hs_real *w, hs_real *const v[3], hs_real *out) {
   for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
 }
 
 /* One iteration of Newton's method on Z = h A f(x + Z), in the coordinates that take A apart: the increments after it
    and the largest change of each state. Not 0 where the flow has no value there, or the change has none. */
-HS_INLINE int iterate(hs_run *run, int n, double t, double h) {
+HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
-  double *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->slopes;
+  hs_real *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->slopes;
   for (int i = 0; i < 3; i++) {
     for (int s = 0; s < n; s++) run->at[s] = run->x[s] + radau->z[i][s];
     if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, f[i])) return NO_VALUE;
   }
   for (int s = 0; s < n; s++) {
-    double g[3];
+    hs_real g[3];
     for (int i = 0; i < 3; i++)
       g[i] = known->unmix[i][0] * f[0][s] + known->unmix[i][1] * f[1][s] + known->unmix[i][2] * f[2][s];
     radau->right[0][s] = h * g[0] - known->gamma * u[0][s];
     radau->right[1][s] = h * g[1] - (known->alpha * u[1][s] + known->beta * u[2][s]);
     radau->right[2][s] = h * g[2] - (known->alpha * u[2][s] - known->beta * u[1][s]);
   }
-  const double *const pair[2] = {radau->right[1], radau->right[2]};
+  const hs_real *const pair[2] = {radau->right[1], radau->right[2]};
   solve(n, radau->real, radau->order, radau->right[0], d[0]);
   solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
-  double total = 0.0;
+  hs_real total = 0.0;
   for (int s = 0; s < n; s++) {
-    const double a = fabs(d[0][s]), b = fabs(d[1][s]), c = fabs(d[2][s]);
+    const hs_real a = fabs(d[0][s]), b = fabs(d[1][s]), c = fabs(d[2][s]);
     for (int i = 0; i < 3; i++) u[i][s] = u[i][s] + d[i][s];
     radau->largest[s] = hs_max(hs_max(a, b), c);
     total = total + (a + b + c);
@@ -47,7 +47,7 @@ static void radau_forget(hs_radau *radau) {
 }
 
 /* Have the scales of the states over a step of length h; `closer`, with a look at the terms of the flow. */
-static void radau_scales(hs_run *run, double t, double h, int closer) {
+static void radau_scales(hs_run *run, hs_time t, hs_real h, int closer) {
   hs_radau *const radau = &run->radau;
   if (!closer || run->here.table->jumps || resolved(run, t, h, run->x, radau->rows)) return;
   radau->scales = run->resolved;
@@ -58,7 +58,7 @@ static void radau_scales(hs_run *run, double t, double h, int closer) {
   }
 }
 
-HS_INLINE int derive(hs_run *run, double t) {
+HS_INLINE int derive(hs_run *run, hs_time t) {
   hs_radau *const radau = &run->radau;
   if (run->here.table->jacobian(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
   swap(&radau->rows, &radau->fresh);
@@ -69,7 +69,7 @@ HS_INLINE int derive(hs_run *run, double t) {
 }
 
 /* Factor gamma - h J and alpha - i beta - h J, unless that is done. */
-HS_INLINE int factor_for(hs_run *run, int n, double h) {
+HS_INLINE int factor_for(hs_run *run, int n, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   if (radau->factored && radau->factored_for == h) return 0;
@@ -89,26 +89,26 @@ HS_INLINE int factor_for(hs_run *run, int n, double h) {
 }
 
 /* Go on with the last step's polynomial: behind its end, or inside it where it was tried from here. To radau->z. */
-HS_INLINE void guess(hs_run *run, int n, double t, double h) {
+HS_INLINE void guess(hs_run *run, int n, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   const int behind = radau->stepped && t == radau->start + radau->length;
   const int known_here = behind || (radau->stepped && t == radau->start);
-  const double share = h / radau->length;
+  const hs_real share = h / radau->length;
   for (int s = 0; s < n; s++) {
-    double c[3];
+    hs_real c[3];
     for (int m = 0; m < 3; m++)
       c[m] = known->power[m][0] * radau->last[0][s] + known->power[m][1] * radau->last[1][s] +
              known->power[m][2] * radau->last[2][s];
     for (int i = 0; i < 3; i++) {
-      const double at = (behind ? 1.0 : 0.0) + known->node[i] * share, base = behind ? radau->last[2][s] : 0.0;
+      const hs_real at = (behind ? 1.0 : 0.0) + known->node[i] * share, base = behind ? radau->last[2][s] : 0.0;
       radau->z[i][s] = known_here ? at * (c[0] + at * (c[1] + at * c[2])) - base : 0.0;
     }
   }
 }
 
 /* Solve for the step with the derivatives that there are. */
-HS_INLINE int settle_in(hs_run *run, int n, double t, double h, int exactly, int closer) {
+HS_INLINE int settle_in(hs_run *run, int n, hs_time t, hs_real h, int exactly, int closer) {
   hs_radau *const radau = &run->radau;
   radau->scales = radau->lifted ? run->resolved : run->scales;
   for (int s = 0; radau->lifted && s < n; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
@@ -120,24 +120,24 @@ HS_INLINE int settle_in(hs_run *run, int n, double t, double h, int exactly, int
   return exactly ? to_roundoff(run, n, t, h) : to_tolerance(run, n, t, h);
 }
 
-static int settle_2(hs_run *run, double t, double h, int exactly, int closer) {
+static int settle_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   return settle_in(run, 2, t, h, exactly, closer);
 }
 
-static int settle_3(hs_run *run, double t, double h, int exactly, int closer) {
+static int settle_3(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   return settle_in(run, 3, t, h, exactly, closer);
 }
 
-static int settle_n(hs_run *run, double t, double h, int exactly, int closer) {
+static int settle_n(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   return settle_in(run, run->here.dimension, t, h, exactly, closer);
 }
 
-HS_INLINE int settle(hs_run *run, int n, double t, double h, int exactly, int closer) {
+HS_INLINE int settle(hs_run *run, int n, hs_time t, hs_real h, int exactly, int closer) {
   return (n == 2 ? settle_2 : n == 3 ? settle_3 : settle_n)(run, t, h, exactly, closer);
 }
 
 /* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */
-HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
+HS_INLINE int solved(hs_run *run, int n, hs_time t, hs_real h, int exactly) {
   hs_radau *const radau = &run->radau;
   const int renew = radau->convergence.aged && radau->derived_at != t;
   if ((!radau->derived || renew) && derive(run, t)) return NO_VALUE;
@@ -151,10 +151,10 @@ HS_INLINE int solved(hs_run *run, int n, double t, double h, int exactly) {
 }
 
 /* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */
-HS_INLINE int estimate(hs_run *run, int n, double t, double h) {
+HS_INLINE int estimate(hs_run *run, int n, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
-  double *const inside = radau->slopes[0], *const embedded = radau->change[0], *const along = radau->change[1];
+  hs_real *const inside = radau->slopes[0], *const embedded = radau->change[0], *const along = radau->change[1];
   weighted3(n, known->value, radau->z, run->at);
   for (int s = 0; s < n; s++) run->at[s] = run->x[s] + run->at[s];
   if (run->here.table->flow(run->here.p, t + known->share * h, run->at, inside)) return NO_VALUE;
@@ -171,11 +171,11 @@ HS_INLINE int estimate(hs_run *run, int n, double t, double h) {
 }
 
 /* The same to round-off, for any number of states. */
-static int solved_exactly(hs_run *run, double t, double h) {
+static int solved_exactly(hs_run *run, hs_time t, hs_real h) {
   return run->here.dimension ? solved(run, run->here.dimension, t, h, 1) : 0;
 }
 
-HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
+HS_INLINE int radau_step_in(hs_run *run, int n, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
   if (!n) return 0;
   const int adaptive = run->control.tolerance > 0;
@@ -191,7 +191,7 @@ HS_INLINE int radau_step_in(hs_run *run, int n, double t, double h) {
 }
 
 /* Try a step, solved to its tolerance; compiled for two and three states apart, a tenth faster. */
-static int radau_step(hs_run *run, double t, double h) {
+static int radau_step(hs_run *run, hs_time t, hs_real h) {
   switch (run->here.dimension) {
     case 2: return radau_step_in(run, 2, t, h);
     case 3: return radau_step_in(run, 3, t, h);
@@ -200,7 +200,7 @@ static int radau_step(hs_run *run, double t, double h) {
 }
 
 /* Make a part of the last step, solved to round-off: its end, run->z, is a smooth function of its length. */
-static int radau_landing(hs_run *run, double t, double h) {
+static int radau_landing(hs_run *run, hs_time t, hs_real h) {
   const int status = solved_exactly(run, t, h);
   if (status) return status;
   for (int s = 0; s < run->here.dimension; s++) run->z[s] = run->x[s] + run->radau.z[2][s];

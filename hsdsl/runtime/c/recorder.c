@@ -19,7 +19,7 @@ HS_INLINE int room(hs_run *run) {
 }
 
 /* Keep a piece, zero where it has nothing: of lower degree, or in a mode with fewer states. */
-HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece, double *kept) {
+HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece, hs_real *kept) {
   const int w = run->width, degree = run->method->degree, used = piece ? piece->degree : 0;
   if (n == w && used) memcpy(kept, piece->c, (size_t)(used * w) * sizeof *kept);
   for (int m = 0; n < w && m < used; m++) {
@@ -29,13 +29,13 @@ HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece,
   for (int i = used * w; i < degree * w; i++) kept[i] = 0.0;
 }
 
-HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polynomial *piece, double depth,
-                      hs_routine *outputs, const double *p) {
+HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_polynomial *piece, hs_real depth,
+                      hs_routine *outputs, const hs_real *p) {
   hs_chunk *chunk = &run->task->chunk;
   const int n = run->here.dimension, w = run->width, m = run->model->outputs;
   if (!room(run)) return;
   const int64_t row = chunk->rows;
-  double *values = chunk->values + row * w;
+  hs_real *values = chunk->values + row * w;
   chunk->times[row] = t;
   copy(values, x, n);
   for (int s = n; s < w; s++) values[s] = NAN;
@@ -49,7 +49,7 @@ HS_INLINE void write_row(hs_run *run, double t, const double *x, const hs_polyno
 }
 
 /* Add the piece that leads to a row, and the row; the scales grow to the state's size. */
-HS_INLINE void append(hs_run *run, double t, const double *x, const hs_polynomial *piece) {
+HS_INLINE void append(hs_run *run, hs_time t, const hs_real *x, const hs_polynomial *piece) {
   for (int s = 0; s < run->here.dimension; s++) run->scales[s] = hs_max(run->scales[s], fabs(x[s]));
   write_row(run, t, x, piece, 0.0, run->here.outputs, run->here.outputs_p);
 }
@@ -65,19 +65,19 @@ static void begin(hs_run *run, int kind) {
 }
 
 /* Write a strip: the state waits at q while time and depth pass through `rows`; inputs go on. */
-static void strip(hs_run *run, int rows, double (*row)[2], const double *q) {
+static void strip(hs_run *run, int rows, hs_time (*row)[2], const hs_real *q) {
   const hs_mode_state *here = &run->here;
   const int further = row[rows - 1][0] > run->task->timeline->end[here->segment];
   begin(run, HS_STRIP);
   for (int i = 0; i < rows; i++) {
-    const double *p = here->outputs_p;
+    const hs_real *p = here->outputs_p;
     if (further) p = segment_data(run, segment_at(run->task->timeline, row[i][0]));
     write_row(run, row[i][0], q, 0, row[i][1], here->outputs, p);
   }
 }
 
 /* Write one transition down; `after` is 0 where the run ended before it was made. */
-static void record(hs_run *run, const hs_crossing *crossing, double resumed, const double *after, int entry) {
+static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, const hs_real *after, int entry) {
   hs_chunk *chunk = &run->task->chunk;
   const int w = run->width;
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
@@ -100,7 +100,7 @@ static void record(hs_run *run, const hs_crossing *crossing, double resumed, con
   if (after) copy(chunk->after + i * w, after, edge->target_dimension);
 }
 
-static void note(hs_run *run, hs_notice kind, int surface, int64_t number, double time, double other) {
+static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_time time, hs_time other) {
   if (!room(run)) return;
   hs_note *note = &run->task->chunk.note[run->task->chunk.notes++];
   note->kind = kind;
@@ -112,7 +112,7 @@ static void note(hs_run *run, hs_notice kind, int surface, int64_t number, doubl
 }
 
 /* Note that surface k would not settle on a polynomial: once for each. */
-static void doubt(hs_run *run, int k, double time) {
+static void doubt(hs_run *run, int k, hs_time time) {
   int *const doubted = &run->doubted[run->here.mode * run->model->surfaces + k];
   if (!*doubted) note(run, HS_UNSETTLED, k, 0, time, time);
   *doubted = 1;

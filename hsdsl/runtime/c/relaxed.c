@@ -5,7 +5,7 @@
 #define POLL_EVERY (CLOCKS_PER_SEC / 50)
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
-HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
+HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
   const hs_mode_state *here = &run->here;
   const hs_mode *mode = here->table;
   hs_trial *trial = &run->trial;
@@ -16,7 +16,7 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
   const int status = step(run, n, here->t, h);
   if (status == NO_CONVERGENCE) return UNSOLVED;
   if (status || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
-  double largest = m ? run->ahead[0] : 0.0;
+  hs_real largest = m ? run->ahead[0] : 0.0;
   for (int k = 1; k < m; k++) largest = hs_max(largest, run->ahead[k]);
   if (largest <= 0) {
     if (mode->flow(here->p, t1, run->z, run->end)) return NOT_FINITE;
@@ -33,9 +33,9 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, double h, double t1) {
 }
 
 /* The sizes of the numbers that a point between x and z is computed from, to run->landed. */
-static void sizes(hs_run *run, const double *x, const double *z) {
+static void sizes(hs_run *run, const hs_real *x, const hs_real *z) {
   for (int s = 0; s < run->here.dimension; s++) {
-    const double still = z[s] == run->entered[s] ? run->scale[s] : fabs(z[s]);
+    const hs_real still = z[s] == run->entered[s] ? run->scale[s] : fabs(z[s]);
     run->landed[s] = hs_max(hs_max(fabs(x[s]), fabs(z[s])), still);
   }
 }
@@ -97,14 +97,15 @@ static int flow(hs_run *run) {
   hs_control *control = &run->control;
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const int n = here->dimension;
-  const double limit = run->task->timeline->end[here->segment];
+  const hs_time limit = run->task->timeline->end[here->segment];
   run->stall.reached = NAN;
   run->stall.idle = run->stall.creeping = run->chatter = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(run);
   while (here->t < limit) {
-    double h = control->h, t1, ratio = NAN;
+    hs_real h = control->h, ratio = NAN;
+    hs_time t1;
     int halvings = 0;
     hs_found found, last = TOO_WRONG;
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
@@ -154,7 +155,7 @@ static int flow(hs_run *run) {
   return AT_BOUNDARY;
 }
 
-static int in_strip(hs_run *run, hs_reason reason, double t) {
+static int in_strip(hs_run *run, hs_reason reason, hs_time t) {
   run->task->stop.edge = run->chosen.edge;
   return stopped(run, reason, t);
 }
@@ -172,22 +173,22 @@ static int moves_on(hs_run *run, const hs_mode_state *before, int unknown) {
 /* Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14). */
 static int through_strip(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
-  const double t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
+  const hs_time t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
   if (crossing->theta > 0) append(run, t, crossing->state, &crossing->piece);
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
-  double resumed = t1 + (run->epsilon - depth);
+  hs_time resumed = t1 + (run->epsilon - depth);
   const int without_value = reset(run, run->landed);
   if (resumed > until + tie(run, until)) {
-    double rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
+    hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
     strip(run, 3, rows, crossing->state);
     record(run, crossing, NAN, 0, 0);
     return in_strip(run, HS_UNTIL_IN_STRIP, until);
   }
   if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);
-  resumed = hs_min(resumed, until);
-  double rows[3][2] = {{t, depth * 0}, {t1, depth}, {resumed, run->epsilon}};
+  resumed = earlier(resumed, until);
+  hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {resumed, run->epsilon}};
   strip(run, 3, rows, crossing->state);
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
@@ -201,7 +202,7 @@ static int through_strip(hs_run *run) {
 
 /* Enter the next segment of the inputs: anew where one of them jumps. */
 static int go_on(hs_run *run) {
-  const double t = run->here.t;
+  const hs_time t = run->here.t;
   const hs_mode_state before = run->here;
   const int64_t segment = segment_at(run->task->timeline, t);
   if (run->task->timeline->jump[segment]) {
@@ -215,13 +216,13 @@ static int go_on(hs_run *run) {
 
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int at_boundary(hs_run *run) {
-  const double t = run->here.t;
+  const hs_time t = run->here.t;
   if (t < run->until) return go_on(run);
   const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   choose(run, count);
-  double rows[1][2] = {{t, 0.0}};
+  hs_time rows[1][2] = {{t, 0.0}};
   strip(run, 1, rows, run->x);
   record(run, &run->chosen, NAN, 0, 0);
   return in_strip(run, HS_UNTIL_ON_GUARD, t);

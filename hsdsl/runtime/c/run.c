@@ -2,7 +2,7 @@
 
 #include "functions.h"
 
-static hs_reason stopped(hs_run *run, hs_reason reason, double t) {
+static hs_reason stopped(hs_run *run, hs_reason reason, hs_time t) {
   hs_stop *stop = &run->task->stop;
   stop->reason = reason;
   stop->time = t;
@@ -24,15 +24,15 @@ static void hand_on_scales(hs_run *run, const hs_mode *from, const hs_mode *to) 
 /* Bound the first step of an arc of flow that begins in a mode; further ones may be twice as long each. */
 static void bound_first_step(hs_run *run, int mode) {
   const hs_settings *settings = &run->task->settings;
-  const double bound = run->placed < settings->arcs ? settings->first_steps[run->placed] : 0.0;
-  double *const reach = &run->reach[mode];
+  const hs_real bound = run->placed < settings->arcs ? settings->first_steps[run->placed] : 0.0;
+  hs_real *const reach = &run->reach[mode];
   run->placed++;
   if (bound > 0) *reach = *reach > 0 ? hs_min(*reach, bound) : bound;
 }
 
 /* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
    A final mode without a flow has the states, and so the outputs, of the mode before it. */
-static void place(hs_run *run, int mode, int dimension, double t, const hs_mode_state *before) {
+static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode_state *before) {
   hs_mode_state here;
   here.mode = mode;
   here.dimension = dimension;
@@ -71,8 +71,8 @@ static void choose(hs_run *run, int count) {
   hs_crossing *first = &run->crossings[0];
   for (int i = 1; i < count; i++)
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
-  const double since = tie(run, first->time);
-  double depth = first->depth;
+  const hs_real since = tie(run, first->time);
+  hs_real depth = first->depth;
   int chosen = first->edge;
   standing(run, first->time, first->state, since, run->tied);
   for (int i = 0; i < count; i++)
@@ -90,11 +90,11 @@ static void choose(hs_run *run, int count) {
 
 /* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state behind
    it to run->after, and to run->both the sizes of the numbers it came from. Not 0 where it has no finite value. */
-static int reset(hs_run *run, double *scale) {
+static int reset(hs_run *run, hs_real *scale) {
   const hs_crossing *crossing = &run->chosen;
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
   const int n = run->here.dimension, to = edge->target_dimension;
-  double *const sizes = run->error;
+  hs_real *const sizes = run->error;
   if (edge->reset(run->here.p, crossing->time, crossing->state, run->after)) return 1;
   if (!all_finite(run->after, to)) return 1;
   copy(run->both, crossing->state, n);

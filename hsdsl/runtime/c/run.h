@@ -15,8 +15,18 @@
 #define HS_INLINE static inline
 #endif
 
+#if defined(HS_FLOAT32)
+#define HS_BITS 24
+#define HS_UNIT 0x1p-24f
+#define HS_TIE 0x1p-20f
+#define HS_NOTHING 0x1p-96f
+#else
+#define HS_BITS 53
 #define HS_UNIT 0x1p-53
 #define HS_TIE 1e-12
+#define HS_NOTHING 0x1p-960 /* below it numbers have no digits left */
+#endif
+#define HS_TIME_UNIT 0x1p-53
 #define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
 #define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
 #define MOST_SPLITS 30
@@ -31,13 +41,14 @@ enum { NO_VALUE = 1, NO_CONVERGENCE = 2 }; /* why a step has no end */
 /* A step's interpolant: x + c_1 s + c_2 s**2 + ..., power m at c[m*width]. */
 typedef struct {
   int degree;
-  double *c;
+  hs_real *c;
 } hs_polynomial;
 
 typedef struct {
   int edge;
-  double theta, time, depth;
-  double *state;
+  hs_real theta, depth;
+  hs_time time;
+  hs_real *state;
   hs_polynomial piece; /* of degree 0 where the crossing is the step's start */
 } hs_crossing;
 
@@ -46,16 +57,17 @@ typedef struct {
   int mode, dimension;
   const hs_mode *table;
   int64_t segment;
-  const double *p;
+  const hs_real *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
-  const double *outputs_p;
+  const hs_real *outputs_p;
   int standing, emerging;  /* numbers of surfaces in active_surfaces and in run->emerging */
-  double t, entered_at;
+  hs_time t, entered_at;
 } hs_mode_state;
 
 /* One step as tried, from (t, x) to (t1, z). */
 typedef struct {
-  double t, h, t1;
+  hs_time t, t1;
+  hs_real h;
   int looked, ends; /* whether the flow at the end was evaluated, and has a value */
   int has_piece;
   hs_polynomial piece;
@@ -69,48 +81,49 @@ typedef struct {
 } hs_found;
 
 typedef struct {
-  double h, tolerance, largest, least;
+  hs_real h, tolerance, largest, least;
   int order;
   int implicit;
-  double before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
+  hs_real before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
   int64_t accepted, rejected; /* in a stretch of time */
-  double stretch;
-  double failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
+  hs_real stretch;
+  hs_time failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
   int closer;       /* whether a look at the flow's round-off let one pass */
 } hs_control;
 
 /* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
    the derivatives should be renewed for the next step. */
 typedef struct {
-  double rate, left;
+  hs_real rate, left;
   int aged;
 } hs_convergence;
 
 /* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of its square. */
 typedef struct {
   int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
-  double derived_at, factored_for, start, length;
+  hs_time derived_at, start;
+  hs_real factored_for, length;
   hs_convergence convergence;
-  double *rows, *fresh;            /* the flow's derivatives */
-  double *real, *re, *im;          /* factors of the real matrix and of the complex one */
+  hs_real *rows, *fresh;            /* the flow's derivatives */
+  hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
   int *order, *turned;             /* the order of their rows */
-  double *z[3], *last[3];          /* increments: as they are now, and of the last step */
-  double *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
-  double *slopes[3], *right[3];
-  double *largest, *error;
-  const double *scales; /* of the states, as the last step was solved with them */
-  double *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
+  hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
+  hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
+  hs_real *slopes[3], *right[3];
+  hs_real *largest, *error;
+  const hs_real *scales; /* of the states, as the last step was solved with them */
+  hs_real *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
   int lifted;
 } hs_radau;
 
 typedef struct {
-  double reached;
+  hs_time reached;
   int idle, creeping;
 } hs_stall;
 
 /* What is remembered of a transition. */
 typedef struct {
-  double time, resumed;
+  hs_time time, resumed;
   int mode, edge, target, entry;
 } hs_made;
 
@@ -118,31 +131,33 @@ typedef struct {
 typedef struct {
   int mode;
   long length, room;
-  double *x;
+  hs_real *x;
 } hs_cascade;
 
 /* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
 typedef struct {
-  double low, high, *b;
+  hs_real low, high, *b;
 } hs_cut;
 
 /* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
 typedef struct {
   int parts, count, room; /* room: numbers for each polynomial */
-  double *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
+  hs_real *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
 /* What holds a state at rest on a window of time: an edge, and the derivative of its surface that does. */
 typedef struct {
   int edge, order;
-  double start, width;
+  hs_time start;
+  hs_real width;
 } hs_held;
 
 /* One step of the located scheme. */
 typedef struct {
-  double t, h, t1;
-  double *x, *largest; /* where it began; of a table, the largest of its stages */
+  hs_time t, t1;
+  hs_real h;
+  hs_real *x, *largest; /* where it began; of a table, the largest of its stages */
   hs_polynomial piece;
 } hs_span;
 
@@ -151,7 +166,8 @@ typedef struct {
   const hs_model *model;
   const hs_method *method;
   int width;
-  double epsilon, until;
+  hs_real epsilon;
+  hs_time until;
   hs_mode_state here;
   hs_trial trial;
   hs_control control;
@@ -160,26 +176,26 @@ typedef struct {
   hs_cascade cascade;
   int chatter;
   /* in the workspace, a state's room each unless said otherwise */
-  double *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
-  double *scales, *known; /* of the states here, and of those of all modes before this one was entered */
-  double *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
+  hs_real *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
+  hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
   int *lifted;
-  double *flow_sizes, *jacobian; /* see sticking.c; jacobian: width * width */
-  double **k;          /* stages, then the flow at the end */
-  double *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
+  hs_real *flow_sizes, *jacobian; /* see sticking.c; jacobian: width * width */
+  hs_real **k;          /* stages, then the flow at the end */
+  hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
-  double *values, *ahead, *magnitudes, *noise; /* one for each surface */
+  hs_real *values, *ahead, *magnitudes, *noise; /* one for each surface */
   int *active_surfaces, *beyond, *emerging;
-  double *source;      /* the flow that led to a transition, or between two states */
+  hs_real *source;      /* the flow that led to a transition, or between two states */
   int *tied;           /* one for each edge */
-  double *gradient;    /* width + 1 */
-  double *both;        /* 2 width: states and sizes */
+  hs_real *gradient;    /* width + 1 */
+  hs_real *both;        /* 2 width: states and sizes */
   hs_crossing *crossings; /* one for each edge */
   hs_polynomial cubic;
   hs_crossing chosen;
   int *alternatives, alternatives_count;
-  double landed_at;    /* the end of a step into a strip */
+  hs_time landed_at;    /* the end of a step into a strip */
   int64_t row, jump;   /* counted from the start of the run */
   int interrupted, full;
   long steps_to_poll, poll_steps;
@@ -187,42 +203,45 @@ typedef struct {
   /* of the located scheme */
   hs_span span, before;
   int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
-  double ratio;                     /* of the last error estimate */
+  hs_real ratio;                     /* of the last error estimate */
   hs_curves curves;
   hs_cut *cuts;
-  const double *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
-  double *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
-  double *q, *ends, *starts, *middle, *other_end, **other_k;
+  const hs_real *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
+  hs_real *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
+  hs_real *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
   int resting;                      /* the edge on whose guard the state rests, or -1 */
   hs_held held;
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
-  double *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
+  hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
   hs_made made[FREE];
 } hs_run;
 
-static inline double tie(const hs_run *run, double t) { return HS_TIE * hs_max(run->until, fabs(t)); }
+/* The earlier of two instants, the first where they are one. */
+static inline hs_time earlier(hs_time a, hs_time b) { return b < a ? b : a; }
 
-static inline int all_finite(const double *v, int n) {
+static inline hs_real tie(const hs_run *run, hs_time t) { return HS_TIE * hs_max(run->until, fabs(t)); }
+
+static inline int all_finite(const hs_real *v, int n) {
   for (int i = 0; i < n; i++)
     if (!hs_finite(v[i])) return 0;
   return 1;
 }
 
-static inline double sum(const double *v, int n) {
-  double total = 0.0;
+static inline hs_real sum(const hs_real *v, int n) {
+  hs_real total = 0.0;
   for (int i = 0; i < n; i++) total += v[i];
   return total;
 }
 
-static inline void swap(double **a, double **b) {
-  double *const kept = *a;
+static inline void swap(hs_real **a, hs_real **b) {
+  hs_real *const kept = *a;
   *a = *b;
   *b = kept;
 }
 
-static inline void copy(double *to, const double *from, int n) {
+static inline void copy(hs_real *to, const hs_real *from, int n) {
   for (int i = 0; i < n; i++) to[i] = from[i];
 }
 

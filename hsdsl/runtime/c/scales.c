@@ -6,6 +6,7 @@
 #define SHARE 32
 #define BLUR_UNITS 4 /* BLUR there */
 
+#if !defined(HS_FLOAT32)
 /* 2**k, where that is a normal number. */
 static double power_of_two(int k) {
   const uint64_t bits = (uint64_t)(k + 1023) << 52;
@@ -13,32 +14,36 @@ static double power_of_two(int k) {
   memcpy(&power, &bits, sizeof power);
   return power;
 }
+#endif
 
 static int rounded_down(int exponent, int m) { return exponent >= 0 ? exponent / m : -((-exponent + m - 1) / m); }
 
 /* x**(-1/m); of x 2**(k m) it is exactly 2**-k times as much. */
-static double root(double x, int m) {
+static hs_real root(hs_real x, int m) {
+#if !defined(HS_FLOAT32)
   if (x >= 0x1p-900 && x <= 0x1p900) { /* frexp and ldexp cost as much as pow */
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     const int shift = rounded_down((int)(bits >> 52) - 1022, m);
     return pow(x * power_of_two(-shift * m), -1.0 / m) * power_of_two(-shift);
   }
+#endif
   int exponent;
-  const double fraction = frexp(x, &exponent);
+  const hs_real fraction = frexp(x, &exponent);
   const int shift = rounded_down(exponent, m);
-  return ldexp(pow(ldexp(fraction, exponent - shift * m), -1.0 / m), -shift);
+  return ldexp(pow(ldexp(fraction, exponent - shift * m), (hs_real)-1 / m), -shift);
 }
 
 /* The sizes of the terms of a flow, by what the last digits of the states `moved` change in it, to `found`;
    its value is `slope`. Not 0 where it has none nearby. */
-static int flow_terms(hs_run *run, double t, const double *x, const double *slope, const double *moved, double *found) {
-  static const double probes[4][2] = {{2, 2}, {-2, 2}, {6, -2}, {-6, -6}};
+static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope, const hs_real *moved,
+                      hs_real *found) {
+  static const hs_real probes[4][2] = {{2, 2}, {-2, 2}, {6, -2}, {-6, -6}};
   const int n = run->here.dimension;
-  double *const near = run->near, *const other = run->nearby;
+  hs_real *const near = run->near, *const other = run->nearby;
   for (int s = 0; s < n; s++) found[s] = 0.0;
   for (int i = 0; i < 4; i++) {
-    const double odd = probes[i][0], even = probes[i][1];
+    const hs_real odd = probes[i][0], even = probes[i][1];
     for (int s = 0; s < n; s++) near[s] = x[s] + (s % 2 ? even : odd) * HS_UNIT * moved[s];
     if (run->here.table->flow(run->here.p, t + even * HS_UNIT * t, near, other)) return 1;
     for (int s = 0; s < n; s++) found[s] = hs_max(found[s], fabs(other[s] - slope[s]));
@@ -49,16 +54,16 @@ static int flow_terms(hs_run *run, double t, const double *x, const double *slop
 
 /* The scales over a step of length h from (t, x), none below a share of what the terms of its flow could move the state
    by, to run->resolved. `rows` are the derivatives of the flow, or 0. Not 0 where the flow has no value nearby. */
-static int resolved(hs_run *run, double t, double h, const double *x, const double *rows) {
+static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows) {
   const int n = run->here.dimension;
-  double *const moved = run->resolved, *const least = run->least;
+  hs_real *const moved = run->resolved, *const least = run->least;
   if (run->here.table->flow(run->here.p, t, x, run->unmoved)) return 1;
   for (int s = 0; s < n; s++) moved[s] = run->scales[s], run->lifted[s] = 0;
   for (int round = 0; round < n; round++) {
     int further = 0;
     if (flow_terms(run, t, x, run->unmoved, moved, least)) return 1;
     for (int s = 0; s < n; s++) {
-      double size = h * least[s];
+      hs_real size = h * least[s];
       if (rows) size = size / (1 + h * fabs(rows[s * n + s]));
       if (!(hs_finite(size) && size > SHARE * run->scales[s])) continue;
       moved[s] = hs_max(moved[s], size);

@@ -6,11 +6,11 @@
 #define MOST_IDLE 64
 
 /* Whether the surface in the way did not come nearer: its round-off is larger than what the step adds. */
-static int still(hs_run *run, int surface, double t1) {
+static int still(hs_run *run, int surface, hs_time t1) {
   const hs_mode_state *here = &run->here;
   if (surface < 0) return 0;
   if (here->table->values(here->p, here->t, run->x, run->values)) return 0;
-  const double before = run->values[surface];
+  const hs_real before = run->values[surface];
   if (here->table->values(here->p, t1, run->z, run->values)) return 0;
   return run->values[surface] == before;
 }
@@ -22,12 +22,12 @@ static int unmoved(const hs_run *run) {
 }
 
 /* Count a step from run->x to run->z that was halved because of `failure`; say what ends the run, if anything. */
-static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, double t1) {
+static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, hs_time t1) {
   hs_stall *stall = &run->stall;
-  const double t = run->here.t;
+  const hs_time t = run->here.t;
   if (t != stall->reached) stall->idle = stall->creeping = 0;
   stall->reached = t1;
-  const int small = t1 - t <= IDLE_UNITS * HS_UNIT * hs_max(t, run->control.h);
+  const int small = t1 - t <= IDLE_UNITS * HS_TIME_UNIT * hs_max(t, run->control.h);
   stall->idle = small || still(run, surface, t1) ? stall->idle + 1 : 0;
   stall->creeping = halvings >= CREEPING ? stall->creeping + 1 : 0;
   if (stall->idle > MOST_IDLE || (small && unmoved(run))) return failure;

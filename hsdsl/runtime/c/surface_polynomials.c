@@ -8,28 +8,28 @@
 #define LOST_IN_A_STEP 16
 #define LOST_SHORTEST 0x1p9
 
-static double *coefficients_of(const hs_curves *curves, int part, int k) {
+static hs_real *coefficients_of(const hs_curves *curves, int part, int k) {
   return curves->c + ((int64_t)part * curves->count + k) * curves->room;
 }
 
-static double *off_of(const hs_curves *curves, int part, int k) { return &curves->off[part * curves->count + k]; }
+static hs_real *off_of(const hs_curves *curves, int part, int k) { return &curves->off[part * curves->count + k]; }
 
 static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
 
-static hs_walk begin_walk(int k, double level, int beyond, int risen) {
+static hs_walk begin_walk(int k, hs_real level, int beyond, int risen) {
   const hs_walk walk = {k, risen, beyond, 0, level, 0.0};
   return walk;
 }
 
 /* The last root before `end`; a series that begins with zero has it taken out, so that tiny roots stay exact. */
-static double root_of(hs_run *run, const double *c, int n, double start, double end) {
+static hs_real root_of(hs_run *run, const hs_real *c, int n, hs_real start, hs_real end) {
   const int reduced = start == 0 && c[0] == 0 && n > 0;
-  double root;
+  hs_real root;
   return last_root(run, c + reduced, n - reduced, start, end, &root) ? root : start;
 }
 
-static double slope_of(const double *c, int n, double s) {
-  double slope = s * 0;
+static hs_real slope_of(const hs_real *c, int n, hs_real s) {
+  hs_real slope = s * 0;
   for (int k = n; k > 0; k--) slope = k * c[k] + s * slope;
   return slope;
 }
@@ -38,12 +38,12 @@ static double slope_of(const double *c, int n, double s) {
 static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
   const hs_curves *curves = &run->curves;
   for (; walk->part < curves->parts; walk->part++, walk->at = 0.0) {
-    const double *c = coefficients_of(curves, walk->part, walk->k);
+    const hs_real *c = coefficients_of(curves, walk->part, walk->k);
     const int n = *degree_of(curves, walk->part, walk->k);
-    double sizes = 0.0, high;
+    hs_real sizes = 0.0, high;
     for (int i = 0; i <= n; i++) sizes = sizes + fabs(c[i]);
-    const double least = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
-    const double above = hs_max(least, *off_of(curves, walk->part, walk->k));
+    const hs_real least = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
+    const hs_real above = hs_max(least, *off_of(curves, walk->part, walk->k));
     if (walk->outside) {
       if (!rises(run, c, n, -1.0, 0.0, walk->at, &walk->at)) continue;
       walk->outside = 0;
@@ -52,7 +52,7 @@ static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
       if (!(walk->part == curves->parts - 1 && walk->risen && walk->at < 1)) continue;
       high = 1.0;
     }
-    const double root = root_of(run, c, n, walk->at, high), width = curves->width[walk->part];
+    const hs_real root = root_of(run, c, n, walk->at, high), width = curves->width[walk->part];
     rise->share = curves->start[walk->part] + root * width;
     rise->slope = slope_of(c, n, root) / width;
     rise->certain = curves->certain[walk->part * curves->count + walk->k];
@@ -64,16 +64,16 @@ static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
 }
 
 /* How far a polynomial is off the values it should have at some points. */
-static double residual(const double *c, const hs_interpolation *by, const double *values, int every) {
-  double worst = fabs(value_of(c, by->degree, by->tests[0]) - values[0]);
+static hs_real residual(const hs_real *c, const hs_interpolation *by, const hs_real *values, int every) {
+  hs_real worst = fabs(value_of(c, by->degree, by->tests[0]) - values[0]);
   for (int i = 1; i < HS_TESTS; i++)
     worst = hs_max(worst, fabs(value_of(c, by->degree, by->tests[i]) - values[i * every]));
   return worst;
 }
 
 /* Whether a residual of function k is small enough; `allowed` is evaluated only where that decides. */
-static int settles(hs_run *run, double off, double enough, hs_allowed *allowed, int k, int *answer) {
-  double more;
+static int settles(hs_run *run, hs_real off, hs_real enough, hs_allowed *allowed, int k, int *answer) {
+  hs_real more;
   *answer = off <= enough;
   if (*answer) return 0;
   if (allowed(run, k, &more)) return RAISED;
@@ -89,18 +89,18 @@ static void begin_curves(hs_curves *curves, int count) {
 }
 
 /* The degree of a polynomial, at least 1: along a polynomial solution it is low. */
-static int degree_without_zeros(const double *c, int degree) {
+static int degree_without_zeros(const hs_real *c, int degree) {
   while (degree > 1 && c[degree] == 0) degree--;
   return degree;
 }
 
 /* A surface that is affine, with these slopes by time and the states, along a piece of n states over h: the sum of the
    absolute coefficients. Those of powers 1 and up go to c, c[0] is there. */
-HS_INLINE double affine_curve(const hs_polynomial *piece, const int n, int w, double h, const double *slopes, double *c,
-                              int *degree) {
-  double sizes = fabs(c[0]);
+HS_INLINE hs_real affine_curve(const hs_polynomial *piece, const int n, int w, hs_real h, const hs_real *slopes,
+                               hs_real *c, int *degree) {
+  hs_real sizes = fabs(c[0]);
   for (int m = 1; m <= piece->degree; m++) {
-    double power = m == 1 ? slopes[0] * h : 0.0;
+    hs_real power = m == 1 ? slopes[0] * h : 0.0;
     for (int s = 0; s < n; s++) power = power + slopes[s + 1] * piece->c[(m - 1) * w + s];
     c[m] = power;
     sizes = sizes + fabs(power);
@@ -114,23 +114,23 @@ static int interpolate_part(hs_run *run, hs_functions *functions, const hs_inter
                             int *settled) {
   hs_curves *const curves = &run->curves;
   const int part = curves->parts, count = curves->count, nodes = by->degree + 1;
-  const double start = curves->start[part], width = curves->width[part];
-  double *const rows = run->rows, *const checks = rows + nodes * count;
+  const hs_real start = curves->start[part], width = curves->width[part];
+  hs_real *const rows = run->rows, *const checks = rows + nodes * count;
   for (int i = 0; i < nodes; i++)
     if (functions(run, start + width * by->nodes[i], rows + i * count)) return RAISED;
   for (int i = 0; i < HS_TESTS; i++)
     if (functions(run, start + width * by->tests[i], checks + i * count)) return RAISED;
   *settled = 1;
   for (int k = 0; k < count; k++) {
-    double *const c = coefficients_of(curves, part, k), largest = fabs(rows[k]);
+    hs_real *const c = coefficients_of(curves, part, k), largest = fabs(rows[k]);
     for (int j = 0; j < nodes; j++) {
-      double power = 0.0;
+      hs_real power = 0.0;
       for (int i = 0; i < nodes; i++) power = power + by->matrix[j * nodes + i] * rows[i * count + k];
       c[j] = power;
     }
     for (int i = 1; i < nodes; i++) largest = hs_max(largest, fabs(rows[i * count + k]));
     int *const certain = &curves->certain[part * count + k];
-    const double off = *off_of(curves, part, k) = by->share * largest;
+    const hs_real off = *off_of(curves, part, k) = by->share * largest;
     if (settles(run, residual(c, by, checks + k, count), off, allowed, k, certain)) return RAISED;
     *settled &= *certain;
     *degree_of(curves, part, k) = by->degree;
@@ -144,7 +144,7 @@ static void straighten(hs_run *run, int degree) {
   const int part = curves->parts, count = curves->count;
   for (int k = 0; k < count; k++) {
     if (curves->certain[part * count + k]) continue;
-    double *const c = coefficients_of(curves, part, k);
+    hs_real *const c = coefficients_of(curves, part, k);
     c[0] = run->rows[k];
     c[1] = run->rows[degree * count + k] - run->rows[k];
     *degree_of(curves, part, k) = 1;
@@ -158,7 +158,7 @@ static void straighten(hs_run *run, int degree) {
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
                         hs_allowed *allowed, int far, int most, int may_refuse) {
   struct {
-    double start, width;
+    hs_real start, width;
     int halvings;
   } parts[MOST_SPLITS + 2] = {{0.0, 1.0, 0}};
   hs_curves *const curves = &run->curves;
@@ -166,14 +166,14 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
   curves->parts = 0;
   curves->count = count;
   while (open) {
-    const double start = parts[--open].start, width = parts[open].width;
+    const hs_real start = parts[--open].start, width = parts[open].width;
     const int halvings = parts[open].halvings;
     curves->start[curves->parts] = start, curves->width[curves->parts] = width;
     if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
     if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST)))
       return run->refused = 1, RAISED;
     if (!settled && halvings < MOST_SPLITS && curves->parts < most) {
-      const double half = width / 2;
+      const hs_real half = width / 2;
       parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;
       parts[open].start = start, parts[open].width = half, parts[open++].halvings = halvings + 1;
       continue;
@@ -186,14 +186,14 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
 }
 
 /* The surfaces at the share s of the step, by its interpolant. */
-static int surfaces_along(hs_run *run, double s, double *values) {
+static int surfaces_along(hs_run *run, hs_real s, hs_real *values) {
   at(run, &run->span.piece, s, run->at);
   return run->here.table->values(run->here.p, run->span.t + s * run->span.h, run->at, values);
 }
 
-static int noise_at_ends(hs_run *run, int k, double *allowed) {
+static int noise_at_ends(hs_run *run, int k, hs_real *allowed) {
   const hs_span *span = &run->span;
-  double first, last;
+  hs_real first, last;
   if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t + span->h, run->z, 0, &last))
     return RAISED;
   *allowed = hs_max(first, last);
@@ -202,17 +202,17 @@ static int noise_at_ends(hs_run *run, int k, double *allowed) {
 
 /* All surfaces along the step's interpolant where all of them are affine: polynomials of its own degree. Rises below a
    share of their size tell nothing. */
-static int affine_curves(hs_run *run, double share) {
+static int affine_curves(hs_run *run, hs_real share) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
   hs_curves *const found = &run->curves;
   if (mode->values(run->here.p, span->t, run->x, run->values)) return RAISED;
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
-    double *const c = coefficients_of(found, 0, k);
+    hs_real *const c = coefficients_of(found, 0, k);
     if (mode->gradients[k](run->here.p, span->t, run->x, run->gradient)) return RAISED;
     c[0] = run->values[k];
-    const double sizes =
+    const hs_real sizes =
         affine_curve(&span->piece, run->here.dimension, run->width, span->h, run->gradient, c, degree_of(found, 0, k));
     *off_of(found, 0, k) = share * sizes;
     found->certain[k] = 1;

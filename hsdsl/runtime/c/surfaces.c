@@ -13,28 +13,28 @@ static hs_found failure(hs_step_failure kind, int surface) {
 }
 
 /* Evaluate the interpolant of a step at s = theta, to `value`. */
-static void at(const hs_run *run, const hs_polynomial *piece, double theta, double *value) {
+static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value) {
   const int n = run->here.dimension, w = run->width, last = piece->degree - 1;
   for (int s = 0; s < n; s++) {
-    double v = piece->c[last * w + s] * theta;
+    hs_real v = piece->c[last * w + s] * theta;
     for (int m = last - 1; m >= 0; m--) v = (piece->c[m * w + s] + v) * theta;
     value[s] = run->x[s] + v;
   }
 }
 
 /* The same at its end. */
-HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, double *value) {
+HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, hs_real *value) {
   const int w = run->width, last = piece->degree - 1;
   for (int s = 0; s < n; s++) {
-    double v = piece->c[last * w + s];
+    hs_real v = piece->c[last * w + s];
     for (int m = last - 1; m >= 0; m--) v = piece->c[m * w + s] + v;
     value[s] = run->x[s] + v;
   }
 }
 
 /* The part of an interpolant before theta, over [0, 1] again. */
-static void shortened(const hs_run *run, const hs_polynomial *piece, double theta, hs_polynomial *part) {
-  double power = theta;
+static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_polynomial *part) {
+  hs_real power = theta;
   part->degree = piece->degree;
   for (int m = 0; m < piece->degree; m++) {
     for (int s = 0; s < run->here.dimension; s++)
@@ -44,19 +44,19 @@ static void shortened(const hs_run *run, const hs_polynomial *piece, double thet
 }
 
 /* Value of surface k at a point. */
-static int surface(hs_run *run, int k, double t, const double *x, double *r) {
+static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) {
   if (run->here.table->values(run->here.p, t, x, run->values)) return RAISED;
   *r = run->values[k];
   return 0;
 }
 
 /* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
-static int roundoff_bound(hs_run *run, int k, double t, const double *x, int entry, double *noise) {
+static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
   if (here->table->magnitudes(here->p, t, x, run->magnitudes)) return RAISED;
-  double total = run->magnitudes[k];
-  double *const g = run->gradient;
+  hs_real total = run->magnitudes[k];
+  hs_real *const g = run->gradient;
   if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
     total = total + fabs(g[0]) * fabs(t);
     const int scaled = entry || run->active_surfaces[k];
@@ -70,12 +70,12 @@ static int roundoff_bound(hs_run *run, int k, double t, const double *x, int ent
    those it stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the
    state was not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one that run->beyond
    marks as not reached before counts as beyond. */
-static int enter_surfaces(hs_run *run, double t, double since, int jumped, double reset_at) {
-  const double *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
+static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_time reset_at) {
+  const hs_real *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
   int *const beyond = run->beyond;
   if (reset_at < t && run->here.table->values(run->here.p, reset_at, run->x, run->noise)) return RAISED;
   for (int k = 0; k < run->here.table->surfaces; k++) {
-    double noise, rate;
+    hs_real noise, rate;
     const int inside = jumped && beyond[k];
     run->active_surfaces[k] = run->emerging[k] = beyond[k] = 0;
     if (roundoff_bound(run, k, t, run->x, 1, &noise)) return RAISED;
@@ -96,11 +96,11 @@ static int enter_surfaces(hs_run *run, double t, double since, int jumped, doubl
 }
 
 /* Mark the edges without an `if` whose surfaces the state has not reached. */
-static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
+static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
   const hs_mode *mode = run->here.table;
   if (mode->values(run->here.p, t, x, run->values)) return RAISED;
   for (int k = 0; k < mode->surfaces; k++) {
-    double noise;
+    hs_real noise;
     inside[k] = 0;
     if (k >= mode->edges || mode->edge[k].conditional) continue;
     if (roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
@@ -110,14 +110,14 @@ static int mark_inside(hs_run *run, double t, const double *x, int *inside) {
 }
 
 /* Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false. */
-static void leave(hs_run *run, double t, const double *x) {
+static void leave(hs_run *run, hs_time t, const hs_real *x) {
   for (int k = 0; k < run->here.table->surfaces; k++) {
-    double r, noise;
+    hs_real r, noise;
     if (!run->active_surfaces[k] || surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) continue;
     if (fabs(r) > noise) run->active_surfaces[k] = 0, run->here.standing--;
   }
   for (int k = 0; run->here.emerging && k < run->here.table->surfaces; k++) {
-    double r, rate = 0.0;
+    hs_real r, rate = 0.0;
     if (!run->emerging[k] || surface(run, k, t, x, &r)) continue;
     if (!(r <= 0) && (run->here.table->rates[k](run->here.p, t, x, &rate) || rate < 0)) continue;
     run->emerging[k] = 0, run->here.emerging--;
@@ -125,8 +125,8 @@ static void leave(hs_run *run, double t, const double *x) {
 }
 
 /* |grad r| in (t, x). */
-static int norm_of(hs_run *run, double t, const double *x, int k, double *norm) {
-  double total = 0.0;
+static int norm_of(hs_run *run, hs_time t, const hs_real *x, int k, hs_real *norm) {
+  hs_real total = 0.0;
   if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
   for (int s = 0; s <= run->here.dimension; s++) total = total + run->gradient[s] * run->gradient[s];
   *norm = sqrt(total);
@@ -134,11 +134,11 @@ static int norm_of(hs_run *run, double t, const double *x, int k, double *norm) 
 }
 
 /* Whether the `if` of edge k holds: 1, 0, or RAISED. A part that is false decides, even if another has no value. */
-static int condition(hs_run *run, int k, double t, const double *x) {
+static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   const hs_edge *edge = &run->here.table->edge[k];
   int answer = 1;
   for (int i = 0; i < edge->parts; i++) {
-    double holds;
+    hs_real holds;
     if (edge->condition[i](run->here.p, t, x, &holds))
       answer = RAISED;
     else if (holds == 0.0)
@@ -148,7 +148,7 @@ static int condition(hs_run *run, int k, double t, const double *x) {
 }
 
 /* How fast surface k changes. */
-static int rate_of(hs_run *run, int k, double t, const double *x, double *rate) {
+static int rate_of(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *rate) {
   if (run->resting < 0) return run->here.table->rates[k](run->here.p, t, x, rate) ? RAISED : 0;
   if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
   *rate = run->gradient[0];
@@ -158,10 +158,10 @@ static int rate_of(hs_run *run, int k, double t, const double *x, double *rate) 
 /* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
    On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. Of a state at
    rest only time goes on. */
-static int standing(hs_run *run, double t, const double *x, double since, int *found) {
+static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
   int count = 0;
   for (int k = 0; k < run->here.table->edges; k++) {
-    double r, rate, noise;
+    hs_real r, rate, noise;
     found[k] = 0;
     if (k == run->resting || surface(run, k, t, x, &r) || rate_of(run, k, t, x, &rate)) continue;
     if (roundoff_bound(run, k, t, x, 0, &noise)) continue;
@@ -176,7 +176,7 @@ static int ends(hs_run *run, hs_trial *trial) {
     trial->looked = 1;
     trial->ends = 0;
     if (!run->here.table->flow(run->here.p, trial->t1, run->z, run->end)) {
-      const double total = sum(run->end, run->here.dimension);
+      const hs_real total = sum(run->end, run->here.dimension);
       trial->ends = total - total == 0;
     }
   }
@@ -196,11 +196,12 @@ static int piece_of(hs_run *run, hs_trial *trial) {
 
 static int beyond_within(hs_run *run, hs_trial *trial, int k) {
   const hs_mode *mode = run->here.table;
-  double r, noise;
+  hs_real r, noise;
   if (surface(run, k, trial->t, run->x, &r) || roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
   if (r > noise) return 0; /* transparent, and beyond already */
   for (int i = 1; i < SCAN; i++) {
-    const double s = (0.0 + i) / SCAN, t = trial->t + s * trial->h;
+    const hs_real s = (0.0 + i) / SCAN;
+    const hs_time t = trial->t + s * trial->h;
     if (piece_of(run, trial)) return RAISED;
     at(run, &trial->piece, s, run->at);
     if (surface(run, k, t, run->at, &r) || roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
@@ -209,7 +210,7 @@ static int beyond_within(hs_run *run, hs_trial *trial, int k) {
   return 0;
 }
 
-static int rate_along(hs_run *run, int k, double t, const double *x, const double *flow, double *rate) {
+static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_real *flow, hs_real *rate) {
   if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
   *rate = run->gradient[0];
   for (int s = 0; s < run->here.dimension; s++) *rate = *rate + run->gradient[s + 1] * flow[s];
@@ -220,7 +221,7 @@ static int rate_along(hs_run *run, int k, double t, const double *x, const doubl
 static hs_found excursion(hs_run *run, hs_trial *trial) {
   if (!ends(run, trial)) return CLEAR;
   for (int k = 0; k < run->here.table->surfaces; k++) {
-    double out, back;
+    hs_real out, back;
     if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
     if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
     if (out > 0 && 0 >= back && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
@@ -228,15 +229,15 @@ static hs_found excursion(hs_run *run, hs_trial *trial) {
   return CLEAR;
 }
 
-static int on_piece(hs_run *run, const hs_polynomial *piece, int k, double s, double *r) {
+static int on_piece(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {
   at(run, piece, s, run->at);
   return surface(run, k, run->trial.t + s * run->trial.h, run->at, r);
 }
 
 /* Close a bracket value(a) = fa <= 0 < value(b) = fb (Illinois), to where it is below `small` or a few `unit`. */
-HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *piece, int k, double a, double fa,
-                            double b, double fb, double small, double unit, double *theta) {
-  double weight_a = fa, weight_b = fb;
+HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *piece, int k, hs_real a, hs_real fa,
+                            hs_real b, hs_real fb, hs_real small, hs_real unit, hs_real *theta) {
+  hs_real weight_a = fa, weight_b = fb;
   int side = 0;
   *theta = a;
   for (int i = 0; i < ROOT_ITERATIONS; i++) {
@@ -246,7 +247,7 @@ HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *p
       break;
     }
     if (weight_b - weight_a == 0) return RAISED;
-    double s = a - weight_a * (b - a) / (weight_b - weight_a), f;
+    hs_real s = a - weight_a * (b - a) / (weight_b - weight_a), f;
     if (!(a < s && s < b)) s = (a + b) / 2;
     if (value(run, piece, k, s, &f)) return RAISED;
     if (f <= 0) {
@@ -263,8 +264,8 @@ HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *p
 
 /* Find the last s in [0, 1] where surface k rises through zero on an interpolant, knowing that it ends above;
    not-a-number if it never does. */
-static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, double small, double *theta) {
-  double a, fa, b = 1.0, fb;
+static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, hs_real small, hs_real *theta) {
+  hs_real a, fa, b = 1.0, fb;
   if (on_piece(run, piece, k, b, &fb)) return RAISED;
   for (int i = SCAN - 1; i >= 0; i--) {
     a = 1.0 * i / SCAN;
@@ -277,8 +278,8 @@ static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, doub
 }
 
 /* The round-off of surface k over this step, from the step's own numbers. */
-static int smallest(hs_run *run, int k, double *small) {
-  double *const sizes = run->at;
+static int smallest(hs_run *run, int k, hs_real *small) {
+  hs_real *const sizes = run->at;
   for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
   if (roundoff_bound(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
   *small = *small * ROOT_SHARE;
@@ -292,9 +293,9 @@ static int is_transparent(const hs_run *run, int k) {
 }
 
 /* Whether a step was further beyond surface k than `end` between the crossing and its end: that is on another flank. */
-static int deeper_before(hs_run *run, const hs_polynomial *piece, double theta, int k, double end) {
+static int deeper_before(hs_run *run, const hs_polynomial *piece, hs_real theta, int k, hs_real end) {
   for (int i = 1; i < SCAN; i++) {
-    double r;
+    hs_real r;
     if (on_piece(run, piece, k, theta + (1 - theta) * i / SCAN, &r)) return RAISED;
     if (r > end) return 1;
   }
@@ -304,7 +305,7 @@ static int deeper_before(hs_run *run, const hs_polynomial *piece, double theta, 
 /* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
 static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
   const hs_trial *trial = &run->trial;
-  double small, theta, r, noise;
+  hs_real small, theta, r, noise;
   if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
   if (theta != theta) {
     if (is_transparent(run, k)) {
@@ -325,8 +326,8 @@ static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossin
 }
 
 /* How far the flow at a crossing would take r back inside over this step; 0 when not beyond round-off. */
-static int inward_of(hs_run *run, int k, const hs_crossing *crossing, double *inward) {
-  double rate;
+static int inward_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *inward) {
+  hs_real rate;
   if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
   *inward = -rate * run->trial.h;
   if (!(*inward > run->noise[k])) *inward = 0.0;
@@ -334,8 +335,8 @@ static int inward_of(hs_run *run, int k, const hs_crossing *crossing, double *in
 }
 
 /* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
-static int too_deep(hs_run *run, int k, const double *values, hs_found *found) {
-  double norm;
+static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) {
+  hs_real norm;
   if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
   if (!(norm > 0)) return *found = failure(HS_FLAT, k), 1;
   if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
@@ -343,10 +344,10 @@ static int too_deep(hs_run *run, int k, const double *values, hs_found *found) {
 }
 
 /* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an failure. */
-static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *crossing, hs_found *found) {
+static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *crossing, hs_found *found) {
   hs_trial *trial = &run->trial;
   const hs_polynomial *piece = &trial->piece;
-  double norm, inward;
+  hs_real norm, inward;
   int status = piece_of(run, trial);
   if (status) return status;
   status = crossed_on(run, piece, k, crossing);
@@ -374,7 +375,7 @@ static int crossing_of(hs_run *run, int k, const double *values, hs_crossing *cr
 
 /* Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
    `values` are those of the surfaces there. */
-static int judge(hs_run *run, const double *values, hs_found *found) {
+static int judge(hs_run *run, const hs_real *values, hs_found *found) {
   const hs_mode *mode = run->here.table;
   *found = CLEAR;
   for (int k = 0; k < mode->surfaces; k++)

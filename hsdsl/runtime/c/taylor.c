@@ -6,38 +6,38 @@
 static int series_length(const hs_method *method) { return method->order + 2; }
 
 /* Coefficients of state s. */
-static const double *series_of(const hs_run *run, int s) { return run->lines + (s + 1) * series_length(run->method); }
+static const hs_real *series_of(const hs_run *run, int s) { return run->lines + (s + 1) * series_length(run->method); }
 
 /* Whether the coefficients are those along the flow through (t, run->x). */
-static int is_expanded(const hs_run *run, double t) {
-  if (!run->expanded || run->lines[0] != t) return 0;
+static int is_expanded(const hs_run *run, hs_time t) {
+  if (!run->expanded || run->lines[0] != (hs_real)t) return 0;
   for (int s = 0; s < run->here.dimension; s++)
     if (series_of(run, s)[0] != run->x[s]) return 0;
   return 1;
 }
 
 /* Compute the coefficients along the flow through (t, run->x), shared by trials from there. Not 0 where it has none. */
-static int expand(hs_run *run, double t) {
+static int expand(hs_run *run, hs_time t) {
   if (is_expanded(run, t)) return 0;
   run->expanded = !run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines);
   return !run->expanded;
 }
 
-static int taylor_step(hs_run *run, double t, double h) {
+static int taylor_step(hs_run *run, hs_time t, hs_real h) {
   if (expand(run, t)) return 1;
   for (int s = 0; s < run->here.dimension; s++) {
-    const double *c = series_of(run, s);
-    double z = c[run->method->order];
+    const hs_real *c = series_of(run, s);
+    hs_real z = c[run->method->order];
     for (int m = run->method->order - 1; m > 0; m--) z = c[m] + h * z;
     run->z[s] = run->x[s] + h * z;
   }
   return 0;
 }
 
-HS_INLINE void taylor_piece(const hs_run *run, const int n, double h, hs_polynomial *piece) {
+HS_INLINE void taylor_piece(const hs_run *run, const int n, hs_real h, hs_polynomial *piece) {
   const int order = run->method->order, length = series_length(run->method), w = run->width;
-  const double *line = series_of(run, 0);
-  double *c = piece->c, power = 1.0;
+  const hs_real *line = series_of(run, 0);
+  hs_real *c = piece->c, power = 1.0;
   piece->degree = order;
   for (int m = 1; m <= order; m++, c += w) {
     power = power * h;
@@ -46,11 +46,11 @@ HS_INLINE void taylor_piece(const hs_run *run, const int n, double h, hs_polynom
 }
 
 /* How badly the polynomial solves the equation at its end: h (X' - f) / (order + 1). */
-HS_INLINE void taylor_error(hs_run *run, const int n, double h) {
+HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
   const int order = run->method->order;
   for (int s = 0; s < n; s++) {
-    const double *c = series_of(run, s);
-    double slope = order * c[order];
+    const hs_real *c = series_of(run, s);
+    hs_real slope = order * c[order];
     for (int m = order - 1; m > 0; m--) slope = m * c[m] + h * slope;
     run->error[s] = h * (slope - run->end[s]) / (order + 1);
   }

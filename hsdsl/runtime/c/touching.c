@@ -8,8 +8,9 @@
 static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
-  double r, off = 0.0, norm = 0.0;
-  const double time = crossing->time, *const q = crossing->state, *const g = run->gradient + 1;
+  hs_real r, off = 0.0, norm = 0.0;
+  const hs_time time = crossing->time;
+  const hs_real *const q = crossing->state, *const g = run->gradient + 1;
   if (here->table->gradients[k](here->p, time, q, run->gradient)) return RAISED;
   for (int i = 0; i < n; i++) off = off + fabs(g[i]) * (run->control.tolerance * hs_max(run->scales[i], fabs(q[i])));
   for (int i = 0; i < n; i++) norm = norm + g[i] * g[i];
@@ -26,10 +27,10 @@ HS_INLINE int may_be_touched(const hs_run *run, int k) {
 }
 
 /* Where in [0, 1] a polynomial turns that rises at 0 and falls at 1. */
-static double turning(const double *c, int n) {
-  double low = 0.0, high = 1.0;
+static hs_real turning(const hs_real *c, int n) {
+  hs_real low = 0.0, high = 1.0;
   for (int i = 0; i < TURNINGS; i++) {
-    const double middle = (low + high) / 2;
+    const hs_real middle = (low + high) / 2;
     if (slope_of(c, n, middle) > 0)
       low = middle;
     else
@@ -41,11 +42,11 @@ static double turning(const double *c, int n) {
 /* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
 static int touched(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
-  const double *const c = coefficients_of(&run->curves, 0, k);
+  const hs_real *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
-  double rate, noise, share = 1.0;
+  hs_real rate, noise, share = 1.0;
   if (!may_be_touched(run, k)) return 0;
-  const double slope = slope_of(c, n, 1.0);
+  const hs_real slope = slope_of(c, n, 1.0);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
   if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
   crossing->time = span->t1;

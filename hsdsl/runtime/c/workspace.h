@@ -9,12 +9,12 @@
 
 #define HS_LARGER(a, b) ((a) > (b) ? (a) : (b))
 #define HS_TAKEN(count, type) (((count) * (int)sizeof(type) + (int)sizeof(double) - 1) / (int)sizeof(double))
-#define HS_NUMBERS(count) HS_TAKEN(count, double)
+#define HS_NUMBERS(count) HS_TAKEN(count, hs_real)
 
 /* w: states of the largest mode; m, e: surfaces and edges of the mode with most; modes, lines, states: see hs_model.
    kind, stages, extra, order, degree: see hs_method. */
 #define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
-#define HS_STAGES(w, all) (HS_TAKEN(all, double *) + ((all)-1) * HS_NUMBERS(w))
+#define HS_STAGES(w, all) (HS_TAKEN(all, hs_real *) + ((all)-1) * HS_NUMBERS(w))
 #define HS_SPAN(w, degree) (2 * HS_NUMBERS(w) + HS_PIECE(w, degree))
 #define HS_RADAU_SPACE(w) (5 * HS_NUMBERS((w) * (w)) + 21 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
 #define HS_SPACE(w, m, e, lines, states, kind, stages, extra, order, degree)                                       \

@@ -10,8 +10,8 @@
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
 
 /* Whether the flights of one edge shrink: the last one, and the largest ratio of the last few. */
-static int contraction(const hs_run *run, double *flight, double *ratio) {
-  double flights[LEAST_FLIGHTS];
+static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
+  hs_real flights[LEAST_FLIGHTS];
   if (run->jump <= LEAST_FLIGHTS) return 0;
   const hs_made *first = made_before(run, LEAST_FLIGHTS);
   for (int i = 0; i <= LEAST_FLIGHTS; i++) {
@@ -23,23 +23,23 @@ static int contraction(const hs_run *run, double *flight, double *ratio) {
   if (!(*flight > 0)) return 0;
   for (int i = 1; i < LEAST_FLIGHTS; i++) {
     if (!(flights[i - 1] > 0)) return 0;
-    const double shrunk = flights[i] / flights[i - 1];
+    const hs_real shrunk = flights[i] / flights[i - 1];
     *ratio = i > 1 ? hs_max(*ratio, shrunk) : shrunk;
   }
   return *ratio < 1;
 }
 
-static double accelerated(double a, double b, double c) {
-  const double bend = c - 2 * b + a;
+static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
+  const hs_real bend = c - 2 * b + a;
   return bend != 0 ? a - (b - a) * (b - a) / bend : c;
 }
 
 /* The point on the guard of edge k that repeated resets run to, to run->z: 1, or 0. */
-static int fixed_point(hs_run *run, int k, double t) {
+static int fixed_point(hs_run *run, int k, hs_time t) {
   const hs_mode_state *here = &run->here;
   const hs_edge *edge = &here->table->edge[k];
   const int n = here->dimension;
-  double *const x = run->z, *const one = run->after, *const two = run->at, r, noise;
+  hs_real *const x = run->z, *const one = run->after, *const two = run->at, r, noise;
   copy(x, run->x, n);
   for (int i = 0; i < MOST_ROUNDS; i++) {
     if (edge->reset(here->p, t, x, one)) return RAISED;
@@ -52,12 +52,12 @@ static int fixed_point(hs_run *run, int k, double t) {
 }
 
 /* Whether a surface other than k is passed on the way from x to a limit q: 1, 0 or RAISED. */
-static int meets_another(hs_run *run, double t, const double *x, double end, const double *q, int k) {
+static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, const hs_real *q, int k) {
   const hs_mode_state *here = &run->here;
   const int m = here->table->surfaces;
   if (here->table->values(here->p, t, x, run->ahead) || here->table->values(here->p, end, q, run->ends)) return RAISED;
   for (int j = 0; j < m; j++) {
-    double noise, before;
+    hs_real noise, before;
     if (roundoff_bound(run, j, end, q, 0, &noise)) return RAISED;
     if (!(run->ends[j] > noise)) continue;
     if (roundoff_bound(run, j, t, x, 0, &before)) return RAISED;
@@ -69,12 +69,13 @@ static int meets_another(hs_run *run, double t, const double *x, double end, con
 /* Go to the limit of a tail of edge k that is nearly over; stop at one where more than the impacts goes on. */
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
-  double flight, ratio;
+  hs_real flight, ratio;
   if (!contraction(run, &flight, &ratio) || here->dimension != here->table->dimension || !here->dimension)
     return GOES_ON;
-  const double left = flight * ratio / (1 - ratio), end = here->t + left;
+  const hs_real left = flight * ratio / (1 - ratio);
+  const hs_time end = here->t + left;
   if (left > run->epsilon || end > run->task->timeline->end[here->segment]) return GOES_ON;
-  double *const q = run->z;
+  hs_real *const q = run->z;
   if (fixed_point(run, k, end) != 1 || is_pushed(run, end, q, k) != 1 || stays(run, end, q, k) != 1) return GOES_ON;
   if (meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
   const int alone = moves_alone(run, end, q, k);

@@ -13,7 +13,7 @@ static const hs_arc *arc_of(const hs_instance *instance, int64_t row, int64_t *a
   return *at > 0 ? &chunk->arc[*at - 1] : &instance->last;
 }
 
-static int dimension_of(const hs_instance *instance, const double *x) {
+static int dimension_of(const hs_instance *instance, const hs_real *x) {
   int dimension = instance->task.model->width;
   while (dimension > 0 && x[dimension - 1] != x[dimension - 1]) dimension--; /* not-a-number where a mode has none */
   return dimension;

@@ -20,15 +20,16 @@ typedef struct hs_instance hs_instance;
 typedef struct {
   int64_t number, jump;
   int mode, kind, dimension;
-  double time, depth;
-  const double *x, *outputs, *piece;
+  hs_time time;
+  hs_real depth;
+  const hs_real *x, *outputs, *piece;
 } hs_row_written;
 
 /* A transition; `after` is 0 where the run ended before it was made. */
 typedef struct {
   int64_t number;
   const hs_transition *made;
-  const double *before, *after;
+  const hs_real *before, *after;
   const int32_t *alternatives;
 } hs_transition_written;
 
@@ -47,23 +48,24 @@ struct hs_instance {
   hs_timeline timeline;
   int64_t rows, jumps; /* handed to the sink */
   hs_arc last;
-  double x[PROBLEM_WIDTH + 1];
-  double parameters[PROBLEM_PARAMETERS + 1];
+  hs_real x[PROBLEM_WIDTH + 1];
+  hs_real parameters[PROBLEM_PARAMETERS + 1];
 #if defined(PROBLEM_TUNABLE)
-  double data[PROBLEM_SEGMENTS * PROBLEM_DATA + 1];
+  hs_real data[PROBLEM_SEGMENTS * PROBLEM_DATA + 1];
 #endif
-  double stop_x[PROBLEM_WIDTH + 1], stop_slope[PROBLEM_WIDTH + 1], stop_scales[PROBLEM_WIDTH + 1];
+  hs_real stop_x[PROBLEM_WIDTH + 1], stop_slope[PROBLEM_WIDTH + 1], stop_scales[PROBLEM_WIDTH + 1];
   double workspace[PROBLEM_WORKSPACE];
-  double times[PROBLEM_ROWS], depth[PROBLEM_ROWS], values[PROBLEM_ROWS * PROBLEM_WIDTH + 1];
-  double outputs[PROBLEM_ROWS * PROBLEM_OUTPUTS + 1];
-  double pieces[(PROBLEM_ROWS + 1) * PROBLEM_DEGREE * PROBLEM_WIDTH + 1];
+  hs_time times[PROBLEM_ROWS];
+  hs_real depth[PROBLEM_ROWS], values[PROBLEM_ROWS * PROBLEM_WIDTH + 1];
+  hs_real outputs[PROBLEM_ROWS * PROBLEM_OUTPUTS + 1];
+  hs_real pieces[(PROBLEM_ROWS + 1) * PROBLEM_DEGREE * PROBLEM_WIDTH + 1];
   hs_arc arc[PROBLEM_ARCS];
   hs_transition transition[PROBLEM_TRANSITIONS];
-  double before[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1], after[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1];
+  hs_real before[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1], after[PROBLEM_TRANSITIONS * PROBLEM_WIDTH + 1];
   int32_t alternatives[PROBLEM_TRANSITIONS * PROBLEM_EDGES + 1];
   hs_note note[PROBLEM_TRANSITIONS];
   int32_t visited_mode[PROBLEM_VISITED];
-  double visited[PROBLEM_VISITED * PROBLEM_WIDTH + 1];
+  hs_real visited[PROBLEM_VISITED * PROBLEM_WIDTH + 1];
   int64_t slot[2 * PROBLEM_VISITED];
 };
 

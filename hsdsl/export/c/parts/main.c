@@ -26,7 +26,7 @@ static void print_number(double number) {
     printf("null");
 }
 
-static void print_states(const char *key, const char *const *name, const double *x, int count) {
+static void print_states(const char *key, const char *const *name, const hs_real *x, int count) {
   printf(", \"%s\": {", key);
   for (int s = 0; s < count; s++) {
     if (s) printf(", ");
@@ -69,7 +69,7 @@ static int print_transition(void *context, const hs_transition_written *written)
 }
 
 static hs_row_written last;
-static double last_x[PROBLEM_WIDTH + 1], last_outputs[PROBLEM_OUTPUTS + 1];
+static hs_real last_x[PROBLEM_WIDTH + 1], last_outputs[PROBLEM_OUTPUTS + 1];
 
 static int keep_row(void *context, const hs_row_written *row) {
   (void)context;
