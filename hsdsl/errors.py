@@ -189,6 +189,10 @@ CODES: dict[str, str] = {
     "HS320": "both a step and a tolerance",
     "HS321": "a setting outside its range",
     "HS322": "a scale of a name that is not a state",
+    # what is imported
+    "HS331": "a file that is not a model of SpaceEx",
+    "HS332": "a part of a SpaceEx model that no model of this language can keep",
+    "HS333": "a configuration of SpaceEx that does not say where a run starts",
 }
 
 TOO_LONG = "HS122"

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from keyword import iskeyword
 from typing import Annotated, Any, cast
 
 from typer import Abort, Context, Exit, Option, Typer, TyperException
@@ -16,7 +17,7 @@ from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED, WORD
 from hsdsl.names import did_you_mean, visible
 
-VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "export", "schema", "doctor")
+VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "export", "import", "schema", "doctor")
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 
@@ -24,7 +25,8 @@ SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 def command(verb: str) -> Any:
     """Import a command."""
     single = Typer(add_completion=False, rich_markup_mode=None)
-    single.command(verb, context_settings=SETTINGS)(getattr(import_module(f"hsdsl.cli.{verb}"), verb))
+    name = f"{verb}_" if iskeyword(verb) else verb
+    single.command(verb, context_settings=SETTINGS)(getattr(import_module(f"hsdsl.cli.{verb}"), name))
     return get_command(single)
 
 

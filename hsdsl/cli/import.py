@@ -1,0 +1,51 @@
+"""``hsdsl import``: read a model of another tool and write it as one of this language."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
+
+from hsdsl.cli.console import print_json, say
+from hsdsl.cli.options import Json, Limit, Quiet, Until, answering, check_target, option
+from hsdsl.errors import UsageError
+
+FILE = "A SpaceEx model (.xml)."
+CFG = "Its configuration; left out, the file of the same name that ends in .cfg."
+OUT = "The model's file (.yaml); left out, the model is printed."
+URGENT = "Make a transition as soon as its guard holds, where SpaceEx may wait."
+
+
+def import_(
+    file: Annotated[Path, Argument(metavar="FILE", help=FILE)],
+    cfg: Annotated[Path | None, option("FILE", CFG)] = None,
+    out: Annotated[Path | None, option("FILE", OUT)] = None,
+    force: Annotated[bool, Option("--force", help="Replace a file that is there.")] = False,
+    urgent: Annotated[bool, Option("--urgent", help=URGENT)] = False,
+    until: Until = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    limit: Limit = None,
+) -> None:
+    """Import a SpaceEx model: write it as a model that runs, or say what cannot be kept."""
+    with answering(json, None, limit):
+        check_target(out, "--out", (".yaml", ".yml"))
+        if out is not None and out.exists() and not force:
+            raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
+        from hsdsl.model import loads
+        from hsdsl.spaceex import imported
+        from hsdsl.store.atomic import replacing
+
+        text = imported(file, cfg, until, urgent)
+        system = loads(text).system
+        if out is None:
+            print(text, end="")
+            return
+        with replacing(out) as target:
+            target.write(text.encode())
+        edges = sum(len(mode.edges) for mode in system.modes)
+        if json:
+            print_json({"file": str(out), "modes": len(system.modes), "transitions": edges})
+        elif not quiet:
+            say(f"wrote {out}: {len(system.modes)} modes, {edges} transitions")

@@ -1,0 +1,95 @@
+"""The text of a model: what an import has found, as YAML for people."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from hsdsl import __version__
+from hsdsl.names import visible
+from hsdsl.spaceex.drafts import ModeDraft, TransitionDraft
+from hsdsl.spaceex.product import Key
+from hsdsl.spaceex.start import Start
+
+_WIDTH = 116
+
+
+def written(
+    source: str,
+    title: str,
+    notes: Sequence[str],
+    drafts: Mapping[Key, ModeDraft],
+    transitions: Mapping[Key, Sequence[TransitionDraft]],
+    begin: Start,
+    first: Key,
+    until: str,
+) -> str:
+    """The model's text."""
+    lines = ["hsdsl: 1", f"title: {_quoted(title)}", f"source: {_quoted(source)}", ""]
+    lines += _comment([f"Imported by hsdsl {__version__}: each transition is made where its guard is reached.", *notes])
+    lines += _section("parameters", begin.constants)
+    lines += ["", "modes:"]
+    for key, draft in drafts.items():
+        lines += _indented(_mode(draft, transitions[key], drafts))
+    states = {name: begin.variables[name] for name in drafts[first].states}
+    lines += ["", "initial:", f"  mode: {_plain(drafts[first].place.name)}", *_indented(_entries(states))]
+    lines += ["", "experiment:", f"  until: {_plain(until)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapping[Key, ModeDraft]) -> list[str]:
+    place = draft.place
+    notes = [location.note for location in place.locations if location.note]
+    lines = [*_comment(notes), f"{_plain(place.name)}:", *_indented(_comment(draft.comments))]
+    lines += _indented(_section("let", draft.lets))
+    flow = {name: place.flow[name].right for name in draft.states}
+    lines += _indented(_section("flow", flow)) if flow else ["  flow: {}"]
+    covered = [t.facet.excess for t in transitions if t.facet and not t.condition]
+    walls = [facet.relation.text for facet in draft.facets if facet.excess not in covered and not draft.kept(facet)]
+    if walls:
+        lines += _indented(["domain:", *_indented([f"- {_plain(wall)}" for wall in walls])])
+    if transitions:
+        labels = Counter(t.arrow.label for t in transitions)
+        lines.append("  transitions:")
+        for t in transitions:
+            lines += _indented(_transition(t, drafts, labels), 4)
+    return lines
+
+
+def _transition(t: TransitionDraft, drafts: Mapping[Key, ModeDraft], labels: Counter[str]) -> list[str]:
+    arrow = t.arrow
+    source, target = drafts[arrow.source], drafts[arrow.target]
+    entries = {"name": arrow.label} if arrow.label and labels[arrow.label] == 1 else {}
+    entries |= {"when": t.when.text.replace("==", ">="), "if": " and ".join(t.condition), "to": target.place.name}
+    reset = {name: relation.right for name, relation in arrow.reset.items() if name in target.states}
+    reset |= {name: name for name in target.states if name not in reset and name in source.lets}
+    body = _entries({key: text for key, text in entries.items() if text}) + _section("reset", reset)
+    return [*_comment([*arrow.notes, *t.comments]), f"- {body[0]}", *_indented(body[1:])]
+
+
+def _section(key: str, entries: Mapping[str, str]) -> list[str]:
+    return [f"{key}:", *_indented(_entries(entries))] if entries else []
+
+
+def _entries(entries: Mapping[str, str]) -> list[str]:
+    return [f"{_plain(name)}: {_plain(text)}" for name, text in entries.items()]
+
+
+def _indented(lines: Sequence[str], by: int = 2) -> list[str]:
+    return [f"{' ' * by}{line}" for line in lines]
+
+
+def _comment(texts: Sequence[str]) -> list[str]:
+    """Comments, cut into lines of a readable width."""
+    return [f"# {line}" for text in texts for line in textwrap.wrap(visible(text), _WIDTH)]
+
+
+def _plain(text: str) -> str:
+    """An expression or a name as YAML, in which only one word means something else."""
+    return _quoted(text) if text.lower() == "null" else text
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(visible(text), ensure_ascii=False)
