@@ -9,18 +9,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.errors import UsageError
-from hsdsl.export.source import Source, source_of
 from hsdsl.names import did_you_mean
-from hsdsl.store.atomic import replacing
 
-__all__ = ["TARGETS", "Source", "check_folder", "files_of", "source_of", "write"]
+if TYPE_CHECKING:
+    from hsdsl.export.source import Source
+    from hsdsl.model import Model
+
+__all__ = ["TARGETS", "check_folder", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
     "mermaid": "the mode graph as a Mermaid diagram",
 }
+
+
+def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
+    """The source of a model with arguments of `Model.simulate` (`hsdsl.export.source`, imported when it is called)."""
+    from hsdsl.export.source import source_of
+
+    return source_of(model, arguments)
 
 
 def files_of(source: Source, target: str) -> dict[str, bytes]:
@@ -50,6 +60,8 @@ def write(files: Mapping[str, bytes], folder: Path, force: bool = False) -> list
 
     Raises UsageError: the folder has entries and ``force`` is not given, or it cannot be written.
     """
+    from hsdsl.store.atomic import replacing
+
     check_folder(folder, force)
     written: list[Path] = []
     for name, content in files.items():
