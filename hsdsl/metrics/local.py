@@ -56,7 +56,7 @@ def search_locally(
                 for number, sequence in enumerate(_sequences(space, start, end, hops)):
                     if found.upper <= enough or (number and budget.spent()):
                         return found
-                    route = Route(space, sequence, (start.mode, start.x), (end.mode, end.x))
+                    route = Route(space, sequence, (start.mode, start.x[0]), (end.mode, end.x[0]))
                     _try(route, start.cost + end.cost + relaxation * len(sequence), found, budget)
     return found
 

@@ -10,15 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hsdsl.metrics.batch_search import ROUNDING, Pairs
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.guard_clearance import to_passages
-from hsdsl.metrics.interval import CERTIFIED, SAMPLED, SEARCHED, weakest
+from hsdsl.metrics.interval import CERTIFIED, SAMPLED, SEARCHED
 from hsdsl.metrics.local import improve, onto
 from hsdsl.metrics.nonaffine import search_nonaffine
+from hsdsl.metrics.passage_bounds import ROUNDING, Indices, unchanged
+from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.routes import Route
 from hsdsl.metrics.search import End, most_hops, search
 from hsdsl.metrics.segment_containment import OUTSIDE, UNDECIDED, segments_inside
@@ -27,8 +27,6 @@ CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
 FAR = 10  # times the lower bound: a path so long that it may take the wrong way
 AGAIN = 16  # pairs improved before paths are carried over anew
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +48,15 @@ class Neighbours:
     """Distances of pairs, and the paths found for earlier ones by their modes."""
 
     space: Space
-    relaxation: float | None
+    toll: float
     budget: Budget
     hops: int | None = None
     known: dict[tuple[int, int], list[KnownPath]] = field(default_factory=dict[tuple[int, int], list[KnownPath]])
 
-    def bound(self, pairs: Pairs, enough: float) -> None:
-        """Bound the distances of pairs; those at most ``enough`` are not looked at more closely."""
-        pool = self.known.setdefault((pairs.source, pairs.target), [])
-        search = _Batch(self, pairs, pool)
+    def bound(self, start: End, end: End, enough: float) -> tuple[Array, Array, str]:
+        """Bound the distances of pairs, and say what bounds rest on; those at most ``enough`` need not be close."""
+        pool = self.known.setdefault((start.mode, end.mode), [])
+        search = _Batch(self, start, end, pool)
         if len(open_ := search.open(enough)) and not self.budget.spent():
             search.around(open_)
         if not pool and len(open_ := search.open(enough)):
@@ -68,54 +66,48 @@ class Neighbours:
         while len(open_ := search.open(enough)) and not self.budget.spent():
             search.carry(open_)
             open_ = search.open(enough)
-            for k in open_[np.argsort(-pairs.upper[open_], kind="stable")][:AGAIN].tolist():
-                if pairs.upper[k] > enough and not self.budget.spent():
+            for k in open_[np.argsort(-search.upper[open_], kind="stable")][:AGAIN].tolist():
+                if search.upper[k] > enough and not self.budget.spent():
                     search.improve(k, enough)
-                    enough = max(enough, float(pairs.upper[k]) if np.isfinite(pairs.upper[k]) else 0.0)
+                    enough = max(enough, float(search.upper[k]) if np.isfinite(search.upper[k]) else 0.0)
         if len(search.open(enough)):
             self.budget.spent()
-        pairs.status = weakest(pairs.status, search.status())
+        return search.lower, search.upper, search.status()
 
 
 class _Batch:
-    """One call's pairs: which are done, and the best guess for each that is not."""
+    """One call's pairs: their bounds, which are done, and the best guess for each that is not."""
 
-    def __init__(self, owner: Neighbours, pairs: Pairs, pool: list[KnownPath]) -> None:
-        self.owner, self.pairs, self.pool = owner, pairs, pool
-        self.done, self.shortened = np.zeros((2, len(pairs.p)), dtype=bool)
+    def __init__(self, owner: Neighbours, start: End, end: End, pool: list[KnownPath]) -> None:
+        self.owner, self.start, self.end, self.pool = owner, start, end, pool
+        self.done, self.shortened, self.looked_at = np.zeros((3, len(start.x)), dtype=bool)
         self.guess: dict[int, KnownPath] = {}
-        self.at = np.hstack([pairs.p, pairs.q])
-        self._quick()
-
-    def _quick(self) -> None:
-        """What no passage changes, and the straight line."""
-        pairs, space = self.pairs, self.owner.space
-        self.straight = pairs.lower
-        pairs.lower = np.minimum(self.straight, pairs.least() + pairs.toll)
-        self.looked_at = np.zeros(len(pairs.p), dtype=bool)
-        if pairs.source == pairs.target and not space.domains[pairs.source].convex:
-            verdicts = segments_inside(space, pairs.source, pairs.p, pairs.q)
-            pairs.upper = np.where(verdicts == OUTSIDE, np.inf, pairs.upper)
+        self.at = np.hstack([start.x, end.x])
+        space, mode = owner.space, start.mode
+        self.straight = norm(start.x - end.x) if mode == end.mode else np.full(len(start.x), np.inf)
+        self.upper, self.straight = self.straight * (1 + ROUNDING), self.straight * (1 - ROUNDING)
+        self.lower = np.minimum(self.straight, unchanged(space, mode, start.x, end.mode, end.x) + owner.toll)
+        if mode == end.mode and not space.domains[mode].convex:
+            verdicts = segments_inside(space, mode, start.x, end.x)
+            self.upper = np.where(verdicts == OUTSIDE, np.inf, self.upper)
             self.looked_at = verdicts == UNDECIDED
 
     def status(self) -> str:
         """What the bounds rest on: local solves, straight lines looked at in points, or proofs alone."""
-        apart = self.pairs.upper > self.pairs.lower * (1 + CLOSED)
+        apart = self.upper > self.lower * (1 + CLOSED)
         if np.any(apart & (self.done | self.shortened)):
             return SEARCHED
         return SAMPLED if np.any(self.looked_at) else CERTIFIED
 
     def around(self, chosen: Indices) -> None:
         """The way to the nearest guard and from one, which every path takes that is not straight."""
-        pairs, space = self.pairs, self.owner.space
-        ways = to_passages(space, pairs.source, pairs.p[chosen]) + to_passages(space, pairs.target, pairs.q[chosen])
-        passing = np.minimum(self.straight[chosen], (ways + pairs.toll) * (1 - ROUNDING))
-        pairs.lower[chosen] = np.maximum(pairs.lower[chosen], passing)
+        ways = sum(to_passages(self.owner.space, end.mode, end.x[chosen]) for end in (self.start, self.end))
+        passing = np.minimum(self.straight[chosen], (ways + self.owner.toll) * (1 - ROUNDING))
+        self.lower[chosen] = np.maximum(self.lower[chosen], passing)
 
     def open(self, enough: float) -> Indices:
         """The pairs not yet looked at that may matter and whose bounds are apart."""
-        upper, lower = self.pairs.upper, self.pairs.lower
-        return np.flatnonzero(~self.done & (upper > enough) & (upper > lower * (1 + CLOSED) + 1e-300))
+        return np.flatnonzero(~self.done & (self.upper > np.maximum(enough, self.lower * (1 + CLOSED) + 1e-300)))
 
     def carry(self, chosen: Indices) -> None:
         """Give pairs upper bounds by the paths of known pairs nearby."""
@@ -155,40 +147,38 @@ class _Batch:
             holds &= segments_inside(self.owner.space, pieces[0][0], a, b) != OUTSIDE
         for (k, found), good in zip(moved, holds.tolist(), strict=True):
             if good:
-                self._shorter(k, found.route.charged(found.points) + self.pairs.toll * found.route.passages, found)
+                self._shorter(k, found.route.charged(found.points) + self.owner.toll * found.route.passages, found)
 
     def improve(self, k: int, enough: float) -> None:
         """Search from the best guess, or from nothing where there is none, or another way may be much shorter."""
         guess = self.guess.get(k)
-        found = None if guess is None else improve(guess.route, guess.points, self.pairs.toll, self.owner.budget)
+        found = None if guess is None else improve(guess.route, guess.points, self.owner.toll, self.owner.budget)
         if found is not None:
             value, route, points = found
-            known = KnownPath(self.at[k], route, points)
-            self.pool.append(known)
-            self._shorter(k, value, known)
+            self.pool.append(KnownPath(self.at[k], route, points))
+            self._shorter(k, value, self.pool[-1])
             self.done[k] = True
-        if self.pairs.upper[k] > FAR * self.pairs.lower[k]:
+        if self.upper[k] > FAR * self.lower[k]:
             self.from_nothing(k, enough)
         self.done[k] = True
 
     def from_nothing(self, k: int, enough: float) -> None:
         """Search as for a single pair."""
-        pairs, owner = self.pairs, self.owner
-        starts, ends = [End(pairs.source, pairs.p[k])], [End(pairs.target, pairs.q[k])]
-        hops = most_hops(owner.space, pairs.source, pairs.target, owner.hops)
-        outer = search(owner.space, starts, ends, pairs.toll, hops, np.inf, owner.budget)
-        enough = max(enough, float(pairs.lower[k]) * (1 + CLOSED))
-        found = search_nonaffine(owner.space, starts, ends, pairs.toll, hops, np.inf, outer, owner.budget, enough)
-        pairs.lower[k] = max(pairs.lower[k], found.lower * (1 - ROUNDING))
-        pairs.upper[k] = min(pairs.upper[k], found.upper)
+        owner = self.owner
+        starts, ends = ([replace(end, x=end.x[k : k + 1])] for end in (self.start, self.end))
+        hops = most_hops(owner.space, self.start.mode, self.end.mode, owner.hops)
+        outer = search(owner.space, starts, ends, owner.toll, hops, np.inf, owner.budget)
+        enough = max(enough, float(self.lower[k]) * (1 + CLOSED))
+        found = search_nonaffine(owner.space, starts, ends, owner.toll, hops, np.inf, outer, owner.budget, enough)
+        self.lower[k] = max(self.lower[k], found.lower * (1 - ROUNDING))
+        self.upper[k] = min(self.upper[k], found.upper)
         self.done[k] = True
         if found.through is not None and found.through.sequence:
             self.pool.append(KnownPath(self.at[k], found.through, found.unknowns))
 
     def _route(self, route: Route, k: int) -> Route:
-        pairs = self.pairs
-        return replace(route, start=(pairs.source, pairs.p[k]), end=(pairs.target, pairs.q[k]))
+        return replace(route, start=(self.start.mode, self.start.x[k]), end=(self.end.mode, self.end.x[k]))
 
     def _shorter(self, k: int, value: float, found: KnownPath) -> None:
-        if value < self.pairs.upper[k]:
-            self.pairs.upper[k], self.guess[k], self.shortened[k] = value, found, True
+        if value < self.upper[k]:
+            self.upper[k], self.guess[k], self.shortened[k] = value, found, True

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.guard_clearance import to_passages
 from hsdsl.metrics.local import search_locally
+from hsdsl.metrics.passage_bounds import unchanged
 from hsdsl.metrics.search import End, SearchResult
 
 CLOSE = 1e-9  # relative: a path so near to the lower end is not improved
@@ -30,7 +29,7 @@ def search_nonaffine(
     beginning to some guard or image, from another to its end, and through the coordinates that no passage changes. A
     path as short as ``enough`` is not improved.
     """
-    lower = min(outer.lower, outer.upper, outer.cut)
+    lower = min(float(end[0]) for end in (outer.lower, outer.upper, outer.cut))
     if space.curved_gates:
         bound = any(a.bound is not None for a in (*starts, *ends))
         passing = min(least_with_passages(space, a, b) for a in starts for b in ends)
@@ -42,12 +41,5 @@ def search_nonaffine(
 
 def least_with_passages(space: Space, a: End, b: End) -> float:
     """The least that a path with passages between two ends can have, without tolls."""
-    around = sum(float(to_passages(space, e.mode, e.x[None])[0]) for e in (a, b) if e.bound is None)
-    return max(unchanged(space, a.mode, a.x, b.mode, b.x), around) + max(0.0, a.cost + b.cost)
-
-
-def unchanged(space: Space, mode_p: int, p: Array, mode_q: int, q: Array) -> float:
-    """The distance in the coordinates that no passage changes."""
-    if space.kept is None:
-        return 0.0
-    return float(np.linalg.norm(p[list(space.kept[mode_p])] - q[list(space.kept[mode_q])]))
+    around = sum(float(to_passages(space, e.mode, e.x)[0]) for e in (a, b) if e.bound is None)
+    return max(float(unchanged(space, a.mode, a.x, b.mode, b.x)[0]), around) + max(0.0, a.cost + b.cost)

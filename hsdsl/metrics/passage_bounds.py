@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from hsdsl.metrics.dominance import hops_of, passage_number
 from hsdsl.metrics.gate_sequence import gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.guard_clearance import to_entry, to_exit
+from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.socp import ROUNDS, solve
 
 ROUNDING = 64 * 2.0**-53  # of a norm or a short sum, relative to itself
@@ -91,6 +93,18 @@ class Ways:
         toll = self.toll * hops_of(sequence)
         return (lower + toll) * (1 - ROUNDING), (upper + toll) * (1 + ROUNDING), s
 
+    def around(self, sequence: tuple[int, ...], rows: Indices, _: int = ROUNDS) -> Array:
+        """The cheapest bound on paths that begin with a sequence: to its guards, from one to the next, and the rest."""
+        numbers = [passage_number(i) for i in sequence]
+        between = sum(float(self.inner[a, b]) for a, b in pairwise(numbers)) + self.toll * hops_of(sequence)
+        found = self.enters[numbers[0], rows] + between + self.rest(sequence[-1], rows)
+        return found * (1 - ROUNDING * len(sequence))
+
+    @cached_property
+    def unchanged(self) -> Array:
+        """From p to q in the coordinates that no passage changes."""
+        return unchanged(self.space, self.source, self.p, self.target, self.q)
+
     def beginning(self, sequence: tuple[int, ...], rows: Indices, rounds: int = ROUNDS) -> Array:
         """What paths that begin with a sequence are at least: through it, and the rest."""
         toll = self.toll * hops_of(sequence)
@@ -104,6 +118,13 @@ class Ways:
         goals = self.q[rows][:, list(self.space.kept[self.target])]
         problem = gate_sequence(self.space, sequence).problem(self.p[rows], goals, kept=True)
         return (solve(problem, rounds)[0] + self.toll * hops_of(sequence)) * (1 - ROUNDING)
+
+
+def unchanged(space: Space, source: int, p: Array, target: int, q: Array) -> Array:
+    """A lower bound on distances of points: those in the coordinates that no passage changes."""
+    if space.kept is None:
+        return np.zeros(len(p))
+    return norm(p[:, list(space.kept[source])] - q[:, list(space.kept[target])]) * (1 - ROUNDING)
 
 
 def gaps(space: Space, budget: Budget) -> Array:

@@ -70,7 +70,8 @@ class PointDistance:
 
 def ends_of(space: Space, place: SpacePoint, relaxation: float | None, is_end: bool) -> list[End]:
     """The ways a path can end at a place: in its domain, or bound to go on through its strip."""
-    mode, x = coordinates(space, place)
+    mode, values = coordinates(space, place)
+    x = values[None]
     if place.edge is None or relaxation is None:
         return [End(mode, x)]
     if not 0 <= place.depth <= relaxation:
@@ -100,18 +101,22 @@ def coordinates(space: Space, place: SpacePoint) -> tuple[int, Array]:
 
 
 def answer(space: Space, found: SearchResult, hops: int) -> PointDistance:
-    """The answer to a search."""
-    lower, upper = min(found.lower, found.cut) * (1 - ROUNDING), found.upper * (1 + ROUNDING)
+    """The answer to a search for one distance."""
+    lower, upper = float(np.max(np.minimum(found.lower, found.cut))), float(np.max(found.upper))
     if lower == upper == np.inf and not found.local:
         return PointDistance(INFINITE, (), "certified: no path of passages connects the two")
-    status = CERTIFIED
-    if found.local:
-        status = SEARCHED
-        if found.upper <= found.lower * (1 + CLOSED):
-            status = CERTIFIED if found.proved else SAMPLED
-    elif found.cut < found.upper * (1 - TOLERANCE):
-        status = up_to_hops(hops)
-    return PointDistance(Interval(lower, upper, status), _path(space, found), _sentence(found, status))
+    status = status_of(found, hops)
+    interval = Interval(lower * (1 - ROUNDING), upper * (1 + ROUNDING), status)
+    return PointDistance(interval, _path(space, found), _sentence(found, status))
+
+
+def status_of(found: SearchResult, hops: int) -> str:
+    """What the bounds of a search rest on."""
+    if not found.local:
+        return up_to_hops(hops) if np.any(found.cut < found.upper * (1 - TOLERANCE)) else CERTIFIED
+    if found.upper > found.lower * (1 + CLOSED):
+        return SEARCHED
+    return CERTIFIED if found.proved else SAMPLED
 
 
 def _sentence(found: SearchResult, status: str) -> str:
@@ -139,14 +144,14 @@ def _path(space: Space, found: SearchResult) -> tuple[PathPiece, ...]:
         return tuple(_piece(space, *leg, *by) for leg, by in legs)
     if found.start is None or found.end is None:
         return ()
-    at, mode = found.start.x, found.start.mode
+    at, mode = found.start.x[0], found.start.mode
     pieces: list[PathPiece] = []
     if found.sequence:
         chain = gate_sequence(space, found.sequence)
         for passage, (enter, leave) in zip(chain.passages, chain.sides(found.unknowns), strict=True):
             pieces.append(_piece(space, mode, at, enter, passage.gate.edge, passage.forward))
             at, mode = leave, passage.target
-    return (*pieces, _piece(space, mode, at, found.end.x))
+    return (*pieces, _piece(space, mode, at, found.end.x[0]))
 
 
 def _piece(

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.metrics.batch_search import Pairs, search_batch
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.interval import INFINITE, ZERO
+from hsdsl.metrics.interval import CERTIFIED, INFINITE, ZERO, Interval
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.nonaffine import search_nonaffine
-from hsdsl.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of
+from hsdsl.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of, status_of
 from hsdsl.metrics.search import End, most_hops, search
 
 __all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
@@ -69,27 +68,31 @@ def distances(
     Columns are the mode's states and, where ``space.timed``, time. Where something is not affine, ``neighbours`` are
     paths of earlier pairs to begin with, and bounds of at most ``enough`` need not be close.
     """
-    pairs = _pairs(space, mode_p, p, mode_q, q, relaxation)
-    if pairs.target not in space.fewest(pairs.source):
-        pairs.lower = pairs.upper = np.full(len(pairs.p), np.inf)
-    elif space.affine:
-        search_batch(pairs, most_hops(space, pairs.source, pairs.target, hops), budget or Budget())
+    start, end = _rows(space, mode_p, p, len(p)), _rows(space, mode_q, q, len(p))
+    toll, budget = relaxation or 0.0, budget or Budget()
+    if end.mode not in space.fewest(start.mode):
+        infinite = np.full(len(start.x), np.inf)
+        return infinite, infinite, CERTIFIED
+    if not space.affine:
+        found = (neighbours or Neighbours(space, toll, budget, hops)).bound(start, end, enough)
     else:
-        (neighbours or Neighbours(space, relaxation, budget or Budget(), hops)).bound(pairs, enough)
-    return pairs.bounds()
+        most = most_hops(space, start.mode, end.mode, hops)
+        result = search(space, [start], [end], toll, most, np.inf, budget)
+        found = np.minimum(result.lower, result.cut), result.upper, status_of(result, most)
+    for ends in zip(*(x[found[0] > found[1]] for x in found[:2]), strict=True):
+        Interval(*ends)  # which they contradict
+    return found
 
 
-def _pairs(space: Space, mode_p: str, p: Array, mode_q: str, q: Array, relaxation: float | None) -> Pairs:
+def _rows(space: Space, name: str, x: Array, count: int) -> End:
     try:
-        source, target = space.mode_index(mode_p), space.mode_index(mode_q)
+        mode = space.mode_index(name)
     except KeyError as error:
         raise ValueError(f"there is no mode {error}") from None
-    p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
-    for values, mode in ((p, source), (q, target)):
-        names = space.domains[mode].coordinates
-        if values.shape != (len(p), len(names)):
-            raise ValueError(f"mode {space.modes[mode]}: expected rows of {', '.join(names)}, got shape {values.shape}")
-    return Pairs.of(space, source, p, target, q, relaxation)
+    x, names = np.asarray(x, dtype=float), space.domains[mode].coordinates
+    if x.shape != (count, len(names)):
+        raise ValueError(f"mode {name}: expected rows of {', '.join(names)}, got shape {x.shape}")
+    return End(mode, x)
 
 
 def _along_strip(p: SpacePoint, q: SpacePoint, a: End, b: End, relaxation: float | None) -> float:

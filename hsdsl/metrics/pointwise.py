@@ -47,7 +47,7 @@ class SpaceMetric:
 
     @cached_property
     def _neighbours(self) -> Neighbours:
-        return Neighbours(self.space, self.relaxation, self.budget, self.hops)
+        return Neighbours(self.space, self.relaxation or 0.0, self.budget, self.hops)
 
     def contains(self, mode: str, low: Array, high: Array) -> Array:
         """Whether whole boxes are known to be in a mode's domain, or that domain to be convex."""

@@ -1,15 +1,15 @@
 """The shortest connected curve (Def. 4, 5 and 12) as a search over sequences of passages, the most promising first.
 
-Every open sequence carries a lower bound on all its continuations: the shortest way through it so far, plus the least
-that is left to q. A sequence is dropped once that bound reaches the best path found.
+Each open sequence carries, for every pair of points that it matters to, a lower bound on all its continuations: the
+shortest way through it so far, plus the least that is left to q. A pair leaves a sequence once that bound reaches its
+best path.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -17,21 +17,21 @@ import numpy as np
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.dominance import followers, hops_of, may_follow, passage_number
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.passage_bounds import Indices, Ways
+from hsdsl.metrics.passage_bounds import ROUNDING, Indices, Ways
+from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.socp import ROUNDS, one_thread
 
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
-ROUNDING = 16 * 2.0**-53  # of a short sum or a norm, relative to itself
 NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
 NEIGHBOURS_AT = {16, 128, 1024}  # sequences looked at: when the best path's neighbours are
 MOST_CHANGES = 20
-ONE = np.zeros(1, dtype=int)  # the only pair of a search
 HOPS = 8  # more than the fewest that lead from one mode to the other
+Bound = Callable[[tuple[int, ...], Indices, int], Array]  # of paths that begin with a sequence
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """Where a path ends: a point of a domain, what it costs to be there, and a passage it is bound to (in a strip)."""
+    """Where N paths end: points (N, n) of a domain, the cost to be there, and a passage they must take (in a strip)."""
 
     mode: int
     x: Array
@@ -41,15 +41,15 @@ class End:
 
 @dataclass
 class SearchResult:
-    """What a search knows: the best path, and the least that anything else can have.
+    """What a search knows of N distances: the best paths, and the least that anything else can have.
 
-    ``lower`` is the least of what was looked at or left out as too long, ``cut`` that of paths with more passages than
-    the cap.
+    ``upper``, ``lower`` and ``cut`` are arrays (N,). ``lower`` is the least of what was looked at or left out as too
+    long, ``cut`` that of paths with more passages than the cap. The path is that of a single distance.
     """
 
-    upper: float = np.inf
-    lower: float = np.inf
-    cut: float = np.inf
+    upper: Any = np.inf
+    lower: Any = np.inf
+    cut: Any = np.inf
     sequence: tuple[int, ...] = ()
     unknowns: Array = field(default_factory=lambda: np.zeros(0))
     start: End | None = None
@@ -73,7 +73,8 @@ def search(
 
     Each passage costs the relaxation. Paths with more passages than ``hops`` are only bounded, in ``SearchResult.cut``.
     """
-    found = SearchResult(upper=limit, lower=limit)
+    count = len(starts[0].x)
+    found = SearchResult(np.full(count, limit), np.full(count, limit), np.full(count, np.inf))
     with one_thread():
         for end in ends:
             for start in starts:
@@ -89,66 +90,68 @@ class _Search:
     ) -> None:
         self.space, self.start, self.end, self.budget = space, start, end, budget
         self.hops, self.found = hops, found
-        self.ways = Ways(space, start.mode, start.x[None], end.mode, end.x[None], relaxation, budget)
+        self.ways = Ways(space, start.mode, start.x, end.mode, end.x, relaxation, budget)
         self.fixed = start.cost + end.cost
-        self.heap: list[tuple[float, int, tuple[int, ...]]] = []
+        self.free = start.bound is None and end.bound is None
+        self.pairs = np.arange(len(start.x))
+        self.single = len(start.x) == 1
+        self.solved = self.ways.beginning, self.ways.beginning_kept
+        self.heap: list[tuple[float, int, tuple[int, ...], Indices, Array]] = []
 
     def run(self) -> None:
         """Best first until nothing open can be shorter."""
-        self._finish(())
-        first, last = self.ways.enters[:, 0].min(initial=np.inf), self.ways.leaves[:, 0].min(initial=np.inf)
-        if np.isinf(first + last):
+        self._finish((), self.pairs)
+        first, last = (side.min(axis=0, initial=np.inf) for side in (self.ways.enters, self.ways.leaves))
+        if np.isinf(first + last).all():
             return
-        least = float(first * (self.start.bound is None) + last * (self.end.bound is None)) * (1 - ROUNDING)
-        least = max(self.fixed, least + self.fixed)
-        if self._left_out(least):
+        apart = (first * (self.start.bound is None) + last * (self.end.bound is None)) * (1 - ROUNDING)
+        rows, bounds = self._left(self.pairs, np.maximum(apart, self.ways.unchanged) + self.fixed)
+        if not rows.size:
             return
-        self.ways.solve_leaves()
-        self._straight_there()
-        self._go_on((), least)
-        for looked_at in count(1):
-            if not self.heap:
-                return
-            bound, _, sequence = heapq.heappop(self.heap)
-            if self._left_out(bound):
-                break
+        if self.single:
+            self.ways.solve_leaves()
+            self._straight_there()
+        self._go_on((), rows, bounds)
+        looked_at = 0
+        while self.heap:
+            looked_at += 1
+            *_, sequence, rows, bounds = heapq.heappop(self.heap)
+            rows, bounds = self._left(rows, bounds)
+            if not rows.size:
+                continue
             if self.budget.spent():
-                self._open(bound)
-                break
-            self._finish(sequence, bound)
-            self._go_on(sequence, bound)
-            if looked_at in NEIGHBOURS_AT:
+                self._open(rows, bounds)
+                continue
+            self._finish(sequence, rows, bounds)
+            self._go_on(sequence, rows, bounds)
+            if self.single and looked_at in NEIGHBOURS_AT:
                 self._shorten()
 
     def _straight_there(self) -> None:
         """Try the sequence that the bounds between passages make look shortest, so that some path is known early."""
         sequence = tuple[int, ...]()
         while len(sequence) < self.hops:
-            open_ = [i for i in self._following(sequence) if i >= 0 and i not in sequence and self._rest(i) < np.inf]
+            rest = {i: float(self.ways.rest(i, self.pairs)[0]) for i in self._following(sequence) if i >= 0}
+            open_ = [i for i in rest if i not in sequence and rest[i] < np.inf]
             if not open_:
                 return
             far = self.ways.inner[sequence[-1]] if sequence else np.zeros(len(self.space.passages))
-            sequence = (*sequence, min(open_, key=lambda i: float(far[i]) + self._rest(i)))
+            sequence = (*sequence, min(open_, key=lambda i: float(far[i]) + rest[i]))
             if self.space.passages[sequence[-1]].target == self.end.mode:
-                self._finish(sequence)
+                self._finish(sequence, self.pairs)
                 return
-
-    def _rest(self, i: int) -> float:
-        return float(self.ways.rest(i, ONE)[0])
 
     def _shorten(self) -> None:
         """Replace the best path by shorter ones whose sequences differ by one passage, as long as there are any."""
-        if (self.start.bound, self.end.bound) != (None, None):
-            return
         tried: set[tuple[int, ...]] = set()
-        for _ in range(MOST_CHANGES):
+        for _ in range(MOST_CHANGES if self.free else 0):
             best = self.found.sequence
             for changed in self._changed(best):
                 if self.budget.spent():
                     return
                 if changed not in tried and hops_of(changed) <= self.hops:
                     tried.add(changed)
-                    self._keep(changed, 1)
+                    self._keep(changed, self.pairs, 1)
                     if self.found.sequence != best:
                         break
             else:
@@ -166,60 +169,62 @@ class _Search:
                 for middle in [()] * (source == target and shorter > k) + fitting:
                     yield before + middle + after
 
-    def _left_out(self, bound: float) -> bool:
-        """Whether no path that is at least so long is worth a look; the lower end remembers it."""
-        if bound < self.found.upper * (1 - TOLERANCE):
-            return False
-        self.found.lower = min(self.found.lower, bound)
-        return True
+    def _left(self, rows: Indices, bounds: Array) -> tuple[Indices, Array]:
+        """The pairs for which paths that are at least so long are worth a look; the lower end remembers the others."""
+        still = bounds < self.found.upper[rows] * (1 - TOLERANCE)
+        self._lower(rows[~still], bounds[~still])
+        return rows[still], bounds[still]
 
-    def _open(self, bound: float) -> None:
+    def _lower(self, rows: Indices, bounds: Array) -> None:
+        self.found.lower[rows] = np.minimum(self.found.lower[rows], bounds)
+
+    def _open(self, rows: Indices, bounds: Array) -> None:
         """Leave what is at least so long for want of time."""
-        self.found.lower, self.found.ended_early = min(self.found.lower, bound), True
+        self._lower(rows, bounds)
+        self.found.ended_early = True
 
-    def _go_on(self, sequence: tuple[int, ...], bound: float) -> None:
-        for following in self._following(sequence):
-            longer = (*sequence, following)
+    def _go_on(self, sequence: tuple[int, ...], rows: Indices, bounds: Array) -> None:
+        longer = [(*sequence, i) for i in self._following(sequence)]
+        kinds = (self.ways.around, *(self.solved if self.single else ()))
+        if longer and sequence and not self.single:  # of many pairs most are settled before this is solved
+            rows, bounds = self._bounded(self.solved, sequence, rows, bounds)
+        for one in longer if rows.size else ():
             if self.budget.spent():
-                self._open(bound)
+                self._open(rows, bounds)
                 return
-            least = max(bound, self._bound(longer))
-            if least == np.inf or self._left_out(least):
+            some, least = self._bounded(kinds, one, rows, bounds)
+            if not some.size:
                 continue
-            if hops_of(longer) <= self.hops:
-                heapq.heappush(self.heap, (least, len(longer), longer))
+            if hops_of(one) <= self.hops:
+                heapq.heappush(self.heap, (float(least.min()), len(one), one, some, least))
             else:
-                self.found.cut = min(self.found.cut, least)
+                self.found.cut[some] = np.minimum(self.found.cut[some], least)
 
-    def _finish(self, sequence: tuple[int, ...], least: float = 0.0) -> None:
-        """The path through exactly this sequence, which is at least so long."""
+    def _finish(self, sequence: tuple[int, ...], rows: Indices, least: Array | float = 0.0) -> None:
+        """The paths through exactly this sequence, which are at least so long."""
         last = self.space.passages[passage_number(sequence[-1])].target if sequence else self.start.mode
-        if last != self.end.mode:
-            return
-        if not sequence and (self.start.bound, self.end.bound) != (None, None):
-            return
-        if sequence and not self._bound_end(sequence):
-            return
-        lower = self._keep(sequence)
-        self.found.lower = min(self.found.lower, max(lower, least))
+        if last == self.end.mode and (self._bound_end(sequence) if sequence else self.free):
+            self._lower(rows, np.maximum(self._keep(sequence, rows), least))
 
-    def _keep(self, sequence: tuple[int, ...], rounds: int = ROUNDS) -> float:
-        """Keep the shortest path through a sequence where it is the best; a lower bound on it."""
+    def _keep(self, sequence: tuple[int, ...], rows: Indices, rounds: int = ROUNDS) -> Array:
+        """Keep the shortest paths through a sequence where they are the best; lower bounds on them."""
         if sequence:
-            lower, upper, s = (x[0] for x in self.ways.through(sequence, ONE, rounds))
-        else:
-            lower, upper, s = _straight(self.start.x, self.end.x)
-        if min(sequence, default=0) >= 0 and upper + self.fixed < self.found.upper:
-            self.found.upper, self.found.sequence, self.found.unknowns = float(upper + self.fixed), sequence, s
+            lower, upper, s = self.ways.through(sequence, rows, rounds)
+        else:  # the difference of two points is exact to a share of itself
+            length, s = norm(self.end.x - self.start.x), np.zeros((len(rows), 0))
+            lower, upper = length * (1 - ROUNDING), length * (1 + ROUNDING)
+        better = upper + self.fixed < self.found.upper[rows]
+        if min(sequence, default=0) >= 0 and better.any():
+            self.found.upper[rows[better]] = upper[better] + self.fixed
+            self.found.sequence, self.found.unknowns = sequence, s[0]
             self.found.start, self.found.end = self.start, self.end
-        return float(lower + self.fixed)
+        return lower + self.fixed
 
     def _bound_end(self, sequence: tuple[int, ...]) -> bool:
-        if self.end.bound is not None and passage_number(sequence[-1]) != self.end.bound:
+        bound = self.end.bound is not None
+        if bound and passage_number(sequence[-1]) != self.end.bound:
             return False
-        return len(sequence) < 2 or self._pair(
-            sequence[-2], sequence[-1], len(sequence) - 2, self.end.bound is not None
-        )
+        return len(sequence) < 2 or self._pair(sequence[-2], sequence[-1], len(sequence) - 2, bound)
 
     def _following(self, sequence: tuple[int, ...]) -> Iterator[int]:
         if sequence:
@@ -238,26 +243,24 @@ class _Search:
         begins = position == 0 and self.start.bound is not None
         return (worth or (begins and last)) and (after or last) and (before or begins)
 
-    def _bound(self, sequence: tuple[int, ...]) -> float:
-        """The least any path beginning with this sequence can have."""
-        if self._rest(sequence[-1]) == np.inf:
-            return np.inf
-        simple = self._least(self.ways.beginning, sequence)
-        if simple >= self.found.upper * (1 - TOLERANCE) or self.space.kept is None:
-            return simple
-        return max(simple, self._least(self.ways.beginning_kept, sequence))
+    def _bounded(
+        self, kinds: Sequence[Bound], sequence: tuple[int, ...], rows: Indices, bounds: Array
+    ) -> tuple[Indices, Array]:
+        """The pairs that a sequence matters to, and the least that any path beginning with it can have."""
+        if rows.size and np.isinf(self.ways.rest(sequence[-1], rows)).all():
+            return rows[:0], bounds[:0]
+        for least in kinds:
+            if rows.size:
+                rows, bounds = self._left(rows, np.maximum(bounds, self._closer(least, sequence, rows)))
+        return rows, bounds
 
-    def _least(self, bounds: Callable[[tuple[int, ...], Indices, int], Array], sequence: tuple[int, ...]) -> float:
-        """A lower bound, closer where that may decide."""
-        bound = float(bounds(sequence, ONE, 1)[0]) + self.fixed
-        near = self.found.upper * (1 - NEAR) < bound < self.found.upper * (1 - TOLERANCE)
-        return max(bound, float(bounds(sequence, ONE, ROUNDS)[0]) + self.fixed) if near else bound
-
-
-def _straight(p: Array, q: Array) -> tuple[float, float, Array]:
-    """The straight way: the difference is exact to a share of itself."""
-    length, share = float(np.linalg.norm(q - p)), len(p) * 2.0**-53 + ROUNDING
-    return length * (1 - share), length * (1 + share), np.zeros(0)
+    def _closer(self, least: Bound, sequence: tuple[int, ...], rows: Indices) -> Array:
+        """Lower bounds, closer where that may decide."""
+        bounds, upper = least(sequence, rows, 1) + self.fixed, self.found.upper[rows]
+        near = (upper * (1 - NEAR) < bounds) & (bounds < upper * (1 - TOLERANCE))
+        if near.any():
+            bounds[near] = np.maximum(bounds[near], least(sequence, rows[near], ROUNDS) + self.fixed)
+        return bounds
 
 
 def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:
