@@ -1,6 +1,6 @@
 """Which passage may follow which on a shortest path: the sequences that a cheaper one always replaces are left out.
 
-Three rules, each proved from the geometry alone, whatever the ends of the path are:
+Three rules, each proved from the geometry alone, for any ends of the path:
 
 1. f then g back into the mode that f left: useless where the straight way from where f is entered to where g is left is
    never longer than the way between the two on the other side. So e then e backwards goes where the reset shortens no
@@ -23,7 +23,7 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 from hsdsl.metrics.geometry import Array, Passage, Space
-from hsdsl.metrics.rational import Vector, dot, maximise, never_negative, plus
+from hsdsl.metrics.rational import Exact, maximise, never_negative
 
 # A way may grow by this share where a pair is left out: far below rounding, and above what numbers that are not
 # rational were rounded to.
@@ -32,8 +32,6 @@ SLACK = Fraction(1, 10**40)
 SEEN = 1e-6  # relative: what is longer by so much is so in floats too
 
 RUN = 3  # passages back and forth through one gate, one after the other
-
-Side = tuple[Vector, tuple[Vector, ...]]
 
 
 def passage_number(i: int) -> int:
@@ -82,8 +80,8 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
     found: tuple[bool, bool, bool] | None = space.cache.get(key)
     if found is None:
         f, g = space.passages[first], space.passages[second]
-        after = g.source != g.target or not _nearer_behind(g, f.exact[1], f)
-        before = f.source != f.target or not _nearer_ahead(f, g.exact[0], g)
+        after = g.source != g.target or not _never_nearer(g, *g.exact, f.exact[1], f)
+        before = f.source != f.target or not _never_nearer(f, f.exact[1], f.exact[0], g.exact[0], g)
         found = (_worth_returning(f, g), after, before)
         space.cache[key] = found
     return found
@@ -92,72 +90,52 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
 def _worth_returning(f: Passage, g: Passage) -> bool:
     if f.source != g.target:
         return True
-    if _seen_longer(_floats(f.enter, g.leave), _floats(f.leave, g.enter)):
-        return True
-    return not _never_longer(_difference(f.exact[0], g.exact[1]), _difference(f.exact[1], g.exact[0]))
-
-
-def _floats(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
-    return np.column_stack([one[0] - other[0], one[1], -other[1]])
+    short, long = _difference(f.exact[0], g.exact[1]), _difference(f.exact[1], g.exact[0])
+    return _seen_longer(short.astype(float), long.astype(float)) or not _never_longer(short, long)
 
 
 def _seen_longer(short: Array, long: Array) -> bool:
     """Whether ``|short @ u| > |long @ u|`` for some u by far more than rounding; most pairs need no closer look."""
-    excess = long.T @ long - short.T @ short
-    return bool(
-        np.linalg.eigvalsh(excess)[0] < -SEEN * max(np.abs(long).max(initial=0), np.abs(short).max(initial=0)) ** 2
-    )
+    excess, size = long.T @ long - short.T @ short, np.abs(np.vstack([long, short])).max(initial=0)
+    return bool(np.linalg.eigvalsh(excess)[0] < -SEEN * size**2)
 
 
-def _difference(one: Side, other: Side) -> list[Vector]:
-    """The columns of the matrix that takes (1, s, s') to the difference of two points."""
-    return [plus(one[0], other[0], Fraction(-1)), *one[1], *(tuple(-v for v in column) for column in other[1])]
+def _difference(one: Exact, other: Exact) -> Exact:
+    """The matrix that takes (1, s, s') to the difference of two points."""
+    return np.column_stack([one[:, 0] - other[:, 0], one[:, 1:], -other[:, 1:]])
 
 
-def _never_longer(short: list[Vector], long: list[Vector]) -> bool:
+def _never_longer(short: Exact, long: Exact) -> bool:
     """Whether ``|short u| <= (1 + slack) |long u|`` for every u."""
-    columns = list(zip(short, long, strict=True))
-    if any(not any(b) and any(a) for a, b in columns):
+    if ((short != 0).any(axis=0) & (long == 0).all(axis=0)).any():
         return False
-    factor = 1 + SLACK
-    return never_negative([[factor * dot(b, d) - dot(a, c) for c, d in columns] for a, b in columns])
+    return never_negative((1 + SLACK) * (long.T @ long) - short.T @ short)
 
 
-def _nearer_behind(g: Passage, side: Side, other: Passage) -> bool:
-    """Whether ``|y - enter| >= |y - leave|`` for all y on the other passage's side and all points of g."""
-    return _never_nearer(g, *g.exact, side, other)
-
-
-def _nearer_ahead(f: Passage, side: Side, other: Passage) -> bool:
-    """Whether ``|leave - y| >= |enter - y|`` for all y on the other passage's side and all points of f."""
-    return _never_nearer(f, f.exact[1], f.exact[0], side, other)
-
-
-def _never_nearer(g: Passage, far: Side, near: Side, side: Side, other: Passage) -> bool:
-    """Whether ``|y - far(s)| >= |y - near(s)|`` for all s in g and y in the other's side.
+def _never_nearer(g: Passage, far: Exact, near: Exact, side: Exact, other: Passage) -> bool:
+    """Whether ``|y - far(s)| >= |y - near(s)|`` for all s in g and y on the other passage's side.
 
     Where far - near = (a s + b) w with one direction w, the difference of squares is that factor times
     ``w . (far + near - 2 y)``: it cannot be negative where both factors have one sign, two linear programs each.
     """
-    apart = [plus(a, b, Fraction(-1)) for a, b in zip((far[0], *far[1]), (near[0], *near[1]), strict=True)]
-    w = next(filter(any, apart), None)
+    apart = far - near
+    w = next((column for column in apart.T if column.any()), None)
     if w is None:
         return True
-    factor = [dot(column, w) / dot(w, w) for column in apart]
-    if any(any(plus(column, w, -share)) for column, share in zip(apart, factor, strict=True)):
+    factor = w @ apart / (w @ w)
+    if (apart - np.outer(w, factor)).any():
         return False
-    both = [dot(plus(a, b), w) for a, b in zip((far[0], *far[1]), (near[0], *near[1]), strict=True)]
-    there = [-2 * dot(column, w) for column in (side[0], *side[1])]
+    forms = ((factor, g), (w @ (far + near), g), (-2 * (w @ side), other))
 
     def one_sign(sign: int) -> bool:
-        own, middle, away = (_least(sign, form, gate) for form, gate in ((factor, g), (both, g), (there, other)))
+        own, middle, away = (_least(sign * form, gate) for form, gate in forms)
         return own is not None and middle is not None and away is not None and own >= 0 and middle + away >= 0
 
     return one_sign(1) or one_sign(-1)
 
 
-def _least(sign: int, form: Sequence[Fraction], passage: Passage) -> Fraction | None:
-    """The minimum of ``sign (form[0] + form[1:] . s)`` over a guard, None where there is none."""
+def _least(form: Exact, passage: Passage) -> Fraction | None:
+    """The minimum of ``form . (1, s)`` over a guard, None where there is none."""
     exact = passage.gate.exact
-    found = maximise([-sign * v for v in form[1:]], exact.rows, exact.inner)
-    return None if found is None else sign * (form[0] + dot(form[1:], found[0]))
+    found = maximise(-form[1:], exact.rows, exact.inner)
+    return None if found is None else form[0] + form[1:] @ found[0]

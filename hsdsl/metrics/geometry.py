@@ -15,7 +15,7 @@ import numpy as np
 
 from hsdsl.enclosures import Array
 from hsdsl.metrics.formulas import Formula
-from hsdsl.metrics.rational import Row, Vector, axes, dot, maximise
+from hsdsl.metrics.rational import Exact, maximise
 
 TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the points
 
@@ -24,16 +24,16 @@ TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, rela
 class Domain:
     """A mode's domain: ``normals @ x <= levels`` (m unit rows of n) and ``curved(x) <= 0``.
 
-    ``rows`` are the inequalities without rounding.
+    ``rows`` (m, n + 1) are the inequalities without rounding, see :mod:`hsdsl.metrics.rational`.
     """
 
     mode: str
     coordinates: tuple[str, ...]
     normals: Array
     levels: Array
-    curved: tuple[Formula, ...] = ()
-    texts: tuple[str, ...] = ()
-    rows: tuple[Row, ...] = ()
+    curved: tuple[Formula, ...]
+    texts: tuple[str, ...]
+    rows: Exact
 
     @property
     def convex(self) -> bool:
@@ -50,7 +50,7 @@ class Domain:
         flat = (self.normals @ x - self.levels) / (size + np.abs(self.levels))
         beyond = [*flat.tolist(), *(_beyond(value, x) / size for value in self.curved)]
         worst = max(range(len(beyond)), key=lambda k: _or_infinite(beyond[k]), default=None)
-        return (0.0, None) if worst is None else (beyond[worst], self.texts[worst] if self.texts else None)
+        return (0.0, None) if worst is None else (beyond[worst], self.texts[worst])
 
 
 def _beyond(formula: Formula, x: Array) -> float:
@@ -86,7 +86,7 @@ class Gate:
     inner: Array
     room: Array
     across: tuple[tuple[Array, Array], tuple[Array, Array]]
-    exact: Exact
+    exact: ExactGate
     curved: tuple[Formula, ...] = ()
 
     @property
@@ -98,7 +98,7 @@ class Gate:
     def plane(self) -> Gate:
         """The same gate without inequalities."""
         none = np.zeros((0, self.size))
-        exact = replace(self.exact, rows=())
+        exact = replace(self.exact, rows=self.exact.rows[:0])
         return replace(self, normals=none, levels=np.zeros(0), room=np.zeros(0), exact=exact, curved=())
 
     @cached_property
@@ -106,19 +106,19 @@ class Gate:
         """How far the guard reaches from its base at most; infinite where it has no end."""
         rows, inner = self.exact.rows, self.exact.inner
         ends: list[float] = []
-        for axis in axes(self.size):
-            both = [maximise([sign * v for v in axis], rows, inner) for sign in (1, -1)]
-            ends.append(max(np.inf if end is None else abs(float(dot(axis, end[0]))) for end in both))
+        for k, axis in enumerate(np.eye(self.size, dtype=int).astype(object)):
+            both = [maximise(sign * axis, rows, inner) for sign in (1, -1)]
+            ends.append(max(np.inf if end is None else abs(float(end[0][k])) for end in both))
         return float(np.linalg.norm(ends)) * (1 + 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
-class Exact:
-    """A gate in rational numbers: base and frame (by columns) of the guard and of its image, and the inequalities."""
+class ExactGate:
+    """A gate in rational numbers: guard and image as maps of s (base, then frame), the inequalities, and ``inner``."""
 
-    sides: tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]
-    rows: tuple[Row, ...]
-    inner: Vector
+    sides: tuple[Exact, Exact]
+    rows: Exact
+    inner: Exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ class Passage:
     enter: tuple[Array, Array]
     leave: tuple[Array, Array]
     across: tuple[tuple[Array, Array], tuple[Array, Array]]
-    exact: tuple[tuple[Vector, tuple[Vector, ...]], tuple[Vector, tuple[Vector, ...]]]
+    exact: tuple[Exact, Exact]
 
     @classmethod
     def through(cls, gate: Gate, index: int) -> Passage:

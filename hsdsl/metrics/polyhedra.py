@@ -2,116 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from fractions import Fraction
 
 import numpy as np
 
 from hsdsl.metrics.formulas import Formula
-from hsdsl.metrics.geometry import Array, Exact, Gate
-from hsdsl.metrics.rational import (
-    ZERO,
-    Plane,
-    Row,
-    Vector,
-    about,
-    axes,
-    deepest,
-    dot,
-    orthogonal,
-    plus,
-    times,
-)
-
-Reset = tuple[tuple[Vector, ...], Vector]  # matrix by rows, and vector
+from hsdsl.metrics.geometry import Array, ExactGate, Gate
+from hsdsl.metrics.rational import Exact, about, after, axes, deepest, matrix, orthogonal, plane, zeros
 
 
 def gate_of(
     edge: str,
     modes: tuple[int, int],
-    surface: Row,
-    inequalities: Sequence[Row],
-    reset: Reset,
-    image: Sequence[Row],
+    surface: Exact,
+    inequalities: Exact,
+    reset: Exact,
+    image: Exact,
     curved: tuple[Formula, ...],
 ) -> Gate | None:
     """A guard as a gate, None where it is empty.
 
-    ``surface`` is ``normal . x = level`` on it, ``inequalities`` hold besides, ``image`` holds in the domain that the
-    affine reset leads into, and ``curved`` are conditions that are not affine.
+    The affine function ``surface`` is 0 on it, and ``inequalities`` are at most 0; so are those of ``image`` in the
+    domain that the affine ``reset`` leads into. ``curved`` are conditions that are not affine.
     """
-    if not any(surface[0]):
+    if not surface[1:].any():
         return None
-    matrix, offset = reset
-    columns = list(zip(*matrix, strict=True)) or [()] * len(surface[0])
-    pulled = [(times(columns, normal), level - dot(normal, offset)) for normal, level in image]
-    found = _polyhedron(len(surface[0]), [surface], list(dict.fromkeys([*inequalities, *pulled])))
+    rows = dict.fromkeys(tuple[Fraction, ...](row) for row in (*inequalities, *after(image, reset)))
+    found = _polyhedron(surface[None], matrix(rows, len(surface)))
     if found is None:
         return None
-    plane, frame, rows, inner = found
-    sides = (
-        (plane.point, tuple(frame)),
-        (plus(times(matrix, plane.point), offset), tuple(times(matrix, f) for f in frame)),
-    )
-    return _rounded(edge, modes, Exact(sides, tuple(rows), inner), curved)
+    side, rows, inner = found
+    return _rounded(edge, modes, ExactGate((side, after(reset, side)), rows, inner), curved)
 
 
-def _polyhedron(
-    size: int, equations: list[Row], inequalities: list[Row]
-) -> tuple[Plane, list[Vector], list[Row], Vector] | None:
-    """The smallest plane that holds a polyhedron, its directions, what is left of the rows, and a point inside."""
-    while True:
-        plane = Plane(size, equations)
-        if plane.empty:
+def _polyhedron(equations: Exact, inequalities: Exact) -> tuple[Exact, Exact, Exact] | None:
+    """The smallest plane that holds a polyhedron, what is left of the rows in its coordinates, and a point inside."""
+    while (side := plane(equations)) is not None:
+        rows = after(inequalities, side)
+        sloped = (rows[:, 1:] != 0).any(axis=1)
+        if (rows[~sloped, 0] > 0).any():
             return None
-        frame = plane.along()
-        rows: list[Row] = []
-        own: list[Row] = []
-        for normal, level in inequalities:
-            along, rest = times(frame, normal), level - dot(normal, plane.point)
-            if any(along):
-                rows.append((along, rest))
-                own.append((normal, level))
-            elif rest < 0:
-                return None
-        if not rows:
-            return plane, frame, rows, (ZERO,) * len(frame)
+        rows, own = rows[sloped], inequalities[sloped]
+        if not len(rows):
+            return side, rows, zeros(side.shape[1] - 1)
         depth, inner, weights = deepest(rows)
         if depth < 0:
             return None
         if depth > 0:
-            return plane, frame, rows, inner
-        equations = [*equations, *(row for row, weight in zip(own, weights, strict=True) if weight > 0)]
+            return side, rows, inner
+        equations = np.vstack([equations, own[weights > 0]])
+    return None
 
 
-def _rounded(edge: str, modes: tuple[int, int], exact: Exact, curved: tuple[Formula, ...]) -> Gate:
-    normals, levels = unit_rows(exact.rows, len(exact.inner))
-    (base, frame), (image_base, image_frame) = exact.sides
-    inner = tuple(Fraction(float(v)) for v in exact.inner)
-    room = [float((level - dot(normal, inner)) / about(normal)) for normal, level in exact.rows]
-    own, image = ((floats(b), _columns(f, len(b))) for b, f in exact.sides)
-    across = _across(base, frame), _across(image_base, image_frame)
-    return Gate(edge, *modes, *own, *image, normals, levels, floats(inner), np.array(room), across, exact, curved)
+def _rounded(edge: str, modes: tuple[int, int], exact: ExactGate, curved: tuple[Formula, ...]) -> Gate:
+    normals, levels = unit_rows(exact.rows)
+    inner = exact.inner.astype(float)
+    depths = -exact.rows[:, 0] - exact.rows[:, 1:] @ np.array([Fraction(v) for v in inner.tolist()], dtype=object)
+    room = np.array([float(depth / about(row[1:])) for depth, row in zip(depths, exact.rows, strict=True)])
+    (base, frame), (image, image_frame) = (
+        (side[:, 0].astype(float), side[:, 1:].astype(float)) for side in exact.sides
+    )
+    across = _across(exact.sides[0]), _across(exact.sides[1])
+    return Gate(edge, *modes, base, frame, image, image_frame, normals, levels, inner, room, across, exact, curved)
 
 
-def unit_rows(rows: Sequence[Row], size: int) -> tuple[Array, Array]:
-    """Inequalities in floats, each divided by its length; one without a direction by its level."""
-    lengths = [about(normal) or abs(level) or Fraction(1) for normal, level in rows]
-    normals = [floats([v / length for v in normal]) for (normal, _), length in zip(rows, lengths, strict=True)]
-    levels = [float(level / length) for (_, level), length in zip(rows, lengths, strict=True)]
-    return np.array(normals).reshape(len(rows), size), np.array(levels)
+def unit_rows(rows: Iterable[Exact]) -> tuple[Array, Array]:
+    """Inequalities as float normals and levels, each divided by its length; one without a direction by its level."""
+    rows = np.asarray(rows)
+    lengths = [about(row[1:]) or abs(row[0]) or Fraction(1) for row in rows]
+    scaled = np.array([row / length for row, length in zip(rows, lengths, strict=True)], dtype=float).reshape(
+        rows.shape
+    )
+    return scaled[:, 1:], -scaled[:, 0]
 
 
-def floats(x: Sequence[Fraction]) -> Array:
-    """The nearest floats."""
-    return np.array([float(v) for v in x])
-
-
-def _columns(vectors: Sequence[Vector], size: int) -> Array:
-    return np.array([floats(v) for v in vectors]).reshape(len(vectors), size).T.copy()
-
-
-def _across(base: Vector, frame: Sequence[Vector]) -> tuple[Array, Array]:
+def _across(side: Exact) -> tuple[Array, Array]:
     """Unit vectors orthogonal to a plane, and their products with its points."""
-    found = orthogonal(axes(len(base)), orthogonal(frame))
-    return unit_rows([(v, dot(v, base)) for v in found], len(base))
+    size = len(side)
+    found = orthogonal(axes(size), orthogonal(side[:, 1:].T))
+    return unit_rows(matrix(([-(v @ side[:, 0]), *v] for v in found), size + 1))

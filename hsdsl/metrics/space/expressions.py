@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
 
 from hsdsl import functions
@@ -15,26 +15,13 @@ from hsdsl.errors import UsageError
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.metrics.formulas import Formula, compiled
-from hsdsl.metrics.rational import Row, Vector
+from hsdsl.metrics.rational import Exact
 
 DIGITS = 60  # of a number that is not rational
 
 
-@dataclass(frozen=True)
-class Affine:
-    """``gradient . x + constant``."""
-
-    gradient: Vector
-    constant: Fraction
-
-    @property
-    def row(self) -> Row:
-        """The inequality that it is at most 0."""
-        return self.gradient, -self.constant
-
-
-def affine(expression: sp.Expr, symbols) -> Affine | None:
-    """The expression as an affine function, None where it is none."""
+def affine(expression: sp.Expr, symbols) -> Exact | None:
+    """The expression as an affine function (its constant, then its slopes), None where it is none."""
     expression = sp.expand(expression)
     own = set(symbols)
     if any(f.free_symbols & own for f in expression.atoms(functions.sign, functions.floor, sp.sign, sp.floor)):
@@ -43,10 +30,8 @@ def affine(expression: sp.Expr, symbols) -> Affine | None:
     if any(g.free_symbols & own for g in gradient):
         return None
     constant = expression.xreplace(dict.fromkeys(symbols, sp.S.Zero))
-    numbers = [_rational(v) for v in (*gradient, constant)]
-    if any(v is None for v in numbers):
-        return None
-    return Affine(tuple(numbers[:-1]), numbers[-1])
+    numbers = [_rational(v) for v in (constant, *gradient)]
+    return None if None in numbers else np.array(numbers, dtype=object)
 
 
 def _rational(value: sp.Expr) -> Fraction | None:

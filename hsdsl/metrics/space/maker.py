@@ -19,6 +19,7 @@ from hsdsl.expression.stack import deep_stack
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
 from hsdsl.metrics.polyhedra import gate_of, unit_rows
+from hsdsl.metrics.rational import matrix
 from hsdsl.metrics.space.expressions import affine as as_affine
 from hsdsl.metrics.space.expressions import clauses, equations, formula
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
@@ -109,11 +110,11 @@ class _Maker:
                 curved.append(self._formula((residual,), j))
                 curved_texts.append(surface.text)
             else:
-                rows.append(row.row)
+                rows.append(row)
                 texts.append(surface.text)
         coordinates = self.states[j] + ("t",) * self.timed
-        normals, levels = unit_rows(rows, len(coordinates))
-        return Domain(mode.name, coordinates, normals, levels, tuple(curved), (*texts, *curved_texts), tuple(rows))
+        rows = matrix(rows, 1 + len(coordinates))
+        return Domain(mode.name, coordinates, *unit_rows(rows), tuple(curved), (*texts, *curved_texts), rows)
 
     def _guard(self, j: int, edge: Edge, clause, domains, gates: list[Gate], curved: list[CurvedGate]) -> None:
         k = [m.name for m in self.system.modes].index(edge.target)
@@ -133,9 +134,9 @@ class _Maker:
             return
         rows = [(c, as_affine(c, self.symbols[j])) for c in conditions]
         bent = (*domains[j].curved, *(self._formula((c,), j) for c, r in rows if r is None))
-        reset_to = tuple(f.gradient for f in flat[1:]), tuple(f.constant for f in flat[1:])
-        inequalities = [*domains[j].rows, *(r.row for _, r in rows if r is not None)]
-        gate = gate_of(edge.name, (j, k), flat[0].row, inequalities, reset_to, domains[k].rows, bent)
+        width = 1 + len(self.symbols[j])
+        inequalities = matrix([*domains[j].rows, *(r for _, r in rows if r is not None)], width)
+        gate = gate_of(edge.name, (j, k), flat[0], inequalities, matrix(flat[1:], width), domains[k].rows, bent)
         gates += [] if gate is None else [gate]
 
     def _rate(self, edge: Edge, surface: sp.Expr, mode: Mode) -> sp.Expr | None:
