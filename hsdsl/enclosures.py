@@ -24,9 +24,13 @@ ANGLE = 8 * 2.0**-53  # more than rounding makes of a number of turns, beside th
 STEPS = 4  # units in the last place by which NumPy's functions may be wrong
 
 
+class Undecided(ArithmeticError):
+    """An inequality holds for some numbers of a range, and not for others."""
+
+
 @dataclass(frozen=True, eq=False)
 class Range:
-    """The numbers from ``low`` to ``high``, element by element."""
+    """The numbers from ``low`` to ``high``, element by element; comparisons are of all of them, or `Undecided`."""
 
     low: Any
     high: Any
@@ -63,6 +67,28 @@ class Range:
         through_zero = (other.low <= 0) & (other.high >= 0)
         low, high = np.where(through_zero, 1.0, other.low), np.where(through_zero, 1.0, other.high)
         return _unless(through_zero, self * _outwards(1 / high, 1 / low))
+
+    def __le__(self, other: Any) -> bool:
+        other = as_range(other)
+        return _decided(self.high <= other.low, self.low > other.high)
+
+    def __lt__(self, other: Any) -> bool:
+        other = as_range(other)
+        return _decided(self.high < other.low, self.low >= other.high)
+
+    def __ge__(self, other: Any) -> bool:
+        return as_range(other) <= self
+
+    def __gt__(self, other: Any) -> bool:
+        return as_range(other) < self
+
+
+def _decided(surely: Any, never: Any) -> bool:
+    if np.all(surely):
+        return True
+    if np.all(never):
+        return False
+    raise Undecided
 
 
 def as_range(value: Any) -> Range:

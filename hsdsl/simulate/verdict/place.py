@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from hsdsl.arithmetic import Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.enclosures import Range, Undecided
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
@@ -16,13 +17,14 @@ TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 
 @dataclass(frozen=True)
 class Place:
-    """A mode at a time: its routines bound, and one state to look at."""
+    """A mode at a time: its routines bound (``enclosing`` binds them over intervals), and one state to look at."""
 
     mode: ModeProgram
     kernel: ModeKernel
     surfaces: Surfaces
     t: Number
     x: State
+    enclosing: Callable[[], ModeKernel]
 
     def value(self, k: int) -> Number:
         """Surface k."""
@@ -50,8 +52,15 @@ class Place:
                 yield (*self.x[:i], self.x[i] + way * e, *self.x[i + 1 :])
 
     def conditions(self, k: int, error: State) -> set[bool]:
-        """What the condition of edge k is at the state and around it."""
-        return {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
+        """What the condition of edge k is at the state and around it, anywhere in the box of the error."""
+        found = {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
+        if len(found) == 1 and any(error):
+            box = [Range(float(x - e), float(x + e)) for x, e in zip(self.x, error, strict=True)]
+            try:
+                found |= {bool(self.enclosing().conditions[k](Range(float(self.t), float(self.t)), *box)[0])}
+            except (Undecided, *DOMAIN_ERRORS):
+                found = {True, False}
+        return found
 
     def name(self, k: int) -> str:
         """Surface k for a person."""

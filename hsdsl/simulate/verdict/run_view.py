@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from math import inf
 
 import numpy as np
 
 from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.kernel import ModeKernel
@@ -134,7 +135,13 @@ class RunView:
             self._bound[key] = self.problem.kernel.bind(index, segment.data)
         program, kernel = self.problem.program.modes[index], self._bound[key]
         scale = tuple(abs(a) for a in x)
-        return Place(program, kernel, Surfaces(kernel, program.edges, scale, self.arithmetic), t, x)
+        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic)
+        return Place(program, kernel, surfaces, t, x, partial(self._enclosing, index, t))
+
+    def _enclosing(self, index: int, t: Number) -> ModeKernel:
+        """A mode's routines over intervals."""
+        data = [Range(float(value), float(value)) for value in self.problem.timeline.at(t).data]
+        return self.problem.kernel.enclosing.bind(index, data)
 
     def before(self, made: Transition) -> tuple[Place, int]:
         """Look at where a transition was made, and which surface it crossed."""
@@ -162,7 +169,7 @@ class RunView:
             time = min(t + s * h, end)
             inner = self.place(index, start, x) if time == end else None  # the end belongs to the step's own segment
             place = self.place(index, time, at(x, piece, s))
-            return place if inner is None else Place(place.mode, inner.kernel, inner.surfaces, time, place.x)
+            return place if inner is None else replace(inner, t=time, x=place.x)
 
         return look
 
