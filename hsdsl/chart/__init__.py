@@ -7,6 +7,7 @@ warm and in turns, and compares each result with the model's exact execution.
 `scene`         a model with its numbers, its exact execution, and the times at which errors are taken
 `plan`          the runs: our own and those of peers
 `judge`         the error of a result, and whether it is the right execution
+`outcome`       one word for a run: right, wrong, warned of, stopped, refused, without an end
 `stopwatch`     warm times, in turns
 `rows`          rows as text, as CSV, and as the panels of a picture
 `peers`         other tools, each run as its own documentation shows

@@ -28,7 +28,7 @@ class Scene:
     Attributes
     ----------
     grid : array, shape (samples,)
-        Equally spaced times from 0 to the exact execution's end.
+        Equally spaced times from 0 to the exact execution's end, or as far as a run is to go.
     clear : array of bool, shape (samples,)
         Whether a sample is so far from every exact jump that a slightly late jump changes nothing.
     exact_values, exact_modes : array
@@ -59,6 +59,7 @@ class Scene:
         clearance: float = 1e-4,
         digits: int = DIGITS,
         exact: Execution | None = None,
+        until: float | None = None,
     ) -> Scene:
         """Make the scene of a model with `hsdsl.exact.reference`, or `hsdsl.exact.precise` where there is none.
 
@@ -76,6 +77,8 @@ class Scene:
             Of a refined reference, 4 to 14; errors below its last digit mean nothing.
         exact : Execution, optional
             Replaces the reference.
+        until : float, optional
+            The end of the samples, where it is not the exact execution's own: one may end before a run is to end.
 
         Raises
         ------
@@ -92,6 +95,7 @@ class Scene:
                 raise UsageError(f"the model has no state '{name}'", did_you_mean(name, exact.states))
         chosen = tuple(states) or exact.states
         start, end = (float(t) for t in exact.time_span)
+        end = end if until is None else until
         grid = np.linspace(start, end, samples)
         jumps = np.array([tr.time for tr in exact.transitions], dtype=float)
         near = np.abs(grid[:, None] - jumps[None, :]).min(axis=1) if len(jumps) else np.full(samples, np.inf)

@@ -8,6 +8,8 @@
 `oscillators`           its two examples (Table I) as executions
 `stiff_switch`          a stiff model of two states with switching, by formula
 `thermostat`            exponentials between two temperatures, by formula
+`gallery`               the scenes of the gallery; its balls, swings and series are in `gallery_balls`, ...
+`terms`                 solutions of linear flows, with bounds on their derivatives
 `rests`                 the end of a Zeno tail, and rest
 `constrained_pendulum`  a pendulum caught by a pin, by series
 `pronking_runner`       the pronking runner, by series

@@ -1,5 +1,8 @@
 """Build the stored references: ``python models/references/build.py [NAME-BLOCK]...``, all of them when none is named.
 
+Scenes of the gallery go to ``models/gallery/references`` as ``gallery/NAME``; some are executions that slide along a
+surface, and solve the completed model.
+
 Each is solved in eighty digits from equations written by hand: by formula, or by Taylor series of order 40 with steps
 and half steps (`references.by_series`). A solution by series is written only if the relaxed scheme, refined by
 `hsdsl.exact.precise` from the model's file, agrees to nine digits.
@@ -23,6 +26,7 @@ from hsdsl.execution import Execution  # noqa: E402
 from references.bouncing_ball import bouncing_ball  # noqa: E402
 from references.constrained_pendulum import constrained_pendulum  # noqa: E402
 from references.digital_control import digital_control  # noqa: E402
+from references.gallery import GALLERY  # noqa: E402
 from references.oscillators import oscillator  # noqa: E402
 from references.pronking_runner import pronking_runner  # noqa: E402
 from references.stiff_switch import stiff_switch  # noqa: E402
@@ -68,7 +72,16 @@ def main(names: list[str]) -> None:
             if not names or stem in names:
                 run = solved(name, block)
                 run.save(STORED / f"{stem}.npz")
-                print(f"{stem}.npz: error {run.settings['error']:.2g}, {run.settings['source']}", flush=True)
+                _report(f"{stem}.npz", run)
+    for name, solve in GALLERY.items():
+        if not names or f"gallery/{name}" in names:
+            run = solve()
+            run.save(MODELS / "gallery" / "references" / f"{name}.npz")
+            _report(f"gallery/{name}.npz", run)
+
+
+def _report(file: str, run: Execution) -> None:
+    print(f"{file}: error {run.settings['error']:.2g}, {run.settings['source']}", flush=True)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ OPERATORS: dict[type, Any] = {
     ast.UAdd: operator.pos,
 }
 FUNCTIONS = {"sqrt": mp.sqrt, "log": mp.log, "exp": mp.exp, "sin": mp.sin, "cos": mp.cos, "acos": mp.acos}
+FUNCTIONS |= {"asin": mp.asin, "atan": mp.atan}
 
 
 def evaluate(text: Any, names: Mapping[str, Any] | None = None) -> mp.mpf:

@@ -1,0 +1,99 @@
+"""The runs of a scene: our schemes, methods and engines, and peers, each with its settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from gallery.scenes import UNDECIDED, Entry
+from hsdsl.chart import PEERS, Refused
+from hsdsl.chart.outcome import Outcome, Tolerance, outcome
+from hsdsl.chart.peers import prepare
+from hsdsl.chart.plan import relaxation
+from hsdsl.chart.result import Result
+from hsdsl.chart.scene import sampled
+from hsdsl.errors import UsageError
+from hsdsl.integrators import METHODS
+from hsdsl.model.options import OWN_FORMULA
+from hsdsl.simulate import SCHEMES
+
+WITHIN = Tolerance(state=0.05, time=0.005)  # of a right result
+TOLERANCES = (1e-6, 1e-9)
+STEPS = (1e-3, 1e-4)  # of the run
+MOST = 100_000  # transitions
+ENGINES = ("c", "python")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A tool with its settings; ``step`` is a share of the run, and peers have no scheme, method and step."""
+
+    tool: str
+    scheme: str = ""
+    method: str = ""
+    tolerance: float | None = None
+    step: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Tool, scheme and method."""
+        return " ".join(filter(None, (self.tool, self.scheme, self.method)))
+
+    @property
+    def size(self) -> str:
+        """Its tolerance or step."""
+        return f"tolerance {self.tolerance:.0e}" if self.tolerance else f"step {self.step:.0e} of the run"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+
+def own_settings(engines: tuple[str, ...] = ENGINES) -> Iterator[Setting]:
+    """Every scheme, method and engine of ours."""
+    for scheme in SCHEMES:
+        for method in ("",) if scheme in OWN_FORMULA else METHODS:
+            for engine in engines:
+                base = Setting(f"hsdsl {engine}", scheme, method)
+                if method and METHODS[method].adaptive:
+                    yield from (replace(base, tolerance=value) for value in TOLERANCES)
+                else:
+                    yield from (replace(base, step=value) for value in STEPS)
+
+
+def peer_settings() -> Iterator[Setting]:
+    """Every peer, installed or not."""
+    for name in PEERS:
+        yield from (Setting(name, tolerance=value) for value in TOLERANCES)
+
+
+def run(entry: Entry, setting: Setting) -> Outcome:
+    """Run a scene with a tool and judge what comes."""
+    try:
+        found = _own(entry, setting) if setting.tool.startswith("hsdsl") else _peer(entry, setting)
+    except (Refused, UsageError) as refusal:
+        return Outcome("refuses", str(refusal))
+    if entry.name in UNDECIDED and found.word == "right" and found.verdict not in ("left", "unknown"):
+        return replace(found, word="wrong", why="gives one of two executions and does not say so")
+    return found
+
+
+def _own(entry: Entry, setting: Setting) -> Outcome:
+    scene = entry.scene
+    options: dict[str, Any] = {"scheme": setting.scheme, "method": setting.method or None}
+    value = setting.tolerance or (setting.step or 0) * entry.until
+    options |= {"tolerance" if setting.tolerance else "step": value}
+    if setting.scheme == "relaxed":
+        options["relaxation"] = relaxation(setting.method, setting.tolerance or setting.step or 0) * min(1, entry.until)
+    engine = setting.tool.removeprefix("hsdsl ")
+    run = entry.model.simulate(**options, engine=engine, max_transitions=MOST)
+    values, modes = sampled(run, scene.grid, scene.states)
+    problem = None if run.stop.complete else f"{run.stop.reason}: {run.stop.message}"
+    result = Result(values, modes, lambda: run.made, problem, run)
+    return outcome(scene, result, WITHIN, run.estimated().verdict)
+
+
+def _peer(entry: Entry, setting: Setting) -> Outcome:
+    assert setting.tolerance is not None
+    return outcome(entry.scene, prepare(setting.tool, entry.scene)(setting.tolerance), WITHIN)
