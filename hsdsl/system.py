@@ -72,7 +72,8 @@ class Edge:
     """A transition: its surface, condition and reset.
 
     ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
-    ``target_states`` are the target mode's states, or the source's where the target is final without a flow.
+    ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
+    ``derived`` of them are derivatives of others.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Edge:
     reset: tuple[sp.Expr, ...]
     reset_texts: tuple[str, ...]
     priority: int = 0
+    derived: int = 0
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
@@ -111,7 +113,8 @@ class Mode:
 
     ``outputs`` has one entry for each output of the system, None where the mode does not define it. ``scene`` likewise
     has the numbers of the system's shapes, one shape behind the other.
-    A final mode without flow has ``states == ()`` here: it has the states it is entered with.
+    A final mode without flow has ``states == ()`` here: it has the states it is entered with. The last ``derived``
+    states are derivatives of the others: no surface or condition depends on them, and their flow is linear in them.
     """
 
     name: str
@@ -123,6 +126,7 @@ class Mode:
     outputs: tuple[sp.Expr | None, ...]
     final: bool = False
     scene: tuple[sp.Expr | None, ...] = ()
+    derived: int = 0
 
     def __post_init__(self) -> None:
         if not len(self.states) == len(self.flow) == len(self.flow_texts):

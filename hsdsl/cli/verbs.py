@@ -17,7 +17,9 @@ from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED, WORD
 from hsdsl.names import did_you_mean, visible
 
-VERBS = ("run", "validate", "lint", "explain", "distance", "chart", "export", "import", "schema", "doctor")
+VERBS = (
+    "run", "validate", "lint", "explain", "distance", "sensitivity", "chart", "export", "import", "schema", "doctor",
+)  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.errors import UsageError
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.records import Deferred, same
 from hsdsl.execution.samples import Samples
@@ -46,6 +47,8 @@ class Execution(Deferred):
         also where steps are fixed; without it the verdict stays what it is.
     repetition : callable or None
         ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.refinement`).
+    differentiation : callable or None
+        ``differentiation(wrt) -> Sensitivity``: its derivatives.
     """
 
     model: str
@@ -73,6 +76,7 @@ class Execution(Deferred):
     sampler: Sampler | None = field(default=None, compare=False)
     assessment: Assessment | None = field(default=None, compare=False)
     repetition: Callable[[Execution], Execution] | None = field(default=None, compare=False)
+    differentiation: Callable[[Any], Any] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
@@ -112,6 +116,7 @@ class Execution(Deferred):
             "sampler": None,
             "assessment": None,
             "repetition": None,
+            "differentiation": None,
         }
 
     def __repr__(self) -> str:
@@ -160,6 +165,18 @@ class Execution(Deferred):
         if self.assessment is None:
             return self
         return replace(self, verdict=self.assessment(self, True))
+
+    def sensitivity(self, wrt: str | Sequence[str]) -> Any:
+        """Return the derivatives of this run by parameters and initial states (see `Model.sensitivity`).
+
+        Raises
+        ------
+        UsageError
+            The run was read from a file, or a name is unknown.
+        """
+        if self.differentiation is None:
+            raise UsageError("an execution that was read from a file has no model to differentiate")
+        return self.differentiation(wrt)
 
     def __call__(self, t: Any, side: Side = "right") -> Point:
         """Return the execution's value at a time.

@@ -177,12 +177,18 @@ class _Mode:
         return not slopes.statements and not any(slope.free_symbols & own for slope in slopes.sparse[0].values())
 
     def _jacobian(self) -> lowered.Jacobian:
-        slopes = Gradient(self.flow, self.states)
+        """The derivatives of the flow; of derived states by derived ones alone: the others would be second ones."""
+        own, width = len(self.states) - self.mode.derived, len(self.states)
+        parts = (
+            (0, Gradient(self.flow[:own], self.states)),
+            (own, Gradient(self.flow[own:], self.states[own:], letter="h")),
+        )
         column = {state: i for i, state in enumerate(self.states)}
-        places = [k * len(self.states) + column[state] for k, row in enumerate(slopes.sparse) for state in row]
-        values = tuple(slope for row in slopes.sparse for slope in row.values())
-        definition = Definition("jacobian", self.arguments, values, slopes.statements)
-        return lowered.Jacobian(print_routines((definition,), self.names.data), tuple(places))
+        rows = [(k, row) for first, part in parts for k, row in enumerate(part.sparse, first)]
+        places = tuple(k * width + column[state] for k, row in rows for state in row)
+        values = tuple(slope for _, row in rows for slope in row.values())
+        definition = Definition("jacobian", self.arguments, values, [s for _, part in parts for s in part.statements])
+        return lowered.Jacobian(print_routines((definition,), self.names.data), places)
 
     def _diagnosis(self, expressions):
         places = {argument: i for i, argument in enumerate(self.arguments)}
@@ -211,8 +217,10 @@ class _Mode:
         for k, edge in enumerate(mode.edges):
             reset = self.place(edge.reset)
             yield Definition(f"reset_{k}", arguments, reset)
-            changes = Gradient(reset, self.states)
-            spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=True))
+            own = len(reset) - edge.derived
+            changes = Gradient(reset[:own], self.states)
+            spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=False))
+            spreads += tuple(map(absolute, reset[own:]))
             yield Definition(f"spread_{k}", (*arguments, *scales.values()), spreads, changes.statements)
 
 

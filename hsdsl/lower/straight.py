@@ -103,10 +103,10 @@ class Gradient:
     where the expressions are small.
     """
 
-    def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> None:
+    def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol], letter: str = "g") -> None:
         self._arguments = arguments
         self._order = {argument: i for i, argument in enumerate(arguments)}
-        self._cut = Cut("g")
+        self._cut = Cut(letter)
         small = [self._cut.down(e) for e in expressions]
         self._slopes: dict[sp.Symbol, dict[sp.Symbol, sp.Expr]] = {}
         for symbol, expr in tuple(self._cut.statements):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,10 @@ from hsdsl.simulate.recorder import Progress
 
 if TYPE_CHECKING:
     from hsdsl.metrics.points import PointDistance, SpacePoint
+    from hsdsl.model.differentiate import Differentiator
     from hsdsl.model.estimate import Estimate
     from hsdsl.model.stream import Streamed
+    from hsdsl.sensitivity.result import Sensitivity
     from hsdsl.system import HybridSystem
 
 MOST_PREPARED = 16
@@ -66,6 +69,12 @@ class Model:
         self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
         self._smaller: dict[tuple[str, ...], Model] = {}
         self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
+
+    @cached_property
+    def _differentiator(self) -> Differentiator:
+        from hsdsl.model.differentiate import Differentiator
+
+        return Differentiator(self.pipeline)
 
     def __reduce__(self) -> tuple[type[Model], tuple[Pipeline]]:
         return type(self), (self.pipeline,)
@@ -160,7 +169,12 @@ class Model:
         if ready is None:
             ready = self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True)))
             self._prepared.keep(key, ready)
-        return ready.simulate(watch, self.pipeline.seconds)
+        run = ready.simulate(watch, self.pipeline.seconds)
+        run.__dict__["differentiation"] = partial(self._differentiate, arguments)
+        return run
+
+    def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
+        return self._differentiator.of_run(dict(zip(ARGUMENTS, arguments, strict=True)), wrt)
 
     def _reduced_run(
         self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
@@ -173,6 +187,23 @@ class Model:
                 name: value for name, value in overrides_of(arguments, group).items() if name not in gone
             }
         return smaller.simulate(**arguments, watch=watch)
+
+    def sensitivity(self, wrt: str | Sequence[str], **arguments: Any) -> Sensitivity:
+        """Derivatives of a run's end, transition times, states and outputs, through its jumps.
+
+        They are those of the located execution, whose variational equations and saltation matrices are computed along
+        with it.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str
+            Parameters by name and initial states as ``initial.NAME``; a text may have several, with commas.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step`` and ``outputs``. The scheme is ``located``.
+
+        Raises UsageError: an unknown name, or an argument that cannot be served.
+        """
+        return self._differentiator.sensitivity(wrt, arguments)
 
     def stream(
         self,

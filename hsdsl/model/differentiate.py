@@ -1,0 +1,162 @@
+"""Sensitivities of a model's executions: the augmented system of a call, prepared and run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from hsdsl.arithmetic import Number
+from hsdsl.defaults import DEFAULT_TOLERANCE
+from hsdsl.integrators import AUTO, METHODS
+from hsdsl.model.call_cache import CallCache, call_key
+from hsdsl.model.options import check_arguments, overrides_of
+from hsdsl.model.pipeline import Pipeline
+from hsdsl.model.settings import arithmetic_of
+from hsdsl.model.values import Values, initial_layout, with_parameters
+from hsdsl.sensitivity.names import Target, targets
+from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
+from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
+from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
+
+if TYPE_CHECKING:
+    from hsdsl.sensitivity.overrides import Overridden
+
+FINEST = 1e-12  # the tolerance of methods of high order: finer than that of most runs, and cheap
+SERIES, FINE = "taylor", "dop853"  # these methods; the latter where `auto` is the method of kinked flows
+REFUSED = ("step", "scheme")
+
+
+class Differentiator:
+    """Augmented systems of one model, and runs of them that are ready."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self._augmented: dict[Any, Pipeline] = {}
+        self._prepared: CallCache[_Ready] = CallCache(16)
+
+    def sensitivity(
+        self, wrt: str | Sequence[str], arguments: Mapping[str, Any], firsts: Sequence[str] = ()
+    ) -> Sensitivity:
+        """The sensitivities of a run of `Model.simulate` with these arguments.
+
+        In ties an edge in ``firsts`` goes first.
+        """
+        check_arguments(arguments, "a sensitivity", REFUSED)
+        key = call_key(wrt if isinstance(wrt, str) else tuple(wrt), tuple(firsts), dict(arguments))
+        ready = self._prepared.find(key)
+        if ready is None:
+            ready = self._ready(wrt, arguments, tuple(firsts))
+            self._prepared.keep(key, ready)
+        run = ready.setting.augmented.simulate()
+        if not ready.entries and (run.stop.reason == "not_finite" or any(made.entry for made in run.transitions)):
+            ready = self._with_entries(ready)
+            self._prepared.keep(key, ready)
+            run = ready.setting.augmented.simulate()
+        return Sensitivity(
+            tuple(t.label for t in ready.by),
+            run,
+            ready.setting,
+            tuple(firsts),
+            lambda first: self.sensitivity(wrt, arguments, first),
+        )
+
+    def of_run(self, arguments: Mapping[str, Any], wrt: str | Sequence[str]) -> Sensitivity:
+        """The sensitivities of a run that was made with these arguments, of any scheme and with any steps."""
+        kept = {name: value for name, value in arguments.items() if name not in ("step", "scheme", "outputs")}
+        method = METHODS.get(str(kept.get("method")))
+        if method is not None and not method.adaptive:
+            del kept["method"]
+        return self.sensitivity(wrt, kept)
+
+    def _ready(self, wrt: str | Sequence[str], arguments: Mapping[str, Any], firsts: tuple[str, ...]) -> _Ready:
+        from hsdsl.sensitivity.overrides import overridden
+
+        call = _located(self.pipeline, arguments)
+        plain = self.pipeline.prepare(call)
+        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
+        by = targets(wrt, self.pipeline.program, initial_layout(values, initial)[1])
+        given: dict[str, Any] = dict(call.get("settings") or {})
+        experiment = {k: given.get(k) if call.get(k) is None else call[k] for k in ("until", "samples")}
+        change = overridden(self.pipeline.system, parameters, initial, experiment)
+        span, samples = moving_times(change, by, values)
+        setting = Setting(plain, plain, self.pipeline.program.outputs, span, samples)
+        return self._prepare(_Ready(by, change, call, setting, firsts, entries=False))
+
+    def _with_entries(self, ready: _Ready) -> _Ready:
+        return self._prepare(replace(ready, entries=True))
+
+    def _prepare(self, ready: _Ready) -> _Ready:
+        """Prepare the run of the augmented system with the numbers and the method of the plain one."""
+        key = (ready.by, ready.entries, ready.firsts, ready.change.structure)
+        if key not in self._augmented:
+            from hsdsl.sensitivity.augment import augmented, preferring
+
+            system = preferring(augmented(ready.change, ready.by, ready.entries), ready.firsts)
+            self._augmented[key] = Pipeline(system)
+        settings, arithmetic = ready.setting.plain.settings, ready.setting.plain.arithmetic
+        tolerance = settings.tolerance
+        assert settings.method is not None and tolerance is not None
+        method = settings.method.name
+        if method == AUTO and settings.method_chosen is not None and arithmetic.digits is None:
+            method = FINE
+        if method in (SERIES, FINE):
+            tolerance = max(min(tolerance, FINEST), 4 * arithmetic.unit)
+        numbers: dict[str, Number] = {
+            UNIT: arithmetic.unit,
+            SPAN: settings.until,
+            ERROR: ROUNDOFF_UNITS * arithmetic.unit + 10 * tolerance,
+        }
+        arguments = {
+            "until": settings.until,
+            "scheme": "located",
+            "method": method,
+            "tolerance": tolerance,
+            "relaxation": settings.relaxation,
+            "scale": dict(settings.scale),
+            "max_transitions": settings.max_transitions,
+            "parameters": ready.change.parameters | numbers,
+            "initial": ready.change.initial,
+            "engine": ready.call.get("engine") or "auto",
+            "precision": ready.call.get("precision"),
+        }
+        prepared = self._augmented[key].prepare(arguments)
+        return replace(ready, setting=replace(ready.setting, augmented=prepared))
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """A sensitivity as far as the arguments of its call decide it."""
+
+    by: tuple[Target, ...]
+    change: Overridden
+    call: dict[str, Any]
+    setting: Setting
+    firsts: tuple[str, ...]
+    entries: bool
+
+
+def _located(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of a located run with a tolerance: what a file or `--set` says of steps is for other runs."""
+    call = {name: value for name, value in arguments.items() if value is not None} | {"scheme": "located"}
+    given: Mapping[str, Any] = arguments.get("settings") or {}
+    settings = {name: value for name, value in given.items() if name not in ("step", "scheme")}
+    call["settings"] = settings
+    if "tolerance" not in call and pipeline.resolve(settings, {"scheme": "located"}).size == "step":
+        call["tolerance"] = DEFAULT_TOLERANCE
+    return call
+
+
+def moving_times(change: Overridden, by: Sequence[Target], values: Values) -> tuple[Slopes, list[Slopes]]:
+    """The derivatives of ``until`` and of the sample times."""
+    from hsdsl.sensitivity.overrides import time_slopes
+
+    until, samples = time_slopes(change, by)
+    expressions = {f"slope_{i}_{k}": e for i, row in enumerate((until, *samples)) for k, e in enumerate(row)}
+    if not any(expressions.values()):
+        numbers = dict.fromkeys(expressions, values.kernel.arithmetic.zero)
+    else:
+        numbers = values.evaluate(expressions)
+    rows = [{t.label: numbers[f"slope_{i}_{k}"] for k, t in enumerate(by)} for i in range(1 + len(samples))]
+    return rows[0], rows[1:]

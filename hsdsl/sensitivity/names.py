@@ -1,0 +1,46 @@
+"""What a derivative is taken by: a parameter, or the initial value of a state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hsdsl.errors import UsageError
+from hsdsl.names import did_you_mean
+from hsdsl.program import Program
+
+INITIAL = "initial."
+
+
+@dataclass(frozen=True)
+class Target:
+    """A parameter, or with ``initial`` the initial value of a state; ``label`` is how it is written."""
+
+    label: str
+    name: str
+    initial: bool
+
+
+def targets(wrt: str | Sequence[str], program: Program, states: Sequence[str]) -> tuple[Target, ...]:
+    """Read names such as ``c`` and ``initial.v``, in a text with commas or one by one; ``states`` are the initial ones.
+
+    Raises UsageError: a name that is neither, or none at all.
+    """
+    given = wrt.split(",") if isinstance(wrt, str) else wrt
+    labels = list(dict.fromkeys(str(name).strip() for name in given if str(name).strip()))
+    if not labels:
+        raise UsageError("expected names to differentiate by, got none", "for example c or initial.v")
+    return tuple(_target(label, program, states) for label in labels)
+
+
+def _target(label: str, program: Program, states: Sequence[str]) -> Target:
+    if label in program.parameters:
+        return Target(label, label, False)
+    name = label.removeprefix(INITIAL)
+    if name != label and name in states:
+        return Target(label, name, True)
+    known = [*program.parameters, *(INITIAL + state for state in states)]
+    hint = f"did you mean '{INITIAL}{label}'?" if label in states else did_you_mean(label, known)
+    if label in (given.name for given in program.inputs):
+        hint = "an input is no number; differentiate by a parameter that its expression or samples depend on"
+    raise UsageError(f"the model has no parameter or initial state '{label}'", hint)

@@ -1,0 +1,263 @@
+"""The derivatives of an execution: read off the execution of an augmented system, as numbers by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution, Transition, Verdict
+from hsdsl.sensitivity.state_names import derivative_name, rate_name, shift_name
+from hsdsl.sensitivity.ties import Tie, ties
+from hsdsl.simulate import Prepared
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.run_view import RunView
+
+Slopes = dict[str, Any]  # a derivative by each of what it was taken by
+
+
+@dataclass(frozen=True)
+class TransitionSlopes:
+    """The derivatives of a transition: of its ``time``, and of the states recorded ``before`` and ``after`` it."""
+
+    index: int
+    edge: str
+    time: Slopes
+    before: dict[str, Slopes]
+    after: dict[str, Slopes]
+
+
+@dataclass(frozen=True)
+class EndSlopes:
+    """The derivatives of the end of a run: of its ``time``, and of the states and outputs there."""
+
+    mode: str
+    time: Slopes
+    state: dict[str, Slopes]
+    outputs: dict[str, Slopes]
+
+
+@dataclass(frozen=True)
+class SampleSlopes:
+    """States and outputs at times, and their derivatives.
+
+    ``values[name]`` has shape (n,), and ``slopes[name]`` (n, number of what they are taken by), NaN where the mode has
+    no such state or the derivative does not exist.
+    """
+
+    times: Array
+    values: dict[str, Array]
+    slopes: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a sensitivity was computed of: the run without derivatives, ready to be made, and what moves with a target.
+
+    ``span`` has the derivatives of ``until``, and ``samples`` those of each sample time; empty where none moves.
+    """
+
+    plain: Prepared
+    augmented: Prepared
+    output_names: tuple[str, ...]
+    span: Slopes
+    samples: Sequence[Slopes]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """The derivatives of an execution by parameters and initial states.
+
+    They are those of what a run records: where the time of a transition moves, the states before and after it are
+    followed to the new time, and so is the end where ``until`` depends on a parameter. Samples are followed where their
+    times do. A derivative that does not exist is NaN; :attr:`reasons` say why.
+
+    Attributes
+    ----------
+    wrt : tuple of str
+        What the derivatives are taken by, as ``c`` or ``initial.v``.
+    execution : Execution
+        The run of the system with the derivatives as states.
+    first : tuple of str
+        Edges that go first in ties: the derivatives are those of the executions on that side.
+    """
+
+    wrt: tuple[str, ...]
+    execution: Execution = field(repr=False)
+    setting: Setting = field(repr=False)
+    first: tuple[str, ...]
+    one_sided: Callable[[Sequence[str]], Sensitivity] = field(repr=False)
+
+    @cached_property
+    def run(self) -> Execution:
+        """The execution itself."""
+        return self.setting.plain.simulate()
+
+    @property
+    def verdict(self) -> Verdict:
+        """What can be said about the execution; where it is not ``holds`` a derivative may not exist."""
+        return self.run.verdict
+
+    @cached_property
+    def ties(self) -> tuple[Tie, ...]:
+        """The instants where the order of transitions may matter, with the derivatives of each order."""
+        return tuple(ties(RunView(self.setting.augmented, self.execution), self.wrt))
+
+    @cached_property
+    def sides(self) -> dict[str, Sensitivity]:
+        """The derivatives of the executions on either side of a tie, by the edge that goes first in all of them."""
+        firsts = dict.fromkeys(order.first for tie in self._parting for order in tie.orders)
+        return {first: self.one_sided((*self.first, first)) for first in firsts}
+
+    @cached_property
+    def _parting(self) -> tuple[Tie, ...]:
+        """The ties whose orders have different derivatives, but those where it is known which goes first."""
+        made = self.execution.transitions
+        return tuple(tie for tie in self.ties if tie.reason and made[tie.index].edge not in self.first)
+
+    @cached_property
+    def breaks(self) -> tuple[tuple[Any, str], ...]:
+        """Times from which on no derivative exists, and why; the verdict of the run has not been looked at."""
+        found = [(tie.time, str(tie.reason)) for tie in self._parting]
+        stop = self.execution.stop
+        if stop.reason == "not_finite":
+            sentence = f"at t = {show(stop.time)} a guard is reached at rate zero within the error of the run"
+            found.append((stop.time, f"{sentence}, or what it leads to has no derivative"))
+        elif not stop.complete and stop.reason != "left_domain":
+            found.append((stop.time, f"the run ends there ({stop.reason}): {stop.message}"))
+        return tuple(sorted(found, key=lambda found: found[0]))
+
+    @property
+    def exists(self) -> bool | None:
+        """Whether the derivatives exist; None where the run's verdict is ``unknown``."""
+        if self.breaks or self.verdict.theorem == "left":
+            return False
+        return True if self.verdict.theorem == "holds" else None
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why they do not exist, or are not known to."""
+        own = tuple(reason for _, reason in self.breaks)
+        return own if self.verdict.theorem == "holds" else (*own, *self.verdict.reasons)
+
+    def _exists_at(self, index: int) -> bool:
+        """Whether the derivatives of a transition exist."""
+        return not any(tie.index <= index for tie in self._parting)
+
+    @cached_property
+    def final(self) -> EndSlopes:
+        """The derivatives of the end of the run."""
+        run, end = self.execution, self.execution.final
+        by_event = run.stop.reason == "final" and bool(run.transitions)
+        time = self._shifts(end.state) if by_event else self.setting.span
+        exists = not self.breaks
+        state = self._followed(end.mode, end.time, end.state, time, True)
+        outputs = {y: self._output(y, end.outputs, time) for y in self.setting.output_names}
+        return EndSlopes(
+            end.mode,
+            self._known(time, exists),
+            {x: self._known(row, exists) for x, row in state.items()},
+            {y: self._known(row, exists) for y, row in outputs.items()},
+        )
+
+    @cached_property
+    def transitions(self) -> tuple[TransitionSlopes, ...]:
+        """The derivatives of every transition."""
+        return tuple(self._transition(made) for made in self.execution.transitions)
+
+    def _transition(self, made: Transition) -> TransitionSlopes:
+        after, exists = made.after or {}, self._exists_at(made.index)
+        time = self._shifts(after)
+        before = self._followed(made.source, made.time, made.before, time, False)
+        reached = self._followed(made.target, made.time, after, time, True)
+        return TransitionSlopes(
+            made.index,
+            made.edge,
+            self._known(time, exists),
+            {x: self._known(row, exists) for x, row in before.items()},
+            {x: self._known(row, exists) for x, row in reached.items()},
+        )
+
+    def _known(self, row: Slopes, exists: bool) -> Slopes:
+        return row if exists else dict.fromkeys(row, float("nan"))
+
+    def own(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The states of the model among those of an augmented mode: they come first."""
+        return names[: (len(names) - len(self.wrt)) // (1 + len(self.wrt))]
+
+    def _shifts(self, state: Mapping[str, Any]) -> Slopes:
+        return {by: state[shift_name(by)] for by in self.wrt}
+
+    def _followed(self, mode: str, t: Any, state: Mapping[str, Any], time: Slopes, after: bool) -> dict[str, Slopes]:
+        """The derivatives of states at a time that moves: S + f T."""
+        names = self.own(tuple(state))
+        found = {x: {by: state[derivative_name(x, by)] for by in self.wrt} for x in names}
+        if not any(moves != 0 for moves in time.values()):
+            return found
+        slope = self._flow(mode, t, [state[x] for x in names], after)
+        return {x: {by: row[by] + f * time[by] for by in row} for (x, row), f in zip(found.items(), slope, strict=True)}
+
+    def _flow(self, mode: str, t: Any, x: Sequence[Any], after: bool) -> Sequence[Any]:
+        """The flow of a mode, with the inputs right before or after a time; that of a mode without one is zero."""
+        plain = self.setting.plain
+        index = next(k for k, each in enumerate(plain.program.modes) if each.name == mode)
+        if not plain.program.modes[index].states:
+            return [0] * len(x)
+        segments = plain.timeline.segments
+        earlier = [s for s in segments if s.start < t or s is segments[0]]
+        segment = plain.timeline.at(t) if after else earlier[-1]
+        return plain.kernel.bind(index, segment.data).flow(t, *x)
+
+    def _output(self, y: str, values: Mapping[str, Any], time: Slopes) -> Slopes:
+        return {
+            by: values[derivative_name(y, by)] + (values[rate_name(y)] * time[by] if time[by] else 0) for by in self.wrt
+        }
+
+    def sample(self, times: Any = None) -> SampleSlopes:
+        """States, outputs and their derivatives at times.
+
+        Parameters
+        ----------
+        times : numbers, optional
+            Times within the run, which stay where they are; left out, those of the run's ``samples``, or else of its
+            steps.
+        """
+        run, moving = self.execution, self.setting.samples if times is None else ()
+        given = self.setting.plain.settings.samples if times is None else None
+        if times is None and given is None:
+            times = np.unique(np.asarray(run.times))
+        elif times is None:
+            end, last = self.setting.plain.settings.until, run.times[-1]
+            listed = [end * k / (given - 1) for k in range(given)] if isinstance(given, int) else list(given or ())
+            times = np.array([t for t in listed if t <= last])
+        table = run.sample(times)
+        names = [*self._all_states(), *self.setting.output_names]
+        broken = min((when for when, _ in self.breaks), default=None)
+        slopes: dict[str, Array] = {}
+        for name in names:
+            slopes[name] = np.stack([table[derivative_name(name, by)] for by in self.wrt], axis=-1)
+            if any(any(row.values()) for row in moving):
+                rates = self._rates(name, table)
+                shift = np.array([[row[by] for by in self.wrt] for row in moving[: len(rates)]])
+                slopes[name] = slopes[name] + rates[:, None] * shift
+            if broken is not None:
+                slopes[name][np.asarray(table.time) >= broken] = np.nan
+        return SampleSlopes(np.asarray(table.time), {name: table[name] for name in names}, slopes)
+
+    def _rates(self, name: str, table: Any) -> Array:
+        """The derivative of a state or output by time, at samples."""
+        if name in self.setting.output_names:
+            return table[rate_name(name)]
+        rates: list[Any] = []
+        for t, mode, row in zip(table.time.tolist(), table.mode.tolist(), range(len(table)), strict=True):
+            index = next(k for k, each in enumerate(self.setting.plain.program.modes) if each.name == mode)
+            states = self.setting.plain.program.modes[index].states
+            x = [table[state][row] for state in states]
+            rates.append(self._flow(mode, t, x, True)[states.index(name)] if name in states else float("nan"))
+        return np.array(rates)
+
+    def _all_states(self) -> Iterator[str]:
+        yield from dict.fromkeys(x for arc in self.execution.arcs for x in self.own(arc.states))

@@ -1,0 +1,22 @@
+"""The names of states, outputs and parameters that an augmented system has besides those of its model.
+
+A model's names are identifiers, and none of these is.
+"""
+
+UNIT, SPAN, ERROR = "unit round-off", "length of the run", "error of the run"  # parameters, given by numbers
+LAST = "time of the last transition"
+
+
+def derivative_name(state: str, by: str) -> str:
+    """The derivative of a state or output."""
+    return f"d {state} / d {by}"
+
+
+def rate_name(output: str) -> str:
+    """The derivative of an output along the flow."""
+    return f"d {output} / d t"
+
+
+def shift_name(by: str) -> str:
+    """The derivative of the time of the last transition."""
+    return f"d time / d {by}"

@@ -1,0 +1,122 @@
+"""Instants at which a derivative depends on the order of transitions: what each order leads to.
+
+Where several guards are reached together, a nearby execution reaches one of them first; which one depends on the way
+in which it differs. Each of them is taken first in turn, then what fires at that instant. Where all orders lead to the
+same point with the same derivatives, these are those of the execution. Otherwise each order has its own, for the
+executions on its side (S. A. Burden, S. S. Sastry, D. E. Koditschek, S. Revzen, Event-selected vector field
+discontinuities yield piecewise-differentiable flows, SIAM Journal on Applied Dynamical Systems 15, 2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Transition
+from hsdsl.sensitivity.state_names import derivative_name, shift_name
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.commutation import settle
+from hsdsl.simulate.verdict.run_view import RunView
+
+Slopes = dict[str, Number]
+
+
+@dataclass(frozen=True)
+class Order:
+    """One order of tied transitions: the edge that goes first, the mode and state that it leads to, and its slopes.
+
+    ``slopes`` are the derivatives of these states at a fixed time, right after the instant.
+    """
+
+    first: str
+    mode: str
+    state: dict[str, Number]
+    slopes: dict[str, Slopes]
+
+
+@dataclass(frozen=True)
+class Tie:
+    """An instant with several orders. ``reason`` says why no derivative exists there; None where all orders agree."""
+
+    time: Number
+    index: int
+    orders: tuple[Order, ...]
+    reason: str | None
+
+
+def ties(run: RunView, wrt: Sequence[str]) -> Iterator[Tie]:
+    """Look at every instant of an augmented run where guards are reached together, or one is landed on."""
+    last: Transition | None = None
+    tied_at: Number | None = None
+    for made in run.transitions:
+        tie = run.tie(made.time)
+        if made.alternatives and not made.entry:
+            yield _tie(run, made, wrt)
+            tied_at = made.time
+        elif tied_at is not None and made.time - tied_at <= tie:
+            pass  # a part of what the tie leads to
+        elif last is not None and made.time - last.time <= tie and not made.entry and _parts(run, last, made, wrt):
+            sentence = f"at t = {show(made.time)} {last.edge} leads onto the guard of {made.edge}"
+            yield Tie(made.time, made.index, (), f"{sentence}, and from nearby to points before or beyond it")
+        last = made
+
+
+def _tie(run: RunView, made: Transition, wrt: Sequence[str]) -> Tie:
+    place, _ = run.before(made)
+    since, names = 2 * run.tie(made.time), run.edges(made.source)
+    orders: list[Order] = []
+    for edge in (made.edge, *made.alternatives):
+        try:
+            landed = settle(run, place, names.index(edge), since)
+        except DOMAIN_ERRORS:
+            landed = None
+        if landed is not None:
+            orders.append(_order(run, edge, *landed, wrt))
+    return Tie(made.time, made.index, tuple(orders), _disagreement(run, made, orders))
+
+
+def _order(run: RunView, edge: str, mode: str, values: Sequence[Number], wrt: Sequence[str]) -> Order:
+    program = run.problem.program.modes[run.index(mode)]
+    names = program.states or next(a.states for a in reversed(run.execution.arcs) if len(a.states) == len(values))
+    named = dict(zip(names, values, strict=True))
+    own = names[: (len(names) - len(wrt)) // (1 + len(wrt))]
+    slopes = {x: {by: named[derivative_name(x, by)] for by in wrt} for x in own}
+    return Order(edge, mode, {x: named[x] for x in own}, slopes)
+
+
+def _disagreement(run: RunView, made: Transition, orders: Sequence[Order]) -> str | None:
+    tied = " and ".join((made.edge, *made.alternatives))
+    together = f"at t = {show(made.time)} {tied} are reached together"
+    if len(orders) <= len(made.alternatives):
+        return f"{together}, and not every order of them has an end"
+    first = orders[0]
+    if any(other.mode != first.mode for other in orders):
+        return f"{together}, and lead to different modes, by their order"
+    if not all(_same(run, other.state, first.state) for other in orders):
+        return f"{together}, and lead to different states, by their order"
+    for by in first.slopes[next(iter(first.slopes))] if first.slopes else ():
+        columns = [{derivative_name(x, by): row[by] for x, row in order.slopes.items()} for order in orders]
+        if not all(_same(run, column, columns[0]) for column in columns):
+            return f"{together}, and the derivatives by {by} depend on their order"
+    return None
+
+
+def _same(run: RunView, one: dict[str, Number], other: dict[str, Number]) -> bool:
+    """Whether numbers agree to half of their digits, relative to the largest that each has in the run."""
+    least = run.arithmetic.sqrt(run.arithmetic.unit)
+    return all(
+        abs(a - b) <= least * max(abs(a), abs(b), run.sizes.get(x, 0.0))
+        for (x, a), b in zip(one.items(), other.values(), strict=True)
+    )
+
+
+def _parts(run: RunView, last: Transition, made: Transition, wrt: Sequence[str]) -> bool:
+    """Whether a guard that is landed on is not landed on from nearby: then both transitions move differently."""
+    before, after = last.after or {}, made.after or {}
+    least = run.arithmetic.sqrt(run.arithmetic.unit)
+    for name in map(shift_name, wrt):
+        a, b = before.get(name, 0), after.get(name, 0)
+        if abs(a - b) > least * max(abs(a), abs(b), run.sizes.get(name, 0.0)):
+            return True
+    return False

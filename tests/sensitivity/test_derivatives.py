@@ -1,0 +1,273 @@
+"""Derivatives of runs, against differences of runs of fifty digits and against exact ones."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import yaml
+
+import hsdsl
+from hsdsl import UsageError
+from hsdsl.arithmetic import multiprecision
+from hsdsl.model.values import with_parameters
+from hsdsl.store.npz import load
+
+MODELS = yaml.safe_load((Path(__file__).parent / "models.yaml").read_text())
+DIGITS, STEP = 50, Fraction(1, 10**14)
+OSCILLATOR = "models/oscillator-with-stop-1.yaml"
+
+
+def recorded(run: Any) -> dict[str, Any]:
+    """What a run records, by name."""
+    found = {f"time {made.index}": made.time for made in run.transitions}
+    for made in run.transitions:
+        found |= {f"after {made.index} {x}": v for x, v in made.after.items()}
+    return found | {"end": run.final.time, **run.final.state, **run.final.outputs}
+
+
+def derivatives(found: Any, by: str) -> dict[str, Any]:
+    """The same of its derivatives."""
+    rows = {f"time {made.index}": made.time for made in found.transitions}
+    for made in found.transitions:
+        rows |= {f"after {made.index} {x}": row for x, row in made.after.items()}
+    rows |= {"end": found.final.time, **found.final.state, **found.final.outputs}
+    return {name: row[by] for name, row in rows.items()}
+
+
+def difference(model: Any, by: str, **call: Any) -> dict[str, Any]:
+    """Central differences of what a run records."""
+    runs = []
+    group, _, name = by.rpartition(".")
+    kind = "initial" if group else "parameters"
+    arithmetic = multiprecision(DIGITS)
+    plain = model.simulate(precision=DIGITS, **call | {"until": 0})
+    if group:
+        value = plain.final.state[name]
+    else:
+        values = with_parameters(model.pipeline.values(arithmetic), {})
+        value = values.parameters[model.program.parameters.index(name)]
+    for way in (1, -1):
+        moved = {kind: {name: value + way * arithmetic.constant(STEP)}}
+        runs.append(recorded(model.simulate(precision=DIGITS, scheme="located", method="taylor", **moved, **call)))
+    ahead, behind = runs
+    assert ahead.keys() == behind.keys()
+    return {k: (ahead[k] - behind[k]) / (2 * arithmetic.constant(STEP)) for k in ahead}
+
+
+def assert_agree(found: Any, model: Any, **call: Any) -> None:
+    for by in found.wrt:
+        exact = difference(model, by, **call)
+        mine = derivatives(found, by)
+        assert mine.keys() == exact.keys()
+        size = max(abs(float(v)) for v in exact.values())
+        for name, value in exact.items():
+            assert abs(mine[name] - float(value)) <= 1e-10 * max(abs(float(value)), 1e-3 * size), (by, name)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_differences_of_fifty_digits(name: str) -> None:
+    case = MODELS[name]
+    model = hsdsl.loads(case["model"])
+    assert_agree(model.sensitivity(case["wrt"]), model)
+
+
+def test_oscillator() -> None:
+    model = hsdsl.load(OSCILLATOR)
+    found = model.simulate(until=3).sensitivity("c,a,omega,x_max,initial.x,initial.v")  # of a relaxed run
+    assert found.exists
+    assert_agree(found, model, until=3, tolerance="1e-36")
+
+
+def test_fifty_digits_of_a_derivative() -> None:
+    """Decay until 1/2 is reached, then from 2: everything is known."""
+    text = (
+        "hsdsl: 1\nparameters: {a: 1/3}\nmodes:\n  A: {flow: {x: -a*x}, transitions:"
+        " [{when: x <= 1/2, to: A, name: half, reset: {x: 2}}]}\ninitial: {mode: A, x: 1}\nexperiment: {until: 3}\n"
+    )
+    found = hsdsl.loads(text).sensitivity("a", precision=50)
+    with mpmath.workdps(60):
+        a = mpmath.mpf(1) / 3
+        assert abs(found.transitions[0].time["a"] + mpmath.log(2) / a**2) < mpmath.mpf("1e-38")
+        value = 2 * mpmath.exp(-3 * a + mpmath.log(2))
+        assert abs(found.final.state["x"]["a"] + 3 * value) < mpmath.mpf("1e-38")
+
+
+def test_samples() -> None:
+    model = hsdsl.loads(MODELS["end"]["model"])
+    table = model.sensitivity("T", samples=5).sample()
+    late, early = (model.simulate(samples=5, parameters={"T": 2 + d}) for d in (1e-5, -1e-5))
+    for name in ("x", "v", "E"):
+        slope = (late.sample(late.sample_times)[name] - early.sample(early.sample_times)[name]) / 2e-5
+        assert np.allclose(table.slopes[name][:, 0], slope, rtol=1e-6, atol=1e-6)
+    fixed = model.sensitivity("T").sample([0.5, 1])
+    assert np.array_equal(fixed.slopes["x"], np.zeros((2, 1)))
+
+
+RIGID = """
+hsdsl: 1
+parameters: {{m: 1, I: {inertia}, d: 0.5, e: 0.5, g: 9.81}}
+let: {{at_left: vz - d*cos(th)*w, at_right: vz + d*cos(th)*w, mobility: 1/m + (d*cos(th))**2/I}}
+modes:
+  air:
+    flow: {{z: vz, th: w, vz: -g, w: 0}}
+    transitions:
+      - when: z - d*sin(th) <= 0
+        if: at_left < 0
+        to: air
+        name: left
+        reset: {{vz: vz - (1 + e)*at_left/mobility/m, w: w + (1 + e)*at_left/mobility*d*cos(th)/I}}
+      - when: z + d*sin(th) <= 0
+        if: at_right < 0
+        to: air
+        name: right
+        reset: {{vz: vz - (1 + e)*at_right/mobility/m, w: w - (1 + e)*at_right/mobility*d*cos(th)/I}}
+initial: {{mode: air, z: (2**2 - 1)/(2*g), th: 0, vz: -1, w: 0}}
+experiment: {{until: 0.25}}
+"""
+STATES = ("z", "th", "vz", "w")
+
+
+def saltation(model: Any, first: str) -> np.ndarray[Any, Any]:
+    """The saltation matrix of an order: the derivatives right after a tie, without the flow before it."""
+    found = model.sensitivity([f"initial.{x}" for x in STATES])
+    (tie,) = found.ties
+    (order,) = (order for order in tie.orders if order.first == first)
+    time = tie.time
+    before = np.eye(4)
+    before[0, 2] = before[1, 3] = time
+    after = np.array([[order.slopes[x][f"initial.{y}"] for y in STATES] for x in STATES])
+    return after @ np.linalg.inv(before)
+
+
+def rigid(inertia: float) -> Any:
+    """Two rigid feet that touch down together at a speed of 2."""
+    return hsdsl.loads(RIGID.format(inertia=inertia))
+
+
+def test_feet_whose_order_matters() -> None:
+    model = rigid(0.5)
+    found = model.sensitivity("initial.th,initial.z")
+    assert found.exists is False
+    assert "lead to different states" in found.reasons[0]
+    assert np.isnan(found.final.state["z"]["initial.z"])
+    left = [
+        [-0.5, -0.25, 0, 0],
+        [0.5, -0.25, 0, 0],
+        [7.3575, 6.13125, -0.5, -0.25],
+        [-2.4525, 11.03625, 0.5, -0.25],
+    ]
+    turn = np.diag([1, -1, 1, -1])
+    assert np.allclose(saltation(model, "left"), left, atol=1e-9)
+    assert np.allclose(saltation(model, "right"), turn @ left @ turn, atol=1e-9)
+
+
+def test_feet_whose_order_does_not_matter() -> None:
+    found = rigid(0.25).sensitivity("initial.th,initial.z")
+    assert not found.breaks
+    expected = [[-0.5, 0, 0, 0], [0, -0.5, 0, 0], [7.3575, 0, -0.5, 0], [0, 7.3575, 0, -0.5]]
+    assert np.allclose(saltation(rigid(0.25), "left"), expected, atol=1e-9)
+
+
+QUADRANTS = """
+hsdsl: 1
+modes:
+  A: {flow: {x: 1, y: 1}, transitions: [{when: x >= 0, to: X, name: x first}, {when: y >= 0, to: Y, name: y first}]}
+  X: {flow: {x: 2, y: 0.5}, transitions: [{when: y >= 0, to: B}]}
+  Y: {flow: {x: 3, y: 1}, transitions: [{when: x >= 0, to: B}]}
+  B: {flow: {x: 1, y: 1}}
+initial: {mode: A, x: -1, y: -1}
+experiment: {until: 2}
+"""
+
+
+def test_one_sided_derivatives() -> None:
+    model = hsdsl.loads(QUADRANTS)
+    found = model.sensitivity("initial.x,initial.y")
+    assert found.exists is False
+    expected = {"x first": [[3, -2], [-1, 2]], "y first": [[1 / 3, 2 / 3], [0, 1]]}
+    assert found.sides.keys() == expected.keys()
+    for first, matrix in expected.items():
+        state = found.sides[first].final.state
+        assert np.allclose([[*state[x].values()] for x in "xy"], matrix, rtol=1e-12)
+    for way, first in ((1e-7, "x first"), (-1e-7, "y first")):
+        run = model.simulate(initial={"x": -1 + way})
+        assert np.isclose((run.final.state["x"] - 1) / way, expected[first][0][0], rtol=1e-6)
+
+
+GRAZING = """
+hsdsl: 1
+parameters: {s: 1}
+modes:
+  A: {flow: {x: v, v: -x}, transitions: [{when: x >= s, to: A, name: hit, reset: {v: -v}}]}
+initial: {mode: A, x: 0, v: 1}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize(
+    ("level", "exists"), [("1", None), ("1 - 1e-12", False), ("1 - 1e-6", True), ("1 + 1e-6", True)]
+)
+def test_grazing(level: str, exists: bool | None) -> None:
+    found = hsdsl.loads(GRAZING).sensitivity("s,initial.v", parameters={"s": level})
+    assert found.exists is exists
+    if not exists:
+        assert found.reasons
+
+
+def test_near_grazing() -> None:
+    """It hits at asin(s): the derivative by s is 1/sqrt(1 - s**2)."""
+    found = hsdsl.loads(GRAZING).sensitivity("s", parameters={"s": "1 - 1e-6"})
+    s = 1 - 1e-6
+    assert np.isclose(found.transitions[0].time["s"], 1 / np.sqrt(1 - s * s), rtol=1e-8)
+
+
+def test_a_zeno_point_ends_derivatives() -> None:
+    found = hsdsl.load("models/bouncing-ball.yaml").sensitivity("e", until=13)
+    assert found.exists is False
+    assert np.isnan(found.final.state["h"]["e"])
+
+
+MOVING_JUMP = """
+hsdsl: 1
+parameters: {w: 2}
+inputs: {u: sign(sin(w*t))}
+modes: {A: {flow: {x: u}}}
+initial: {mode: A, x: 0}
+experiment: {until: 3}
+"""
+
+
+def test_moving_jumps_are_refused() -> None:
+    with pytest.raises(UsageError, match="the times at which"):
+        hsdsl.loads(MOVING_JUMP).sensitivity("w")
+    assert hsdsl.loads(MOVING_JUMP).sensitivity("initial.x").final.state["x"] == {"initial.x": 1}
+
+
+@pytest.mark.parametrize(
+    ("wrt", "call", "sentence", "hint"),
+    [
+        ("C", {}, "no parameter or initial state 'C'", "'c'"),
+        ("v", {}, "no parameter or initial state 'v'", "'initial.v'"),
+        ("", {}, "got none", "for example"),
+        ("c", {"step": 1e-3}, "no argument 'step'", ""),
+        ("c", {"scheme": "relaxed"}, "no argument 'scheme'", ""),
+        ("c", {"tolerence": 1e-3}, "no argument 'tolerence'", "tolerance"),
+    ],
+)
+def test_bad_input(wrt: str, call: dict[str, Any], sentence: str, hint: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        hsdsl.load(OSCILLATOR).sensitivity(wrt, **call)
+    assert sentence in str(caught.value)
+    assert hint in (caught.value.hint or "")
+
+
+def test_a_run_from_a_file_has_no_model(tmp_path: Path) -> None:
+    run = hsdsl.load(OSCILLATOR).simulate(until=1)
+    run.save(tmp_path / "run.npz")
+    with pytest.raises(UsageError, match="no model"):
+        load(tmp_path / "run.npz").sensitivity("c")
