@@ -17,7 +17,8 @@ from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.interval import CERTIFIED, ZERO, Interval
 from hsdsl.metrics.merge import Cells, common_span, merge
-from hsdsl.metrics.on_space import OnSpace, PointMetric
+from hsdsl.metrics.on_space import OnSpace
+from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.supremum import Supremum, supremum
 from hsdsl.metrics.trace import Trace, names_of, trace
 
@@ -81,7 +82,7 @@ class CurveDistance:
 
 
 def rho(
-    a: Execution, b: Execution, metric: PointMetric, *, relaxation: float | None = None, gap: float = GAP
+    a: Execution, b: Execution, metric: SpaceMetric, *, relaxation: float | None = None, gap: float = GAP
 ) -> CurveDistance:
     """Return the supremum over the common time span of the distance between two executions (Def. 22).
 

@@ -3,69 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hsdsl.metrics.bernstein import bernstein, largest_norm, length
-from hsdsl.metrics.budget import Budget
+from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.merge import Side
-
-Array = npt.NDArray[Any]
-
-
-@dataclass(frozen=True, eq=False)
-class ModePoints:
-    """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
-
-    mode: str
-    x: Array
-    t: Array
-    edge: Array
-    depth: Array
-
-
-class PointMetric(Protocol):
-    """A distance between points of a hybrid space."""
-
-    @property
-    def timed(self) -> bool:
-        """Whether time is a coordinate of the domains (a surface or a reset depends on it)."""
-        ...
-
-    @property
-    def status(self) -> str:
-        """What all bounds given so far rest on, see :class:`hsdsl.metrics.Interval`."""
-        ...
-
-    @property
-    def evaluations(self) -> int:
-        """How many distances may be asked for before a search has to end with what it knows."""
-        ...
-
-    @property
-    def budget(self) -> Budget:
-        """The time that may be spent."""
-        ...
-
-    def contains(self, mode: str, low: Array, high: Array) -> Array:
-        """Whether boxes, (n, d) lower and upper corners, are known to lie in a mode's domain, or that to be convex."""
-        ...
-
-    def between(self, p: ModePoints, q: ModePoints, enough: float) -> tuple[Array, Array]:
-        """Bound the distances of pairs from below and above, each of shape (n,).
-
-        Upper bounds of at most ``enough`` need not be improved.
-        """
-        ...
+from hsdsl.metrics.pointwise import ModePoints, SpaceMetric
 
 
 @dataclass(frozen=True)
 class OnSpace:
     """Distances on M, where a strip's point (z, tau) counts as z, or with ``strips`` on the relaxed space."""
 
-    metric: PointMetric
+    metric: SpaceMetric
     strips: bool
 
     def over(self, a: Side, b: Side) -> Array:

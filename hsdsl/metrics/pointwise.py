@@ -13,11 +13,21 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Space
 from hsdsl.metrics.interval import weakest
 from hsdsl.metrics.neighbours import Neighbours
-from hsdsl.metrics.on_space import ModePoints
 from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.segment_containment import highest
 
 QUICK, SLOW = 50_000, 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class ModePoints:
+    """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
+
+    mode: str
+    x: Array
+    t: Array
+    edge: Array
+    depth: Array
 
 
 @dataclass(frozen=True)
@@ -42,7 +52,7 @@ class SpaceMetric:
 
     @property
     def evaluations(self) -> int:
-        """Distances are quick where everything is affine, and take local solves elsewhere."""
+        """How many distances a search may take: they are quick where everything is affine, and slow elsewhere."""
         return QUICK if self.space.affine else SLOW
 
     @cached_property
@@ -51,7 +61,7 @@ class SpaceMetric:
 
     def contains(self, mode: str, low: Array, high: Array) -> Array:
         """Whether whole boxes are known to be in a mode's domain, or that domain to be convex."""
-        domain = self.space.domains[self._index(mode)]
+        domain = self.space.domains[self.space.mode_index(self._named(mode))]
         inside = np.ones(len(low), dtype=bool)
         for formula in domain.curved:
             inside &= highest(formula, low, high) <= 0
@@ -72,20 +82,17 @@ class SpaceMetric:
         return lower, upper
 
     def _flowing(self, p: ModePoints, q: ModePoints, chosen: Array, enough: float) -> tuple[Array, Array]:
-        x, y = self._coordinates(p, chosen), self._coordinates(q, chosen)
-        for points in (p, q):
-            self._index(points.mode)
+        (mode_p, x), (mode_q, y) = ((self._named(e.mode), self._coordinates(e, chosen)) for e in (p, q))
         known = None if self.space.affine else self._neighbours
-        where = self.space, p.mode, x, q.mode, y, self.relaxation
+        where = self.space, mode_p, x, mode_q, y, self.relaxation
         lower, upper, status = distances(*where, known, enough, self.hops, self.budget)
         self._statuses.add(status)
         return lower, upper
 
-    def _index(self, mode: str) -> int:
-        try:
-            return self.space.mode_index(mode)
-        except KeyError:
-            raise UsageError(f"the model has no mode '{mode}', which a run is in") from None
+    def _named(self, mode: str) -> str:
+        if mode not in self.space.modes:
+            raise UsageError(f"the model has no mode '{mode}', which a run is in")
+        return mode
 
     def _coordinates(self, points: ModePoints, chosen: Array) -> Array:
         x = points.x[chosen]

@@ -9,7 +9,8 @@ import numpy as np
 from hsdsl.execution import Array, Execution
 from hsdsl.metrics.curves import merged
 from hsdsl.metrics.labelled_sup import Labelled
-from hsdsl.metrics.on_space import OnSpace, PointMetric
+from hsdsl.metrics.on_space import OnSpace
+from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.supremum import CellDistance
 
 POINTS = 1500
@@ -25,7 +26,7 @@ class Profile:
 
 
 def profiles(
-    a: Execution, b: Execution, metric: PointMetric, relaxation: float | None = None, points: int = POINTS
+    a: Execution, b: Execution, metric: SpaceMetric, relaxation: float | None = None, points: int = POINTS
 ) -> dict[str, Profile]:
     """Return the distance of points and that of states with modes over time, at about ``points`` of the breakpoints.
 

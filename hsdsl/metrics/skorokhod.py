@@ -25,9 +25,8 @@ RESOLUTION = 1000
 def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> CurveDistance:
     """Return the Skorokhod distance of two runs over their common time span.
 
-    The best coupling of about ``resolution`` points of each curve is found exactly by dynamic programming, visit by
-    visit of the modes where both make the same ones, else in O(n m) among points that are near enough. It differs from
-    the distance by no more than the way between neighbouring points.
+    The best coupling of about ``resolution`` points of each curve is found exactly, by dynamic programming among points
+    that are near enough. It differs from the distance by no more than the way between neighbouring points.
     """
     cells = merged(a, b)
     span = common_span(cells.a, cells.b)
@@ -46,21 +45,14 @@ def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> Curve
 def coupling(p: Polyline, q: Polyline) -> float:
     """Return the least, over couplings in order, of the largest max(|t - s|, D) over coupled points.
 
-    Below 1 no two modes are coupled, so runs of one sequence of modes are coupled visit by visit. Otherwise limits are
-    tried, doubled until a coupling within one exists: that one is the best.
+    Limits are tried, doubled until a coupling within one exists: that one is the best. Below 1 no two modes are
+    coupled.
     """
     largest = max(_cost(p, q, np.arange(len(p)), np.zeros(len(p), dtype=int)).max(), 1.0)
-    visits_p, visits_q = _visits(p), _visits(q)
     # Ends are coupled with ends; without them, curves of no length would begin at a limit that doubling never raises.
     ends = _cost(p, q, np.array([0, len(p) - 1]), np.array([0, len(q) - 1]))
-    limit = max(4 * max(p.reach, q.reach), float(ends.max()))
-    if len(visits_p) != len(visits_q) or (p.label[visits_p] != q.label[visits_q]).any():
-        limit = max(limit, 1.0)
-    elif len(visits_p) > 1:
-        found = _by_visits(p, q, visits_p, visits_q)
-        if found < 1:
-            return found
-        limit = max(limit, 1.0)
+    visits = [one.label[np.append(True, np.diff(one.label) != 0)].tolist() for one in (p, q)]
+    limit = max(4 * max(p.reach, q.reach), float(ends.max()), float(visits[0] != visits[1]))
     while True:
         found = _within(p, q, limit)
         if found < np.inf or limit == np.inf:
@@ -68,44 +60,22 @@ def coupling(p: Polyline, q: Polyline) -> float:
         limit = 2 * limit if 0 < limit < 8 * largest else np.inf
 
 
-def _visits(p: Polyline) -> Array:
-    """The points at which a mode is entered, the first among them."""
-    return np.flatnonzero(np.append(True, p.label[1:] != p.label[:-1]))
-
-
-def _by_visits(p: Polyline, q: Polyline, first_p: Array, first_q: Array) -> float:
-    """Couple each visit of p with the same one of q, all of them diagonal by diagonal at once."""
-    many_p, many_q = np.diff(first_p, append=len(p)), np.diff(first_q, append=len(q))
-    visit = np.repeat(np.arange(len(first_p)), many_p)
-    own = np.arange(len(p)) - first_p[visit]
-    before, last = np.full(len(p), np.inf), np.full(len(p), np.inf)
-    worst = 0.0
-    for s in range(int(np.max(many_p + many_q)) - 1):
-        i = np.flatnonzero((own <= s) & (s - own < many_q[visit]))
-        j = first_q[visit[i]] + s - own[i]
-        opens = (own[i] == 0, s - own[i] == 0)
-        now = np.full(len(p), np.inf)
-        reached = np.where(opens[0] & opens[1], 0.0, _reached(p, q, i, j, last, before, *opens))
-        now[i] = np.maximum(_cost(p, q, i, j), reached)
-        ends = (own[i] == many_p[visit[i]] - 1) & (s - own[i] == many_q[visit[i]] - 1)
-        worst = max(worst, float(np.max(now[i][ends], initial=0.0)))
-        before, last = last, now
-    return worst
-
-
 def _within(p: Polyline, q: Polyline, limit: float) -> float:
     """Couple only points that are at most ``limit`` apart, diagonal by diagonal of the table; inf where none does."""
     n, m = len(p), len(q)
-    before, last = np.full(n + 1, np.inf), np.full(n + 1, np.inf)  # a last entry that is never reached
+    jumps_p, jumps_q = np.append(p.jumps, False), np.append(q.jumps, False)
+    before, last = np.full(n + 1, np.inf), np.full(n + 1, np.inf)  # a last entry that is never reached, also as -1
     reach = (0, 0), (0, -1)  # of the last two diagonals, the indices that were reached
     for s in range(n + m - 1):
         low = max(min(a for a, b in reach if a <= b), s - m + 1)
         high = min(max(b for a, b in reach if a <= b) + 1, n - 1, s)
         i = np.arange(low, high + 1)
         j = s - i
+        # From the left, from below, or from both where both flow or both jump.
+        together = np.where(jumps_p[i - 1] == jumps_q[j - 1], before[i - 1], np.inf)
+        reached = np.minimum(np.minimum(last[i - 1], last[i]), together) if s else 0.0
+        value = np.maximum(_cost(p, q, i, j), reached)
         now = np.full(n + 1, np.inf)
-        cost = _cost(p, q, i, j)
-        value = np.maximum(cost, _reached(p, q, i, j, last, before, i == 0, j == 0)) if s else cost
         now[i] = np.where(value <= limit, value, np.inf)
         hit = np.flatnonzero(now[i] < np.inf)
         reach = ((low + int(hit[0]), low + int(hit[-1])) if len(hit) else (0, -1)), reach[0]
@@ -118,21 +88,6 @@ def _within(p: Polyline, q: Polyline, limit: float) -> float:
 def _cost(p: Polyline, q: Polyline, i: Array, j: Array) -> Array:
     states = np.sqrt(np.sum((p.states[i] - q.states[j]) ** 2, axis=1)) + (p.label[i] != q.label[j])
     return np.maximum(np.abs(p.times[i] - q.times[j]), states)
-
-
-def _reached(
-    p: Polyline, q: Polyline, i: Array, j: Array, last: Array, before: Array, first_i: Array, first_j: Array
-) -> Array:
-    """Return the best way into pairs (i, j): from the left, from below, or from both where both flow or both jump.
-
-    ``first_i`` and ``first_j`` say where there is none before i, or before j.
-    """
-    back_i, back_j = np.maximum(i - 1, 0), np.maximum(j - 1, 0)
-    best = np.minimum(np.where(first_i, np.inf, last[back_i]), np.where(first_j, np.inf, last[i]))
-    if len(p) > 1 and len(q) > 1:
-        together = ~first_i & ~first_j & (p.jumps[back_i] == q.jumps[back_j])
-        best = np.minimum(best, np.where(together, before[back_i], np.inf))
-    return best
 
 
 def switches_apart(a: Trace, b: Trace, span: tuple[float, float]) -> float:

@@ -9,13 +9,13 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import CurveDistance, rho
 from hsdsl.metrics.labelled_sup import sup_norm
-from hsdsl.metrics.on_space import PointMetric
+from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
 from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.names import did_you_mean
 
-SpaceMaker = Callable[[float | None], PointMetric]  # the model's, relaxed or not
+SpaceMaker = Callable[[float | None], SpaceMetric]  # the model's, relaxed or not
 
 
 @dataclass(frozen=True)

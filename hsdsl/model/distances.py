@@ -17,8 +17,8 @@ from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.interval import Interval
-from hsdsl.metrics.on_space import PointMetric
 from hsdsl.metrics.points import SpacePoint
+from hsdsl.metrics.pointwise import SpaceMetric
 from hsdsl.metrics.table import CurvePair, between, check_same_model
 from hsdsl.model.options import parameters_of
 from hsdsl.simulate.stops import show
@@ -185,8 +185,7 @@ class _RunSpace:
             raise UsageError(f"relaxation must be positive, not {number:.10g}")
         return number
 
-    def space(self, depth: float | None) -> PointMetric:
-        from hsdsl.metrics.pointwise import SpaceMetric
+    def space(self, depth: float | None) -> SpaceMetric:
         from hsdsl.metrics.space import make_space
 
         space = make_space(self.values.system, [float(v) for v in self.values.parameters])
