@@ -7,7 +7,7 @@ length is a norm of affine functions, to be minimised over a polyhedron: a secon
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -20,10 +20,11 @@ from hsdsl.metrics.rounding import UNIT, norm
 
 @dataclass(eq=False)
 class ConeShape:
-    """What problems share: minimise the sum of ``|matrices[i] @ s + offsets[i]|`` over unit ``normals @ s <= levels``.
+    """What problems share: minimise the sum of ``|matrices[i] @ s + offset|`` over unit ``normals @ s <= levels``.
 
-    ``inner`` is a point at which every inequality holds with some ``room``, if one is known, and ``gates`` are those
-    whose coordinates the unknowns are.
+    A problem's offsets, one leg after the other, are those of its two ends and ``bases``; ``numbers`` is the size of
+    all these. ``inner`` is a point at which every inequality holds with some ``room``, if one is known, and ``gates``
+    are those whose coordinates the unknowns are.
     """
 
     matrices: tuple[Array, ...]
@@ -32,6 +33,8 @@ class ConeShape:
     inner: Array | None = None
     room: Array | None = None
     gates: tuple[Gate, ...] = ()
+    bases: Array = field(default_factory=lambda: np.zeros(0))
+    numbers: float = 0.0
     cone: Any = None  # as the conic solver takes it, once it was needed
 
     @property
@@ -88,94 +91,70 @@ class ConeShape:
         return float(np.linalg.norm([gate.radius for gate in self.gates])) if self.gates else np.inf
 
 
-@dataclass(frozen=True, eq=False)
-class ConeProblem:
-    """B problems of one shape: offsets (B, n_i), and the size (B,) of the numbers that they are made of."""
-
-    shape: ConeShape
-    offsets: list[Array]
-    numbers: Array
-
-
 class GateSequence:
-    """A sequence of passages: its matrices, to which the two ends are added by :meth:`problem`.
+    """A sequence of passages: its legs, to which the two ends are added by :meth:`problem`.
 
-    The legs are the one from p, those between passages, and the one to q.
+    ``enters`` and ``leaves`` are the points where each is entered and left, as maps of all unknowns: base, then frame.
     """
 
     def __init__(self, space: Space, passages: Sequence[Passage]) -> None:
-        self.space = space
-        self.passages = tuple(passages)
-        gates = [p.gate for p in passages]
-        starts = np.concatenate([[0], np.cumsum([g.size for g in gates])]).astype(int)
-        self.slices = [slice(a, b) for a, b in pairwise(starts.tolist())]
-        self.size = int(starts[-1])
-        self.normals = np.zeros((sum(len(g.levels) for g in gates), self.size))
-        row = 0
-        for gate, where in zip(gates, self.slices, strict=True):
-            self.normals[row : row + len(gate.levels), where] = gate.normals
-            row += len(gate.levels)
-        self.levels, self.inner, self.room = (
-            np.concatenate([np.zeros(0), *parts])
-            for parts in ([g.levels for g in gates], [g.inner for g in gates], [g.room for g in gates])
-        )
-        self.enters = [self._wide(p.enter, w) for p, w in zip(passages, self.slices, strict=True)]
-        self.leaves = [self._wide(p.leave, w) for p, w in zip(passages, self.slices, strict=True)]
-        between = list(zip(self.leaves, self.enters[1:], strict=False))
-        self.inner_legs = [(into[1] - out[1], into[0] - out[0]) for out, into in between]
-        self.numbers = sum(float(np.linalg.norm(base)) for side in between for base, _ in side)
+        self.space, self.passages = space, tuple(passages)
+        self.gates = tuple(p.gate for p in passages)
+        firsts = np.cumsum([0, *(gate.size for gate in self.gates)]).tolist()
+        rows = np.cumsum([0, *(len(gate.levels) for gate in self.gates)]).tolist()
+        self.normals = np.zeros((rows[-1], firsts[-1]))
+        self.enters: list[Array] = []
+        self.leaves: list[Array] = []
+        for passage, first, row in zip(self.passages, firsts, rows, strict=False):
+            gate = passage.gate
+            self.normals[row : row + len(gate.levels), first : first + gate.size] = gate.normals
+            for sides, (base, frame) in ((self.enters, passage.enter), (self.leaves, passage.leave)):
+                wide = np.zeros((len(base), 1 + firsts[-1]))
+                wide[:, 0], wide[:, 1 + first : 1 + first + gate.size] = base, frame
+                sides.append(wide)
         self.shapes: dict[tuple[bool, bool, bool], ConeShape] = {}
 
-    def _wide(self, side: tuple[Array, Array], where: slice) -> tuple[Array, Array]:
-        base, frame = side
-        wide = np.zeros((len(base), self.size))
-        wide[:, where] = frame
-        return base, wide
+    def problem(self, p: Array | None, q: Array | None, kept: bool = False) -> tuple[ConeShape, Array, Array]:
+        """The problems between pairs, rows of p and q: their shape, offsets, and the size of their numbers.
 
-    def problem(self, p: Array | None, q: Array | None, kept: bool = False) -> ConeProblem:
-        """The problems between pairs, rows of p and q; without a first or last leg where they are None.
-
-        With ``kept`` the last leg measures only the coordinates that no passage changes, to a q in any mode given by
-        those coordinates alone: a lower bound for whatever comes after.
+        There is no first or last leg where p or q is None. With ``kept`` the last leg measures only the coordinates
+        that no passage changes, to a q in any mode given by those coordinates alone: a lower bound for all that may
+        come after.
         """
-        ends = [x for x in (p, q) if x is not None]
-        count = len(ends[0]) if ends else 1
-        offsets = [np.tile(offset, (count, 1)) for _, offset in self.inner_legs]
-        numbers = np.full(count, float(self.numbers))
-        if p is not None:
-            base = self.enters[0][0]
-            offsets.insert(0, base - p)
-            numbers += float(np.linalg.norm(base)) + norm(p)
-        if q is not None:
-            base = self._last(kept)[0]
-            offsets.append(base - q)
-            numbers += float(np.linalg.norm(base)) + norm(q)
-        return ConeProblem(self.shape(p is not None, q is not None, kept), offsets, numbers)
+        shape = self.shape(p is not None, q is not None, kept)
+        count = next((len(x) for x in (p, q) if x is not None), 1)
+        offsets, numbers = np.tile(shape.bases, (count, 1)), np.full(count, shape.numbers)
+        for end, leg in ((p, 0), (q, -1)):
+            if end is not None:
+                offsets[:, shape.parts[leg]] -= end
+                numbers += norm(end)
+        return shape, offsets, numbers
 
     def shape(self, first: bool, last: bool, kept: bool = False) -> ConeShape:
         """What problems with or without a first and a last leg share."""
         found = self.shapes.get((first, last, kept))
         if found is None:
-            legs = [self.enters[0][1]] * first + [matrix for matrix, _ in self.inner_legs]
-            legs += [self._last(kept)[1]] * last
-            gates = tuple(p.gate for p in self.passages)
-            found = ConeShape(tuple(legs), self.normals, self.levels, self.inner, self.room, gates)
+            between = list(zip(self.leaves, self.enters[1:], strict=False))
+            end = self.leaves[-1]
+            if kept and self.space.kept is not None:
+                end = end[list(self.space.kept[self.passages[-1].target])]
+            legs = self.enters[:1] * first + [into - out for out, into in between] + [end] * last
+            ends = [*self.enters[: int(first)], *(side for pair in between for side in pair), *[end] * last]
+            levels, inner, room = (
+                np.concatenate([np.zeros(0), *(getattr(gate, name) for gate in self.gates)])
+                for name in ("levels", "inner", "room")
+            )
+            bases = np.concatenate([np.zeros(0), *(leg[:, 0] for leg in legs)])
+            numbers = sum(float(np.linalg.norm(side[:, 0])) for side in ends)
+            matrices = tuple(leg[:, 1:] for leg in legs)
+            found = ConeShape(matrices, self.normals, levels, inner, room, self.gates, bases, numbers)
             self.shapes[first, last, kept] = found
         return found
 
-    def _last(self, kept: bool) -> tuple[Array, Array]:
-        base, frame = self.leaves[-1]
-        if kept and self.space.kept is not None:
-            rows = list(self.space.kept[self.passages[-1].target])
-            return base[rows], frame[rows]
-        return base, frame
-
     def sides(self, s: Array) -> list[tuple[Array, Array]]:
         """Where each passage is entered and left, for unknowns s."""
-        return [
-            (enter[0] + enter[1] @ s, leave[0] + leave[1] @ s)
-            for enter, leave in zip(self.enters, self.leaves, strict=True)
-        ]
+        at = np.append(1.0, s)
+        return [(enter @ at, leave @ at) for enter, leave in zip(self.enters, self.leaves, strict=True)]
 
 
 def gate_sequence(space: Space, indices: tuple[int, ...]) -> GateSequence:

@@ -6,12 +6,12 @@ import numpy as np
 
 from hsdsl.metrics.gate_sequence import ConeShape
 from hsdsl.metrics.geometry import Array
-from hsdsl.metrics.rounding import UNIT, charge, lengths
+from hsdsl.metrics.rounding import UNIT, charge, lengths, norm
 
 ITERATIONS = 100
 
 
-def on_line(shape: ConeShape, offsets: list[Array], numbers: Array) -> tuple[Array, Array, Array]:
+def on_line(shape: ConeShape, offsets: Array, numbers: Array) -> tuple[Array, Array, Array]:
     """Minimise a shape's problems of at most one unknown, both ends charged with rounding; s is (N, 0) or (N, 1).
 
     Rounding moves the interval's ends by less than the legs are charged for.
@@ -20,8 +20,7 @@ def on_line(shape: ConeShape, offsets: list[Array], numbers: Array) -> tuple[Arr
         s, far = np.zeros((len(numbers), 0)), np.zeros(len(numbers))
         lower = upper = lengths(shape, offsets, s)
     else:
-        low, high = interval_of(shape.normals, shape.levels)
-        lower, upper, where, far = minimise_on_line([m[:, 0] for m in shape.matrices], offsets, low, high)
+        lower, upper, where, far = _minimised(shape, offsets)
         s = where[:, None]
         if shape.least > 0:  # no shorter path is farther away
             far = np.minimum(far, np.abs(where) + 2 * upper / shape.least)
@@ -29,27 +28,20 @@ def on_line(shape: ConeShape, offsets: list[Array], numbers: Array) -> tuple[Arr
     return np.maximum(0.0, lower - rounding), upper + rounding, s
 
 
-def minimise_on_line(
-    matrices: list[Array], offsets: list[Array], low: float, high: float
-) -> tuple[Array, Array, Array, Array]:
-    """Minimise N sums of norms ``|matrices[i] s + offsets[i]|`` over ``low <= s <= high``; offsets are (N, n_i) arrays.
-
-    Returns lower bounds, values attained (more by round-off), where, and how far from 0 the minimum can be.
-    """
-    count = len(offsets[0])
-    slopes = [float(m @ m) for m in matrices]
-    kinks = [np.clip(-(o @ m) / a, low, high) for m, o, a in zip(matrices, offsets, slopes, strict=True) if a > 0]
-    if not kinks:
-        s = np.full(count, np.clip(0.0, low, high))
-        value = _length(matrices, offsets, s)
-        return value, value, s, np.abs(s)
-    a, b = np.min(kinks, axis=0), np.max(kinks, axis=0)
-    best, where = _best(matrices, offsets, kinks)
+def _minimised(shape: ConeShape, offsets: Array) -> tuple[Array, Array, Array, Array]:
+    """Lower bounds, values attained (more by round-off), where, and how far from 0 the minimum can be."""
+    low, high = interval_of(shape.normals, shape.levels)
+    along = [(offsets[:, part], shape.stacked[part, 0]) for part in shape.parts]
+    kinks = [np.clip(-(o @ m) / (m @ m), low, high) for o, m in along if m @ m > 0]
+    kinks = np.array(kinks or [np.full(len(offsets), np.clip(0.0, low, high))])
+    a, b = kinks.min(axis=0), kinks.max(axis=0)
+    values = np.array([lengths(shape, offsets, s[:, None]) for s in kinks])
+    first = np.argmin(values, axis=0)[None]
+    best, where = (np.take_along_axis(x, first, axis=0)[0] for x in (values, kinks))
     wide = np.flatnonzero(b - a > 4e-16 * (np.abs(a) + np.abs(b)))
     lower = best.copy()
     if wide.size:
-        some = [o[wide] for o in offsets]
-        low_wide, value, at = _newton(matrices, some, a[wide], b[wide])
+        low_wide, value, at = _newton(shape, offsets[wide], a[wide], b[wide])
         better = value < best[wide]
         best[wide] = np.where(better, value, best[wide])
         where[wide] = np.where(better, at, where[wide])
@@ -57,19 +49,17 @@ def minimise_on_line(
     return lower, best, where, np.maximum(np.abs(a), np.abs(b))
 
 
-def _newton(matrices: list[Array], offsets: list[Array], a: Array, b: Array) -> tuple[Array, Array, Array]:
+def _newton(shape: ConeShape, offsets: Array, a: Array, b: Array) -> tuple[Array, Array, Array]:
     """Newton's method on the slope, between a and b, halving where it leaves them.
 
     The sum is convex, so its tangent at any point bounds it from below.
     """
     s, lower, value = 0.5 * (a + b), np.full(len(a), -np.inf), np.full(len(a), np.inf)
     where = s.copy()
-    steepest = sum(float(np.linalg.norm(m)) for m in matrices)
     left = np.arange(len(a))
     for _ in range(ITERATIONS):
-        some = [o[left] for o in offsets]
-        at, slope, bend = _expanded(matrices, some, s)
-        loose = 4e-16 * steepest * (b - a)
+        at, slope, bend = _expanded(shape, offsets[left], s)
+        loose = 4e-16 * shape.spread * (b - a)
         below = at + np.minimum(slope * (a - s), slope * (b - s)) - loose
         better = at < value[left]
         where[left] = np.where(better, s, where[left])
@@ -85,38 +75,19 @@ def _newton(matrices: list[Array], offsets: list[Array], a: Array, b: Array) -> 
     return np.minimum(lower, value), value, where
 
 
-def _expanded(matrices: list[Array], offsets: list[Array], s: Array) -> tuple[Array, Array, Array]:
+def _expanded(shape: ConeShape, offsets: Array, s: Array) -> tuple[Array, Array, Array]:
     """The sum, its slope and its second derivative."""
-    total, slope, bend = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s))
-    for m, o in zip(matrices, offsets, strict=True):
-        parts = [o[:, i] + m[i] * s for i in range(len(m))]
-        size = _norm(parts)
+    total, slope, bend = np.zeros((3, len(s)))
+    for part in shape.parts:
+        m = shape.stacked[part, 0]
+        leg = offsets[:, part] + s[:, None] * m
+        size = norm(leg)
         inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-        along = sum((m[i] * parts[i] for i in range(len(m))), np.zeros(len(s))) * inverse
+        along = (leg @ m) * inverse
         total += size
         slope += along
         bend += (float(m @ m) - along * along) * inverse
     return total, slope, bend
-
-
-def _length(matrices: list[Array], offsets: list[Array], s: Array) -> Array:
-    total = np.zeros(len(s))
-    for m, o in zip(matrices, offsets, strict=True):
-        total += _norm([o[:, i] + m[i] * s for i in range(len(m))])
-    return total
-
-
-def _norm(parts: list[Array]) -> Array:
-    if len(parts) == 2:
-        return np.hypot(parts[0], parts[1])
-    return np.sqrt(sum((p * p for p in parts), np.zeros_like(parts[0]))) if parts else np.zeros(0)
-
-
-def _best(matrices: list[Array], offsets: list[Array], candidates: list[Array]) -> tuple[Array, Array]:
-    values = np.array([_length(matrices, offsets, s) for s in candidates])
-    chosen = np.argmin(values, axis=0)
-    columns = np.arange(len(candidates[0]))
-    return values[chosen, columns], np.array(candidates)[chosen, columns]
 
 
 def interval_of(normals: Array, levels: Array) -> tuple[float, float]:

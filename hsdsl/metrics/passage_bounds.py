@@ -56,7 +56,7 @@ class Ways:
         for g in self.space.passages:
             if g.target == self.target and g.gate.size > 1 and not self.budget.spent():
                 goal = gate_sequence(self.space, (g.index,)).problem(None, self.q)
-                self.leaves[g.index] = np.maximum(self.leaves[g.index], solve(goal)[0])
+                self.leaves[g.index] = np.maximum(self.leaves[g.index], solve(*goal)[0])
 
     @cached_property
     def inner(self) -> Array:
@@ -89,7 +89,7 @@ class Ways:
     def through(self, sequence: tuple[int, ...], rows: Indices, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
         """Bounds on the paths through exactly a sequence, tolls included, and their unknowns."""
         problem = gate_sequence(self.space, sequence).problem(self.p[rows], self.q[rows])
-        lower, upper, s = solve(problem, rounds)
+        lower, upper, s = solve(*problem, rounds)
         toll = self.toll * hops_of(sequence)
         return (lower + toll) * (1 - ROUNDING), (upper + toll) * (1 + ROUNDING), s
 
@@ -109,7 +109,7 @@ class Ways:
         """What paths that begin with a sequence are at least: through it, and the rest."""
         toll = self.toll * hops_of(sequence)
         problem = gate_sequence(self.space, sequence).problem(self.p[rows], None)
-        return (solve(problem, rounds)[0] + toll + self.rest(sequence[-1], rows)) * (1 - ROUNDING)
+        return (solve(*problem, rounds)[0] + toll + self.rest(sequence[-1], rows)) * (1 - ROUNDING)
 
     def beginning_kept(self, sequence: tuple[int, ...], rows: Indices, rounds: int = ROUNDS) -> Array:
         """The same by the coordinates that no passage changes, up to q."""
@@ -117,7 +117,7 @@ class Ways:
             return np.zeros(len(rows))
         goals = self.q[rows][:, list(self.space.kept[self.target])]
         problem = gate_sequence(self.space, sequence).problem(self.p[rows], goals, kept=True)
-        return (solve(problem, rounds)[0] + self.toll * hops_of(sequence)) * (1 - ROUNDING)
+        return (solve(*problem, rounds)[0] + self.toll * hops_of(sequence)) * (1 - ROUNDING)
 
 
 def unchanged(space: Space, source: int, p: Array, target: int, q: Array) -> Array:
@@ -149,4 +149,4 @@ def gaps(space: Space, budget: Budget) -> Array:
 
 def _gap(space: Space, f: int, g: int) -> float:
     """0 where a passage is taken back at once."""
-    return 0.0 if f == g ^ 1 else float(solve(gate_sequence(space, (f, g)).problem(None, None), 1)[0][0])
+    return 0.0 if f == g ^ 1 else float(solve(*gate_sequence(space, (f, g)).problem(None, None), 1)[0][0])

@@ -26,10 +26,10 @@ def norm(rows: Array) -> Array:
     return np.sqrt(np.einsum("bi,bi->b", rows, rows))
 
 
-def lengths(shape: ConeShape, offsets: list[Array], s: Array) -> Array:
+def lengths(shape: ConeShape, offsets: Array, s: Array) -> Array:
     """The lengths of B paths at unknowns s, shape (B, N), to rounding."""
-    legs = zip(shape.matrices, offsets, strict=True)
-    return sum((norm(s @ m.T + o) for m, o in legs), np.zeros(len(s)))
+    legs = s @ shape.stacked.T + offsets
+    return sum((norm(legs[:, part]) for part in shape.parts), np.zeros(len(s)))
 
 
 def charge(shape: ConeShape, numbers: Array, far: Array) -> Array:
@@ -73,16 +73,14 @@ def _margin(shape: ConeShape, s: Array) -> Array:
     return shape.operations * UNIT * (norm(s)[:, None] + np.abs(shape.levels))
 
 
-def proved_above(shape: ConeShape, offsets: list[Array], numbers: Array, s: Array, inside: Array) -> Array:
+def proved_above(shape: ConeShape, offsets: Array, numbers: Array, s: Array, inside: Array) -> Array:
     """The lengths of paths, charged; infinite for those that are not inside."""
     value = lengths(shape, offsets, s)
     above = value * (1 + shape.operations * UNIT) + charge(shape, numbers, norm(s))
     return np.where(inside, above, np.inf)
 
 
-def proved_below(
-    shape: ConeShape, offsets: list[Array], numbers: Array, s: Array, vectors: Array, weights: Array
-) -> Array:
+def proved_below(shape: ConeShape, offsets: Array, numbers: Array, s: Array, vectors: Array, weights: Array) -> Array:
     """Lower bounds on the minima from proposals for a dual: a unit vector y for each leg, a weight w for each row.
 
     For any unknowns s' of a path no longer than that at s, with the legs u at s and the residual ``r = M'y + C'w``,
@@ -98,8 +96,7 @@ def proved_below(
     longest = np.max([norm(flat[:, where]) for where in shape.parts], axis=0)
     shrink = (1 - shape.operations * UNIT) / np.maximum(1.0, longest)
     flat, weights = flat * shrink[:, None], weights * shrink[:, None]
-    legs = np.hstack([s @ m.T + o for m, o in zip(shape.matrices, offsets, strict=True)])
-    value = np.einsum("bi,bi->b", flat, legs)
+    value = np.einsum("bi,bi->b", flat, s @ shape.stacked.T + offsets)
     value -= np.einsum("bj,bj->b", weights, shape.levels - s @ shape.normals.T)
     longest_path, far = lengths(shape, offsets, s), norm(s)
     if np.all(value <= charge(shape, numbers, far)):  # nothing is left of it, wherever the unknowns may be

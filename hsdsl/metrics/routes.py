@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -118,16 +119,23 @@ class Route:
             at, mode = leave, crossing.target
         return [*found, (mode, at, self.end[1])]
 
+    def _crossed(self, unknowns: Array) -> Iterator[tuple[Crossing, Array, Callable[[Array], Array]]]:
+        """The crossings with their guard points, and what takes derivatives by these to those by all unknowns."""
+
+        def wide(block: Array, where: slice) -> Array:
+            found = np.zeros((len(block), len(unknowns)))
+            found[:, where] = block
+            return found
+
+        for crossing, where in zip(self.sequence, self._slices, strict=True):
+            yield crossing, unknowns[where], partial(wide, where=where)
+
     def leg_slopes(self, unknowns: Array) -> list[tuple[Array, Array]]:
         """The derivatives of each leg's start and end by all unknowns."""
-        at = np.zeros((len(self.start[1]), len(unknowns)))
-        found: list[tuple[Array, Array]] = []
-        first = 0
-        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
-            enter, leave = (_placed(slope, first, len(unknowns)) for slope in crossing.slopes(x))
-            found.append((at, enter))
-            at, first = leave, first + len(x)
-        return [*found, (at, np.zeros((len(self.end[1]), len(unknowns))))]
+        fixed = [np.zeros((len(end[1]), len(unknowns))) for end in (self.start, self.end)]
+        sides = [wide(side) for c, x, wide in self._crossed(unknowns) for side in c.slopes(x)]
+        ends = [fixed[0], *sides, fixed[1]]
+        return list(zip(ends[::2], ends[1::2], strict=True))
 
     def length(self, unknowns: Array) -> float:
         """The path's length."""
@@ -149,11 +157,8 @@ class Route:
 
     def surface_slopes(self, unknowns: Array) -> Array:
         """Its derivatives."""
-        rows, first = [np.zeros((0, len(unknowns)))], 0
-        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
-            rows.append(_placed(crossing.surface.jacobian(x), first, len(unknowns)))
-            first += len(x)
-        return np.vstack(rows)
+        rows = [wide(c.surface.jacobian(x)) for c, x, wide in self._crossed(unknowns)]
+        return np.vstack([np.zeros((0, len(unknowns))), *rows])
 
     def room(self, unknowns: Array) -> Array:
         """What must not be negative: guards' conditions, and images inside their domains."""
@@ -170,11 +175,10 @@ class Route:
 
     def room_slopes(self, unknowns: Array) -> Array:
         """Its derivatives."""
-        rows, first = [np.zeros((0, len(unknowns)))], 0
-        for crossing, x in zip(self.sequence, self.points(unknowns), strict=True):
-            image = crossing.room.jacobian(crossing.reset.value(x)) @ crossing.reset.jacobian(x)
-            rows += [-_placed(part, first, len(unknowns)) for part in (crossing.conditions.jacobian(x), image)]
-            first += len(x)
+        rows = [np.zeros((0, len(unknowns)))]
+        for c, x, wide in self._crossed(unknowns):
+            image = c.room.jacobian(c.reset.value(x)) @ c.reset.jacobian(x)
+            rows += [-wide(c.conditions.jacobian(x)), -wide(image)]
         legs, slopes = (self.legs(unknowns), self.leg_slopes(unknowns)) if self.held else ([], [])
         for k, _ in self.held:
             (mode, a, b), (da, db) = legs[k], slopes[k]
@@ -204,8 +208,8 @@ class Route:
         excess = self.excess(unknowns)
         if not excess > 0:
             return self.length(unknowns)
-        slopes = (c.slopes(x) for c, x in zip(self.sequence, self.points(unknowns), strict=True))
-        moved = sum(float(np.linalg.norm(side)) for both in slopes for side in both)
+        points = zip(self.sequence, self.points(unknowns), strict=True)
+        moved = sum(float(np.linalg.norm(side)) for c, x in points for side in c.slopes(x))
         return self.length(unknowns) + 2 * excess * moved
 
     def judged(self, unknowns: Array) -> list[int]:
@@ -226,9 +230,3 @@ def _farthest(off: Array, slopes: Array) -> float:
     """The way to where functions that are ``off`` are not, along their steepest slopes."""
     with np.errstate(all="ignore"):
         return float(np.max(np.where(off > 0, off / np.linalg.norm(slopes, axis=1), 0.0)))
-
-
-def _placed(block: Array, first: int, width: int) -> Array:
-    wide = np.zeros((block.shape[0], width))
-    wide[:, first : first + block.shape[1]] = block
-    return wide

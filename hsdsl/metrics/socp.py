@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.metrics.gate_sequence import ConeProblem, ConeShape
+from hsdsl.metrics.gate_sequence import ConeShape
 from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.line import on_line
 from hsdsl.metrics.rounding import brought_inside, charge, lengths, norm, proved_above, proved_below
@@ -37,21 +37,20 @@ def _controller() -> Any:
     return import_module("threadpoolctl").ThreadpoolController()
 
 
-def solve(problem: ConeProblem, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
-    """Minimise B problems of one shape, in at most so many rounds.
+def solve(shape: ConeShape, offsets: Array, numbers: Array, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
+    """Minimise B problems of one shape, with offsets (B, n) and numbers of sizes (B,), in at most so many rounds.
 
     Returns lower and upper ends (B,), see :mod:`hsdsl.metrics.rounding`, and where the upper ones are attained, (B, N).
     """
-    shape, offsets, numbers = problem.shape, problem.offsets, problem.numbers
     if not shape.matrices:
         return np.zeros(len(numbers)), np.zeros(len(numbers)), np.zeros((len(numbers), shape.size))
     if shape.size < 2:
         return on_line(shape, offsets, numbers)
-    best = -np.hstack(offsets) @ shape.back.T
+    best = -offsets @ shape.back.T
     unit = np.maximum(np.maximum(lengths(shape, offsets, best), charge(shape, numbers, norm(best))), 1e-300)
     lower, upper, todo = np.zeros(len(numbers)), np.full(len(numbers), np.inf), np.arange(len(numbers))
     for _ in range(rounds):
-        some = [o[todo] for o in offsets]
+        some = offsets[todo]
         s, vectors, weights = _proposals(shape, some, best[todo], unit[todo], SOLVED if rounds > 1 else ROUGHLY)
         s, inside = brought_inside(shape, s)
         value = proved_above(shape, some, numbers[todo], s, inside)
@@ -68,7 +67,7 @@ def solve(problem: ConeProblem, rounds: int = ROUNDS) -> tuple[Array, Array, Arr
 
 
 def _proposals(
-    shape: ConeShape, offsets: list[Array], centers: Array, units: Array, tolerance: float
+    shape: ConeShape, offsets: Array, centers: Array, units: Array, tolerance: float
 ) -> tuple[Array, Array, Array]:
     """Solve each problem for ``s = center + unit * sigma``: proposed unknowns, the legs' vectors, and weights."""
     clarabel: Any = import_module("clarabel")  # heavy, so not before it is needed
@@ -76,11 +75,12 @@ def _proposals(
         shape.cone = _cone(shape, clarabel)
     cost, matrix, objective, cones = shape.cone
     # Each leg is a cone of its bound and its vector, after the inequalities.
-    legs = len(shape.levels) + np.cumsum([0, *(1 + len(m) for m in shape.matrices[:-1])])
-    right = np.zeros((len(centers), matrix.shape[0]))
-    right[:, : len(shape.levels)] = shape.levels - centers @ shape.normals.T
-    for at, m, o in zip(legs, shape.matrices, offsets, strict=True):
-        right[:, at + 1 : at + 1 + len(m)] = centers @ m.T + o
+    rows = len(shape.levels)
+    bounds = rows + np.array([part.start + k for k, part in enumerate(shape.parts)])
+    right = np.zeros((len(centers), rows + len(bounds) + len(shape.stacked)))
+    vectors = np.delete(np.arange(right.shape[1]), bounds)[rows:]
+    right[:, :rows] = shape.levels - centers @ shape.normals.T
+    right[:, vectors] = centers @ shape.stacked.T + offsets
     right /= units[:, None]
     s, dual, solver = centers.copy(), np.zeros_like(right), None
     for k in np.flatnonzero(np.all(np.isfinite(right), axis=1)).tolist():
@@ -92,8 +92,7 @@ def _proposals(
         s[k], dual[k] = centers[k] + units[k] * np.asarray(answer.x)[: shape.size], answer.z
     lost = ~(np.all(np.isfinite(s), axis=1) & np.all(np.isfinite(dual), axis=1))
     s[lost], dual[lost] = centers[lost], 0.0
-    weights, vectors = dual[:, : len(shape.levels)], np.delete(-dual, legs, axis=1)[:, len(shape.levels) :]
-    return s, vectors, weights
+    return s, -dual[:, vectors], dual[:, :rows]
 
 
 def _cone(shape: ConeShape, clarabel: Any) -> tuple[Any, Any, Array, list[Any]]:

@@ -9,7 +9,7 @@ import pytest
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.metrics.gate_sequence import ConeProblem, ConeShape
+from hsdsl.metrics.gate_sequence import ConeShape
 from hsdsl.metrics.interval import INFINITE, ZERO
 from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.socp import solve
@@ -218,13 +218,14 @@ def test_problems_solved_together_have_the_minima_of_each(seed):
     levels = normals @ inner + room
     shape = ConeShape(tuple(matrices), normals, levels, inner, room)
     numbers = np.array([sum(np.linalg.norm(o[k]) for o in offsets) for k in range(count)])
-    lower, upper, s = solve(ConeProblem(shape, offsets, numbers))
+    together = np.hstack(offsets)
+    lower, upper, s = solve(shape, together, numbers)
     assert np.all(s @ normals.T <= levels)
     for k in range(count):
-        (below,), (above,), _ = solve(ConeProblem(shape, [o[k : k + 1] for o in offsets], numbers[k : k + 1]))
-        assert above - below <= 1e-9 * above + 1e-13 * np.abs(np.hstack(offsets)).max()
+        (below,), (above,), _ = solve(shape, together[k : k + 1], numbers[k : k + 1])
+        assert above - below <= 1e-9 * above + 1e-13 * np.abs(together).max()
         assert lower[k] <= above * (1 + 1e-12) and below <= upper[k] * (1 + 1e-12)
-        assert upper[k] - lower[k] <= 1e-9 * upper[k] + 1e-13 * np.abs(np.hstack(offsets)).max()
+        assert upper[k] - lower[k] <= 1e-9 * upper[k] + 1e-13 * np.abs(together).max()
 
 
 def test_runner_through_a_curved_guard_in_a_slice():

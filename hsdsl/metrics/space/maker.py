@@ -15,7 +15,9 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.errors import UsageError
+from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
+from hsdsl.lower.straight import lie_derivative
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
 from hsdsl.metrics.polyhedra import gate_of, unit_rows
@@ -42,11 +44,11 @@ class _Maker:
     def __init__(self, system: HybridSystem, parameters: Sequence[float]) -> None:
         self.system = system
         given = zip(system.parameters, parameters, strict=True)
-        self.values = {_symbol(p.name): sp.Rational(*Fraction(float(v)).as_integer_ratio()) for p, v in given}
-        self.inputs = {_symbol(i.name): i for i in system.inputs}
+        self.values = {symbol(p.name): sp.Rational(*Fraction(float(v)).as_integer_ratio()) for p, v in given}
+        self.inputs = {symbol(i.name): i for i in system.inputs}
         self.timed = any(self._moves(e) for m in system.modes for e in _geometric(m))
         self.states = [self._states_of(mode) for mode in system.modes]
-        self.symbols = [tuple(map(_symbol, states)) + (TIME,) * self.timed for states in self.states]
+        self.symbols = [tuple(map(symbol, states)) + (TIME,) * self.timed for states in self.states]
 
     def space(self) -> Space:
         """Everything, guards in pieces."""
@@ -80,7 +82,7 @@ class _Maker:
         """Put in parameter values, and an input as a function of time."""
         placed = sp.sympify(expression).xreplace(self.values)
         used = placed.free_symbols & set(self.inputs)
-        return placed.xreplace({symbol: self._input(self.inputs[symbol]) for symbol in used})
+        return placed.xreplace({name: self._input(self.inputs[name]) for name in used})
 
     def _input(self, given) -> sp.Expr:
         if len(given.times) > MOST_SAMPLES:
@@ -88,7 +90,7 @@ class _Maker:
                 f"distances: a guard depends on the input {given.name}, which has more than {MOST_SAMPLES} samples"
             )
         times, values = (
-            [sp.Rational(*v.as_integer_ratio()) if isinstance(v, Fraction) else v.xreplace(self.values) for v in row]
+            [sp.Rational(v) if isinstance(v, Fraction) else v.xreplace(self.values) for v in row]
             for row in (given.times, given.values)
         )
         result = values[0]
@@ -128,7 +130,8 @@ class _Maker:
             domain = domains[j]
             flat_part = affine(domain.normals, -domain.levels)
             both = stacked([*domain.curved, self._formula(conditions, j), flat_part])
-            marks = equations(surface, reset, self.symbols[j], self._image_symbols(edge))
+            image = [*map(symbol, edge.target_states), *(TIME,) * self.timed]
+            marks = equations(surface, reset, self.symbols[j], image)
             made = self._formula((surface,), j), both, self._formula(reset, j), formula(marks, self.symbols[k])
             curved.append(CurvedGate(edge.name, j, k, *made))
             return
@@ -141,18 +144,11 @@ class _Maker:
 
     def _rate(self, edge: Edge, surface: sp.Expr, mode: Mode) -> sp.Expr | None:
         """The surface's derivative along the flow; None where time or an input is in it."""
-
-        def along_flow(residual: sp.Expr) -> sp.Expr:
-            slopes = [residual.diff(_symbol(s)) for s in mode.states]
-            return residual.diff(TIME) + sum((a * f for a, f in zip(slopes, mode.flow, strict=True)), sp.S.Zero)
-
-        rate = along_flow(edge.surface.residual)
+        flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
+        rate = lie_derivative(edge.surface.residual, flow)
         if self._moves(rate):
             return None
-        return self._place(along_flow(surface) if self._moves(edge.surface.residual) else rate)
-
-    def _image_symbols(self, edge: Edge) -> list[sp.Symbol]:
-        return [*map(_symbol, edge.target_states), *(TIME,) * self.timed]
+        return self._place(lie_derivative(surface, flow) if self._moves(edge.surface.residual) else rate)
 
     def _kept(self) -> tuple[tuple[int, ...], ...] | None:
         common = [n for n in self.states[0] if all(n in states for states in self.states)]
@@ -166,7 +162,7 @@ class _Maker:
 
     def _unchanged(self, edge: Edge, value: sp.Expr, name: str) -> bool:
         """Whether a reset leaves a state alone, if only because the guard fixes it."""
-        change = sp.expand(self._place(value) - _symbol(name))
+        change = sp.expand(self._place(value) - symbol(name))
         if change == 0:
             return True
         surface = sp.expand(self._place(edge.surface.residual))
@@ -174,10 +170,6 @@ class _Maker:
 
     def _formula(self, expressions, j: int) -> Formula:
         return formula(expressions, self.symbols[j])
-
-
-def _symbol(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 def _geometric(mode: Mode):
