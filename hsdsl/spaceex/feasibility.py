@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from hsdsl.lint.analysis.decide import Decider
 from hsdsl.lint.analysis.normal_form import NormalForms
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, SearchRange
-from hsdsl.metrics.rational import ZERO, Row, about, deepest, maximise
+from hsdsl.metrics.rational import Exact, about, axes, deepest, matrix, maximise, zeros
 
 _FORMS = NormalForms()
 REACH = 100.0  # how far a search for a point of constraints that are not affine goes, in units of the model
@@ -27,7 +29,9 @@ def decide(constraints: Sequence[Constraint]) -> Answer:
         answer = Decider().decide(tuple(constraints), ranges, prove=True)
         return UNKNOWN if answer.never and answer.searched else answer
     relations = [c.relation for c in constraints]
-    if any(not any(n) and not _constant(v, relation) for (n, v), relation in zip(rows, relations, strict=True)):
+    if any(
+        not row[1:].any() and not _constant(row[0], relation) for row, relation in zip(rows, relations, strict=True)
+    ):
         return NEVER
     point = _interior(*_split(rows, relations, len(names)))
     if point is None:
@@ -37,52 +41,48 @@ def decide(constraints: Sequence[Constraint]) -> Answer:
 
 def _holds(constraint: Constraint) -> bool:
     row = _row(constraint.expr, [])
-    return row is not None and _constant(row[1], constraint.relation)
+    return row is not None and _constant(row[0], constraint.relation)
 
 
-def _constant(level: Fraction, relation: str) -> bool:
-    return level == 0 if relation == "= 0" else level >= 0 if relation == "<= 0" else level > 0
+def _constant(value: Fraction, relation: str) -> bool:
+    return value == 0 if relation == "= 0" else value <= 0 if relation == "<= 0" else value < 0
 
 
-def _row(expr: Any, names: Sequence[Any]) -> Row | None:
-    """``normal . x <= level`` for an affine expression that is at most zero; None for another."""
-    normal, level = [ZERO] * len(names), ZERO
+def _row(expr: Any, names: Sequence[Any]) -> Exact | None:
+    """An affine expression as its constant and its slopes; None for another."""
+    row = zeros(1 + len(names))
     for monomial, factor in _FORMS.of(expr).terms.items():
         if not monomial:
-            level -= factor
+            row[0] += factor
             continue
         ((atom, exponent), *others) = monomial
         if others or exponent != 1 or atom.kind != "name" or atom.head not in names:
             return None
-        normal[names.index(atom.head)] += factor
-    return tuple(normal), level
+        row[1 + names.index(atom.head)] += factor
+    return row
 
 
-def _split(rows: Sequence[Row], relations: Sequence[str], size: int) -> tuple[list[Row], list[Row], int]:
+def _split(rows: Sequence[Exact], relations: Sequence[str], size: int) -> tuple[Exact, Exact]:
     """Rows that hold weakly, and those that hold strictly; those without names do not count."""
-    weak: list[Row] = []
-    strict: list[Row] = []
-    for (normal, level), relation in zip(rows, relations, strict=True):
-        if any(normal):
-            (strict if relation == "< 0" else weak).append((normal, level))
-            if relation == "= 0":
-                weak.append((tuple(-v for v in normal), -level))
-    return weak, strict, size
+    pairs = [(row, relation) for row, relation in zip(rows, relations, strict=True) if row[1:].any()]
+    weak = [sign * row for row, relation in pairs if relation != "< 0" for sign in (1, -1)[: 1 + (relation == "= 0")]]
+    return matrix(weak, 1 + size), matrix((row for row, relation in pairs if relation == "< 0"), 1 + size)
 
 
-def _interior(weak: list[Row], strict: list[Row], size: int) -> Sequence[Fraction] | None:
+def _interior(weak: Exact, strict: Exact) -> Exact | None:
     """A point where weak rows hold, and strict ones with room to spare."""
-    if not weak + strict:
-        return (ZERO,) * size
-    depth, point, _ = deepest(weak + strict)
+    size = weak.shape[1] - 1
+    if not len(weak) + len(strict):
+        return zeros(size)
+    depth, point, _ = deepest(np.vstack([weak, strict]))
     if depth < 0:
         return None
-    if not strict:
+    if not len(strict):
         return point
-    one = Fraction(1)
-    wider = [((*normal, ZERO), level) for normal, level in weak]
-    wider += [((*normal, about(normal)), level) for normal, level in strict]
-    wider.append(((ZERO,) * size + (one,), one))
-    found = maximise((ZERO,) * size + (one,), wider, (*point, ZERO))
+    goal = axes(size + 1)[-1]
+    lengths = np.array([about(row[1:]) for row in strict], dtype=object)
+    wider = [np.column_stack([weak, zeros(len(weak))]), np.column_stack([strict, lengths])]
+    wider.append(np.append(np.array([Fraction(-1)], dtype=object), goal)[None])
+    found = maximise(goal, np.vstack(wider), np.append(point, zeros(1)))
     assert found is not None  # the last row bounds it
     return found[0][:-1] if found[0][-1] > 0 else None
