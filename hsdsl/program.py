@@ -97,7 +97,10 @@ NOTHING = Routines((), "def bind():\n    return ()\n")
 
 @dataclass(frozen=True)
 class EdgeProgram:
-    """An edge. ``conditional`` says whether it has an `if`; indices count modes in file order."""
+    """An edge; indices count modes in file order.
+
+    ``conditional`` says whether it has an `if`, and ``condition_text`` how that is written.
+    """
 
     name: str
     source: int
@@ -107,6 +110,7 @@ class EdgeProgram:
     priority: int
     text: str
     reset_texts: tuple[str, ...]
+    condition_text: str = ""
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,7 @@ class Edge:
     reset_texts: tuple[str, ...]
     priority: int = 0
     derived: int = 0
+    condition_text: str | None = None
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
@@ -136,6 +137,15 @@ class Mode:
     def surfaces(self) -> tuple[Surface, ...]:
         """The surfaces of all edges, then the walls."""
         return (*(edge.surface for edge in self.edges), *self.walls)
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A name that was substituted: an input that is an expression, or a `let`, of one mode where ``mode`` is given."""
+
+    name: str
+    text: str
+    mode: str | None = None
 
 
 @dataclass(frozen=True)
@@ -213,6 +223,7 @@ class HybridSystem:
     reference: tuple[Reference, ...]
     files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
     scene: tuple[Shape, ...] = ()
+    definitions: tuple[Definition, ...] = ()  # for people: they are substituted everywhere
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

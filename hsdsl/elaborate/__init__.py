@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hsdsl import limits
-from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units
+from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units, substituted_definitions
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.inputs import define_inputs
 from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
@@ -123,6 +123,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         reference=reference,
         files=symbols.data,
         scene=scene,
+        definitions=tuple(substituted_definitions(document)),
     )
 
 

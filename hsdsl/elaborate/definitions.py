@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections import ChainMap
+from collections.abc import Iterator
 
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.names import did_you_mean, shown
-from hsdsl.schema import ParameterEntry
+from hsdsl.schema import ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
-from hsdsl.system import Parameter
+from hsdsl.system import Definition, Parameter
 
 _UNDER_LET = "give it under `let`, which may use everything"
 _ONLY_PARAMETERS = "a parameter is an expression of earlier parameters"
@@ -63,6 +64,14 @@ def define_lets(symbols: SymbolTable) -> None:
     scope = Scope(ChainMap(refused, earlier, base))  # pyright: ignore[reportArgumentType]
     for name in definition_order(symbols.document.let, "`let` names", refused):
         symbols.values[name] = earlier[name] = symbols.number(symbols.document.let[name], scope)
+
+
+def substituted_definitions(document: ModelDocument) -> Iterator[Definition]:
+    """What was written for each name that the mathematics no longer has: inputs that are expressions, and `let`."""
+    inputs = {name: entry for name, entry in document.inputs.items() if isinstance(entry, Scalar)}
+    yield from (Definition(str(name), scalar.value) for name, scalar in [*inputs.items(), *document.let.items()])
+    for mode, content in document.modes.items():
+        yield from (Definition(str(name), scalar.value, str(mode)) for name, scalar in content.let.items())
 
 
 def elaborate_units(symbols: SymbolTable) -> dict[str, str]:

@@ -87,6 +87,7 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         reset=tuple(resets[s].expr if s in resets else symbol(s) for s in states),
         reset_texts=tuple(texts.get(s, s) for s in states),
         priority=transition.priority,
+        condition_text=None if transition.condition is None else transition.condition.value,
     )
 
 

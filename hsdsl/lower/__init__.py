@@ -234,6 +234,7 @@ def _edge(edge: Edge, indices: dict[str, int]) -> lowered.EdgeProgram:
         priority=edge.priority,
         text=edge.surface.text,
         reset_texts=edge.reset_texts,
+        condition_text=edge.condition_text or "",
     )
 
 

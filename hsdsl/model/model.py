@@ -309,7 +309,7 @@ class Model:
         from hsdsl.plot import plot
 
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
-        plot(execution, path, guards=guard_lines(values), units=self.program.units)
+        plot(execution, path, guards=guard_lines(values), units=self.program.units, program=self.program)
 
     def distance(
         self,

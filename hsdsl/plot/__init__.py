@@ -9,6 +9,7 @@ from io import BytesIO
 from hsdsl.execution import Execution
 from hsdsl.plot.curves import GuardLine
 from hsdsl.plot.style import FORMATS, check_suffixes, save, styled, write_figure
+from hsdsl.program import Program
 from hsdsl.report.html import page
 from hsdsl.store.atomic import replacing
 
@@ -22,19 +23,22 @@ def plot(
     guards: Sequence[GuardLine] = (),
     units: Mapping[str, str] | None = None,
     title: str | None = None,
+    program: Program | None = None,
 ) -> None:
     """Draw a run.
 
     Parameters
     ----------
     path : path
-        ``.png``, ``.svg``, or ``.html`` (one self-contained page with the picture and the summary).
+        ``.png``, ``.svg``, or ``.html`` (one self-contained page with the picture, the summary and the mode graph).
     guards : sequence of GuardLine
         Levels at which transitions fire, drawn as dotted lines where their mode is occupied.
     units : mapping, optional
         Units of states and outputs, and of time under the name ``t``, for the labels of the axes.
     title : str, optional
         Replaces the model's title (or its path, where it has none).
+    program : Program, optional
+        The model whose mode graph is in the page.
 
     Raises
     ------
@@ -50,6 +54,6 @@ def plot(
         if suffix == ".html":
             picture = BytesIO()
             write_figure(figure, picture, "svg")
-            file.write(page(execution, picture.getvalue().decode(), title).encode())
+            file.write(page(execution, picture.getvalue().decode(), title, program).encode())
         else:
             write_figure(figure, file, suffix[1:])

@@ -6,7 +6,8 @@ from html import escape
 
 from hsdsl.execution import Execution
 from hsdsl.names import visible_lines
-from hsdsl.report import words
+from hsdsl.program import Program
+from hsdsl.report import mode_graph, words
 
 CSS = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 75rem; margin: 2rem auto; padding: 0 1rem }
@@ -43,11 +44,13 @@ def _transitions(execution: Execution, limit: int) -> str:
     return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
-def page(execution: Execution, svg: str, title: str | None) -> str:
-    """A page with an SVG picture and the summary; nothing is fetched."""
+def page(execution: Execution, svg: str, title: str | None, program: Program | None = None) -> str:
+    """A page with an SVG picture, the summary and a program's mode graph; nothing is fetched."""
     name = _escaped(title or words.heading(execution))
+    graph = "" if program is None else mode_graph.mode_graph(program, execution)
     picture = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{name}"', 1)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{name}</title>\n'
-        f"<style>{CSS}</style>\n</head>\n<body>\n{picture}\n{html(execution)}\n</body>\n</html>\n"
+        f"<style>{CSS}{mode_graph.CSS}</style>\n</head>\n<body>\n{picture}\n{html(execution)}\n{graph}\n"
+        "</body>\n</html>\n"
     )

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from hsdsl.errors import Findings, ModelError, UsageError
+from hsdsl.expression.plain import value
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.files.model import read_bytes
 from hsdsl.names import did_you_mean, shown
 from hsdsl.spaceex.configuration import Configuration, configuration
 from hsdsl.spaceex.document import Component, components
 from hsdsl.spaceex.drafts import ModeDraft, TransitionDraft
-from hsdsl.spaceex.formula import value
 from hsdsl.spaceex.modes import mode_drafts
 from hsdsl.spaceex.network import flattened
 from hsdsl.spaceex.product import Automaton, Key, automaton

@@ -9,11 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hsdsl.errors import Diagnostic, ModelError
-from hsdsl.expression import symbolic
 from hsdsl.expression.parse import parse
-from hsdsl.expression.scope import Scope, state
-from hsdsl.expression.syntax import ExpressionError, Name, Tree, walk
-from hsdsl.functions import CONSTANTS
+from hsdsl.expression.plain import names_in, value
+from hsdsl.expression.syntax import ExpressionError, Name, walk
 from hsdsl.names import shown
 from hsdsl.spaceex.xml import Passage
 
@@ -123,11 +121,6 @@ def _side(passage: Passage, start: int, end: int) -> tuple[str, bool]:
     return text, primed
 
 
-def names_in(text: str) -> list[str]:
-    """The names in an expression, constants of the language aside."""
-    return [node.name for node in walk(parse(text)) if isinstance(node, Name) and node.name not in CONSTANTS]
-
-
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """An expression with other names, and nothing else changed."""
     for node in reversed([node for node in walk(parse(text)) if isinstance(node, Name)]):
@@ -139,18 +132,6 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 def within(text: str) -> str:
     """An expression to put in place of a name."""
     return text if isinstance(parse(text), Name) else f"({text})"
-
-
-def value(text: str) -> Any:
-    """The SymPy expression, over plain symbols.
-
-    Raises ExpressionError: a function that there is not, a constant without a value, too large.
-    """
-    tree: Tree = parse(text)
-    scope = Scope({name: state(name) for name in names_in(text)})
-    if faults := scope.faults(tree):
-        raise faults[0]
-    return symbolic.number(tree, scope, text).expr
 
 
 def checked(relation: Relation) -> Relation:

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from hsdsl.errors import ModelError
+from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.question import negative, positive
 from hsdsl.lower.straight import lie_derivative, replaced
 from hsdsl.spaceex.drafts import Facet, ModeDraft
 from hsdsl.spaceex.feasibility import decide
-from hsdsl.spaceex.formula import Relation, names_in, value
+from hsdsl.spaceex.formula import Relation
 from hsdsl.spaceex.network import Network
 from hsdsl.spaceex.product import Arrow, Automaton, Key, Place
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 from hsdsl.errors import ModelError
 from hsdsl.expression.parse import parse
+from hsdsl.expression.plain import names_in
 from hsdsl.expression.scope import RESERVED
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.names import closest, shown
 from hsdsl.spaceex.document import Bind, Component, Param
-from hsdsl.spaceex.formula import names_in
 from hsdsl.spaceex.xml import Passage
 
 MOST_INSTANCES, DEEPEST = 1000, 20

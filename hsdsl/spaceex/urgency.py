@@ -13,13 +13,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from hsdsl.errors import Findings
+from hsdsl.expression.plain import value
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.question import Answer, Constraint, at_most_zero, negative, positive, zero
 from hsdsl.lower.straight import lie_derivative, replaced
 from hsdsl.names import shown
 from hsdsl.spaceex.drafts import Facet, ModeDraft, TransitionDraft
 from hsdsl.spaceex.feasibility import decide
-from hsdsl.spaceex.formula import Relation, renamed, value, within
+from hsdsl.spaceex.formula import Relation, renamed, within
 from hsdsl.spaceex.product import Arrow
 
 STRICT = "<>"

@@ -35,7 +35,7 @@ def _mode_lines(mode: Mode) -> list[str]:
 
 def _edge_lines(edge: Edge) -> list[str]:
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
-    condition = [] if edge.condition is None else [f"if {edge.condition}"]
+    condition = [] if edge.condition is None else [f"if {edge.condition_text}"]
     changed = [f"{name} := {text}" for name, text in resets if text != name]
     return [edge.name, f"when {edge.surface.text}", *condition, *changed]
 

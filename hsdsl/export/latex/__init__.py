@@ -1,0 +1,170 @@
+"""A model as mathematics: one LaTeX document with its modes, flows, domains and transitions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from hsdsl.export.latex.escaping import escaped
+from hsdsl.export.latex.mathematics import Mathematics
+from hsdsl.export.source import Source
+from hsdsl.expression.plain import names_in
+from hsdsl.system import Edge, HybridSystem, Mode
+
+WIDEST = 90  # signs of a formula that fit into a line, roughly: a longer one is a paragraph that breaks by itself
+_COMMAND = re.compile(r"\\[A-Za-z]+|[{}^_ ]")
+_HEAD = r"""\documentclass[11pt,a4paper]{article}
+\usepackage[margin=25mm]{geometry}
+\usepackage{amsmath}
+\usepackage{amssymb}
+\setlength{\parindent}{0pt}
+\setlength{\parskip}{4pt}
+\allowdisplaybreaks
+\renewcommand{\labelitemi}{\(\bullet\)}
+\begin{document}
+"""
+
+
+def files(source: Source) -> dict[str, bytes]:
+    """One document that needs no other file."""
+    return {f"{source.name}.tex": document(source).encode()}
+
+
+def document(source: Source) -> str:
+    """The text of the document."""
+    system = source.system
+    math = Mathematics(_names(system))
+    lines = [*(f"% {line}" for line in source.heading), _HEAD, rf"\section*{{{escaped(system.title or source.name)}}}"]
+    lines += [escaped(system.source), ""] if system.source else []
+    lines += _parameters(source, math)
+    lines += _inputs(system, math)
+    shared = _where(system, None, [text for mode in system.modes for text in _texts(mode)], math)
+    lines += [r"\subsection*{Definitions}", *shared] if shared else []
+    for mode in system.modes:
+        lines += _mode(system, mode, math)
+    lines += _run(source, math)
+    return "\n".join([*lines, r"\end{document}", ""])
+
+
+def _names(system: HybridSystem) -> Iterable[str]:
+    yield from system.states
+    yield from (parameter.name for parameter in system.parameters)
+    yield from (given.name for given in system.inputs)
+    yield from (definition.name for definition in system.definitions)
+    yield from system.outputs
+
+
+def _parameters(source: Source, math: Mathematics) -> list[str]:
+    if not source.system.parameters:
+        return []
+    given = source.problem.settings.overrides
+    values = [(p, math.expression(str(given.get(p.name, p.text)))) for p in source.system.parameters]
+    columns = [("symbol", [rf"\({math.name(p.name)}\)" for p, _ in values])]
+    columns += [("value", [rf"\({value}\)" for _, value in values])]
+    columns += [("unit", [escaped(p.unit or "") for p, _ in values])]
+    columns += [("meaning", [escaped(p.about or "") for p, _ in values])]
+    columns = [(title, cells) for title, cells in columns if any(cells)]
+    head = " & ".join(title for title, _ in columns)
+    rows = [" & ".join(row) for row in zip(*(cells for _, cells in columns), strict=True)]
+    table = [rf"\begin{{tabular}}{{@{{}}{'l' * len(columns)}@{{}}}}", rf"{head} \\ \hline", " \\\\\n".join(rows)]
+    return [r"\subsection*{Parameters}", *table, r"\end{tabular}", ""]
+
+
+def _inputs(system: HybridSystem, math: Mathematics) -> list[str]:
+    lines: list[str] = []
+    for given in system.inputs:
+        held = "straight lines between" if given.hold == "linear" else "steps at"
+        count = len(given.times)
+        lines.append(rf"\({math.name(given.name)}(t)\): {held} {count} samples{_unit(given.unit)}.")
+        lines.append("")
+    return [r"\subsection*{Inputs}", *lines] if lines else []
+
+
+def _unit(unit: str | None) -> str:
+    return f" in {escaped(unit)}" if unit else ""
+
+
+def _mode(system: HybridSystem, mode: Mode, math: Mathematics) -> list[str]:
+    end = ", final" if mode.final else ""
+    lines = [rf"\subsection*{{Mode {escaped(mode.name)}{end}}}"]
+    if mode.states:
+        lines.append("States " + ", ".join(_state(system, math, name) for name in mode.states) + ".")
+    flow = zip(mode.states, mode.flow_texts, strict=True)
+    lines += _equations([(rf"\dot{{{math.name(s)}}}", math.expression(text)) for s, text in flow])
+    own = _where(system, mode.name, _texts(mode), math)
+    lines += ["with", *own] if own else []
+    if mode.walls:
+        lines += ["The flow is meant where", *_stacked([math.inequality(wall.text) for wall in mode.walls])]
+    if mode.edges:
+        lines.append(r"\begin{itemize}")
+        for edge in mode.edges:
+            lines += _edge(edge, math)
+        lines.append(r"\end{itemize}")
+    return [*lines, ""]
+
+
+def _state(system: HybridSystem, math: Mathematics, name: str) -> str:
+    unit = system.units.get(name)
+    return rf"\({math.name(name)}\)" + (f" ({escaped(unit)})" if unit else "")
+
+
+def _texts(mode: Mode) -> list[str]:
+    """What is written in a mode."""
+    texts = [*mode.flow_texts, *(wall.text for wall in mode.walls)]
+    for edge in mode.edges:
+        texts += [edge.surface.text, edge.condition_text or "0", *edge.reset_texts]
+    return texts
+
+
+def _where(system: HybridSystem, mode: str | None, texts: Iterable[str], math: Mathematics) -> list[str]:
+    """The definitions that texts use and that are a mode's own, or the whole model's, in the file's order."""
+    known = {d.name: d for d in system.definitions if d.mode is None}
+    known |= {d.name: d for d in system.definitions if mode is not None and d.mode == mode}
+    waiting = [name for text in texts for name in names_in(text)]
+    needed: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name in known and name not in needed:
+            needed.add(name)
+            waiting += names_in(known[name].text)
+    used = [definition for definition in known.values() if definition.name in needed and definition.mode == mode]
+    return _equations([(math.name(d.name), math.expression(d.text)) for d in used])
+
+
+def _edge(edge: Edge, math: Mathematics) -> list[str]:
+    when = rf"when \({math.inequality(edge.surface.text)}\) is reached"
+    condition = rf" while \({math.condition(edge.condition_text)}\)" if edge.condition_text else ""
+    resets = zip(edge.target_states, edge.reset_texts, strict=True)
+    changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in resets if text != name]
+    priority = f", with priority {edge.priority}" if edge.priority else ""
+    line = rf"\item \textbf{{{escaped(edge.name)}}} to {escaped(edge.target)}, {when}{condition}{priority}"
+    return [line + (":" if changed else "."), *_equations(changed)]
+
+
+def _equations(pairs: list[tuple[str, str]]) -> list[str]:
+    """Equations below each other, aligned; where one is too long for that, each is a paragraph."""
+    if not pairs:
+        return []
+    if any(len(_COMMAND.sub("", left + right)) > WIDEST for left, right in pairs):
+        return [r"\begin{flushleft}", *(rf"\({left} = {right}\)\par" for left, right in pairs), r"\end{flushleft}"]
+    rows = [rf"{left} &= {right}" for left, right in pairs]
+    return [r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}"]
+
+
+def _stacked(formulas: list[str]) -> list[str]:
+    return [r"\begin{gather*}", " \\\\\n".join(formulas), r"\end{gather*}"]
+
+
+def _run(source: Source, math: Mathematics) -> list[str]:
+    """Where a run starts, and its settings."""
+    problem, settings = source.problem, source.problem.settings
+    given = settings.overrides
+    initial = dict(source.system.initial.values)
+    values: list[tuple[str, str]] = []
+    for name, number in zip(problem.states, problem.x, strict=True):
+        text = given.get(f"initial.{name}")
+        value = initial.get(name, number) if text is None else None
+        values.append((rf"{math.name(name)}(0)", math.expression(str(text)) if value is None else math.number(value)))
+    start = escaped(problem.program.modes[problem.mode].name)
+    lines = [r"\subsection*{Run}", rf"It starts in mode {start}" + (" at" if values else "."), *_equations(values)]
+    return [*lines, *(rf"{escaped(line)}. \par" for line in source.heading[-3:] if line.startswith(("scheme", "with")))]

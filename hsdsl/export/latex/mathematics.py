@@ -1,0 +1,132 @@
+# pyright: basic, reportIncompatibleMethodOverride=false
+"""Expressions of a model as LaTeX mathematics, by SymPy's printer with names and numbers as people write them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from typing import Any
+
+from sympy.printing.latex import LatexPrinter
+
+from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
+from hsdsl.expression import plain
+from hsdsl.expression.scope import symbol
+
+_SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
+_PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")
+_MOST_PARTS = 9  # of the unit that are written as a fraction: others as decimals, where those end
+_MOST_DIGITS = 20
+
+
+class Mathematics:
+    """Expressions with the names of one model: each has a form of its own."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.names: dict[str, str] = {"t": "t"}
+        for name in names:
+            if name not in self.names:
+                form = _form(name)
+                taken = set(self.names.values())
+                self.names[name] = rf"\text{{\texttt{{{escaped(name)}}}}}" if form in taken else form
+        self.printer = _Printer({symbol(name): form for name, form in self.names.items()})
+
+    def name(self, name: str) -> str:
+        """A name."""
+        return self.names[name]
+
+    def expression(self, text: str) -> str:
+        """An expression, as it was written."""
+        return self.printer.doprint(plain.value(text))
+
+    def inequality(self, text: str) -> str:
+        """One inequality, as it was written."""
+        left, sign, right = plain.inequality(text)
+        return f"{self.printer.doprint(left)} {_SIGNS[sign]} {self.printer.doprint(right)}"
+
+    def condition(self, text: str) -> str:
+        """A condition, as it was written."""
+        return self.printer.doprint(plain.condition(text))
+
+    def number(self, value: Any) -> str:
+        """A number or an expression of SymPy."""
+        return self.printer.doprint(value)
+
+
+def _form(name: str) -> str:
+    """A name as mathematics: Greek letters, one letter in italics, several upright, what follows `_` as an index."""
+    head, *rest = [part for part in name.split("_") if part] or ["_"]
+    match = _PARTS.fullmatch(head)
+    if match:
+        head, rest = match[1], [match[2], *rest]
+    index = ",".join(_word(part) for part in rest)
+    primes = "'" * (len(name) - len(name.rstrip("_")))
+    return _word(head) + (f"_{{{index}}}" if index else "") + primes
+
+
+def _word(word: str) -> str:
+    if len(word) == 1 and greek_name(word) in GREEK:
+        word = greek_name(word)
+    if word in GREEK:
+        return f"\\{word}"
+    if word.isascii() and (len(word) == 1 or word.isdigit()):
+        return word if word != "_" else r"\_"
+    return rf"\mathrm{{{word}}}" if word.isascii() else rf"\text{{{escaped(word)}}}"
+
+
+class _Printer(LatexPrinter):
+    def __init__(self, names: dict[Any, str]) -> None:
+        super().__init__({"symbol_names": names, "ln_notation": False, "mul_symbol": r"\,"})
+
+    def _print_Rational(self, expr: Any) -> str:
+        p, q = int(expr.p), int(expr.q)
+        if q == 1:
+            return str(p)
+        if (abs(p) != 1 or q > _MOST_PARTS) and (decimal := _decimal(p, q)) is not None:
+            return decimal
+        sign, top = ("- " if p < 0 else ""), abs(p)
+        return rf"{sign}\frac{{{top}}}{{{q}}}"
+
+    def _print_absolute(self, expr: Any, exp: Any = None) -> str:
+        text = rf"\left|{{{self._print(expr.args[0])}}}\right|"
+        return f"{text}^{{{exp}}}" if exp is not None else text
+
+    def _print_floor(self, expr: Any, exp: Any = None) -> str:
+        text = rf"\left\lfloor{{{self._print(expr.args[0])}}}\right\rfloor"
+        return f"{text}^{{{exp}}}" if exp is not None else text
+
+    def _named(self, name: str, expr: Any, exp: Any) -> str:
+        arguments = ", ".join(self._print(argument) for argument in expr.args)
+        power = f"^{{{exp}}}" if exp is not None else ""
+        return rf"{name}{power}\left({arguments}\right)"
+
+    def _print_minimum(self, expr: Any, exp: Any = None) -> str:
+        return self._named(r"\min", expr, exp)
+
+    def _print_maximum(self, expr: Any, exp: Any = None) -> str:
+        return self._named(r"\max", expr, exp)
+
+    def _print_sign(self, expr: Any, exp: Any = None) -> str:
+        return self._named(r"\operatorname{sign}", expr, exp)
+
+    def _print_atan2(self, expr: Any, exp: Any = None) -> str:
+        return self._named(r"\operatorname{atan2}", expr, exp)
+
+
+def _decimal(p: int, q: int) -> str | None:
+    """P/q as a decimal, where that ends and is short."""
+    rest = q
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    if rest != 1:
+        return None
+    digits = Decimal(p) / Decimal(q)
+    if Decimal(digits) * q != p:
+        return None
+    text = f"{digits.normalize():E}" if not 1e-4 <= abs(p / q) < 1e6 else f"{digits.normalize():f}"
+    if len(text) > _MOST_DIGITS:
+        return None
+    mantissa, _, exponent = text.partition("E")
+    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa

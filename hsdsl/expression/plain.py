@@ -1,0 +1,48 @@
+# pyright: basic
+"""Expressions over plain symbols: every name means itself, and nothing is substituted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hsdsl.expression import symbolic
+from hsdsl.expression.inequality import the_comparison
+from hsdsl.expression.parse import parse
+from hsdsl.expression.scope import Scope, state
+from hsdsl.expression.syntax import Name, Tree, walk
+from hsdsl.functions import CONSTANTS
+
+
+def names_in(text: str) -> list[str]:
+    """The names in an expression or a condition, constants of the language aside."""
+    return [node.name for node in walk(parse(text)) if isinstance(node, Name) and node.name not in CONSTANTS]
+
+
+def value(text: str) -> Any:
+    """The SymPy expression.
+
+    Raises ExpressionError: a function that there is not, a constant without a value, too large.
+    """
+    tree = parse(text)
+    return symbolic.number(tree, _scope(tree), text).expr
+
+
+def condition(text: str) -> Any:
+    """The SymPy Boolean; errors as for :func:`value`."""
+    tree = parse(text, "condition")
+    return symbolic.condition(tree, _scope(tree), text)
+
+
+def inequality(text: str) -> tuple[Any, str, Any]:
+    """Both sides of an inequality with its sign; errors as for :func:`value`."""
+    tree = parse(text, "inequality")
+    comparison, scope = the_comparison(tree, "when", text), _scope(tree)
+    left, right = (symbolic.number(side, scope, text).expr for side in comparison.operands)
+    return left, comparison.operators[0], right
+
+
+def _scope(tree: Tree) -> Scope:
+    scope = Scope({node.name: state(node.name) for node in walk(tree) if isinstance(node, Name)})
+    if faults := scope.faults(tree):
+        raise faults[0]
+    return scope

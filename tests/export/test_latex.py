@@ -1,0 +1,104 @@
+"""Models as LaTeX: what is written stays mathematics, no text is a command, and the document compiles."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hsdsl
+from hsdsl.export import files_of, source_of
+from hsdsl.export.latex.escaping import escaped
+from hsdsl.export.latex.mathematics import Mathematics
+
+MODELS = sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))
+HOSTILE = """
+hsdsl: 1
+title: '\\input{/etc/passwd} %s & # $x^2$ ~ _ { } \\end{document} "x" <é ü ñ ß θ 中 · ²>'
+source: '% \\write18{ls}'
+parameters:
+  θ_max: {value: 0.25, unit: 'm/s^2 & $', about: 'how \\much%'}
+  x_1: 3
+modes:
+  'a&\\b_%#$': {flow: {x1: abs(x1) + θ_max, é: 'min(x1, floor(x1/2))**2/3 + 1e-9*sign(x1)'}, domain: [x1 <= 100],
+    transitions: [{name: '}\\%', when: x1 >= x_1, if: é > 0 and not x1 < 1, to: 'a&\\b_%#$', reset: {x1: -1e9}}]}
+initial: {mode: 'a&\\b_%#$', x1: 1, é: 0}
+experiment: {until: 1}
+"""
+
+
+def latex(text: str) -> str:
+    return next(iter(files_of(source_of(hsdsl.loads(text), {}), "latex").values())).decode()
+
+
+def check(document: str) -> None:
+    """Braces and environments are closed, nothing but known commands and ASCII is there."""
+    body = "\n".join(line for line in document.splitlines() if not line.startswith("%"))
+    assert body.isascii()
+    plain = re.sub(r"\\[\\{}%&#$_^~]", "", body)
+    depth = 0
+    for sign in plain:
+        depth += (sign == "{") - (sign == "}")
+        assert depth >= 0
+    assert depth == 0 and "%" not in plain and "#" not in plain and "$" not in plain
+    opened: list[str] = []
+    for what, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", plain):
+        opened.append(name) if what == "begin" else None
+        assert what == "begin" or opened.pop() == name
+    assert not opened
+    assert not {"input", "write", "much", "include", "def", "catcode"} & set(re.findall(r"\\([A-Za-z]+)", plain))
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_models_are_documents(path: Path) -> None:
+    (document,) = files_of(source_of(hsdsl.load(path), {}), "latex").values()
+    check(document.decode())
+    model = hsdsl.load(path)
+    assert document.count(rb"\subsection*{Mode ") == len(model.system.modes)
+    assert document.count(b"\\item ") == sum(len(mode.edges) for mode in model.system.modes)
+
+
+def test_text_of_a_model_is_no_command() -> None:
+    check(latex(HOSTILE))
+
+
+@settings(max_examples=100)
+@given(st.text(max_size=40))
+def test_any_text_is_escaped(text: str) -> None:
+    found = escaped(text)
+    assert found.isascii() and "\n" not in found
+    check(found)
+
+
+def test_names_and_numbers_are_written_as_people_do() -> None:
+    math = Mathematics(["x_max", "omega", "x1", "x_1", "vx", "θ", "k__"])
+    forms = {name: math.name(name) for name in math.names}
+    assert forms == {
+        "t": "t", "x_max": r"x_{\mathrm{max}}", "omega": r"\omega", "x1": "x_{1}", "x_1": r"\text{\texttt{x\_1}}",
+        "vx": r"\mathrm{vx}", "θ": r"\theta", "k__": "k''",
+    }  # fmt: skip
+    texts = ["9.81", "1/2", "2.5", "1e-9", "2.7e6", "-1/3", "22/7", "abs(x1)", "min(x1, 2)", "-2*omega*vx", "x1**2/3"]
+    assert [math.expression(text) for text in texts] == [
+        "9.81", r"\frac{1}{2}", "2.5", r"1 \cdot 10^{-9}", "2700000", r"- \frac{1}{3}", r"\frac{22}{7}",
+        r"\left|{x_{1}}\right|", r"\min\left(x_{1}, 2\right)", r"- 2\,\omega\,\mathrm{vx}", r"\frac{x_{1}^{2}}{3}",
+    ]  # fmt: skip
+
+
+@pytest.mark.tools
+@pytest.mark.parametrize("path", [*MODELS, None], ids=lambda path: path.stem if path else "hostile")
+def test_documents_compile(path: Path | None, tmp_path: Path) -> None:
+    compiler = shutil.which("pdflatex") or shutil.which("tectonic")
+    if compiler is None:
+        pytest.skip("neither pdflatex nor tectonic is installed: tests/export/install-tools.sh")
+    text = HOSTILE if path is None else None
+    source = source_of(hsdsl.load(path) if path else hsdsl.loads(str(text)), {})
+    (tmp_path / "model.tex").write_bytes(next(iter(files_of(source, "latex").values())))
+    safe = ["-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape"] if "pdflatex" in compiler else []
+    done = subprocess.run([compiler, *safe, "model.tex"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
