@@ -141,6 +141,12 @@ class Execution(Deferred):
         return len(self.transitions) if counted is None else counted
 
     @property
+    def enters_beyond(self) -> bool:
+        """Whether a transition fired at once on entry; of a compiled run that is sooner known than the transitions."""
+        known: Callable[[], bool] | None = self.__dict__.get("_enters_beyond")
+        return any(made.entry for made in self.transitions) if known is None else known()
+
+    @property
     def time_span(self) -> tuple[Any, Any]:
         """The first and the last time."""
         return self.times[0], self.times[-1]

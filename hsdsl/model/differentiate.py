@@ -49,7 +49,7 @@ class Differentiator:
             ready = self._ready(wrt, arguments, tuple(firsts))
             self._prepared.keep(key, ready)
         run = ready.setting.augmented.simulate()
-        if not ready.entries and (run.stop.reason == "not_finite" or any(made.entry for made in run.transitions)):
+        if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
             ready = self._with_entries(ready)
             self._prepared.keep(key, ready)
             run = ready.setting.augmented.simulate()

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.execution import Array, Execution, Transition, Verdict
-from hsdsl.sensitivity.state_names import derivative_name, rate_name, shift_name
+from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
+from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
 from hsdsl.sensitivity.ties import Tie, ties
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.stops import show
@@ -184,17 +184,13 @@ class Sensitivity:
     def _known(self, row: Slopes, exists: bool) -> Slopes:
         return row if exists else dict.fromkeys(row, float("nan"))
 
-    def own(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        """The states of the model among those of an augmented mode: they come first."""
-        return names[: (len(names) - len(self.wrt)) // (1 + len(self.wrt))]
-
     def _shifts(self, state: Mapping[str, Any]) -> Slopes:
-        return {by: state[shift_name(by)] for by in self.wrt}
+        return {by: state.get(shift_name(by), 0.0) for by in self.wrt}
 
     def _followed(self, mode: str, t: Any, state: Mapping[str, Any], time: Slopes, after: bool) -> dict[str, Slopes]:
         """The derivatives of states at a time that moves: S + f T."""
-        names = self.own(tuple(state))
-        found = {x: {by: state[derivative_name(x, by)] for by in self.wrt} for x in names}
+        names = own(state)
+        found = {x: {by: state.get(derivative_name(x, by), 0.0) for by in self.wrt} for x in names}
         if not any(moves != 0 for moves in time.values()):
             return found
         slope = self._flow(mode, t, [state[x] for x in names], after)
@@ -238,7 +234,7 @@ class Sensitivity:
         broken = min((when for when, _ in self.breaks), default=None)
         slopes: dict[str, Array] = {}
         for name in names:
-            slopes[name] = np.stack([table[derivative_name(name, by)] for by in self.wrt], axis=-1)
+            slopes[name] = np.stack([self._column(table, name, by) for by in self.wrt], axis=-1)
             if any(any(row.values()) for row in moving):
                 rates = self._rates(name, table)
                 shift = np.array([[row[by] for by in self.wrt] for row in moving[: len(rates)]])
@@ -246,6 +242,17 @@ class Sensitivity:
             if broken is not None:
                 slopes[name][np.asarray(table.time) >= broken] = np.nan
         return SampleSlopes(np.asarray(table.time), {name: table[name] for name in names}, slopes)
+
+    def _column(self, table: Samples, name: str, by: str) -> Array:
+        """A derivative at samples: zero in modes that leave it out, NaN in those without the state."""
+        known = derivative_name(name, by)
+        if known not in table.names:
+            return np.where(table[name] == table[name], 0.0, np.nan)
+        column = table[known]
+        if name in table.states:
+            there, has = (table.present[:, table.states.index(each)] for each in (name, known))
+            column = np.where(there & ~has, 0.0, column)
+        return column
 
     def _rates(self, name: str, table: Any) -> Array:
         """The derivative of a state or output by time, at samples."""
@@ -260,4 +267,4 @@ class Sensitivity:
         return np.array(rates)
 
     def _all_states(self) -> Iterator[str]:
-        yield from dict.fromkeys(x for arc in self.execution.arcs for x in self.own(arc.states))
+        yield from dict.fromkeys(x for arc in self.execution.arcs for x in own(arc.states))

@@ -3,8 +3,17 @@
 A model's names are identifiers, and none of these is.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 UNIT, SPAN, ERROR = "unit round-off", "length of the run", "error of the run"  # parameters, given by numbers
 LAST = "time of the last transition"
+
+
+def own(names: Iterable[str]) -> tuple[str, ...]:
+    """The names that are a model's."""
+    return tuple(name for name in names if " " not in name)
 
 
 def derivative_name(state: str, by: str) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
-from hsdsl.sensitivity.state_names import derivative_name, shift_name
+from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.commutation import settle
 from hsdsl.simulate.verdict.run_view import RunView
@@ -80,9 +80,8 @@ def _order(run: RunView, edge: str, mode: str, values: Sequence[Number], wrt: Se
     program = run.problem.program.modes[run.index(mode)]
     names = program.states or next(a.states for a in reversed(run.execution.arcs) if len(a.states) == len(values))
     named = dict(zip(names, values, strict=True))
-    own = names[: (len(names) - len(wrt)) // (1 + len(wrt))]
-    slopes = {x: {by: named[derivative_name(x, by)] for by in wrt} for x in own}
-    return Order(edge, mode, {x: named[x] for x in own}, slopes)
+    slopes = {x: {by: named.get(derivative_name(x, by), 0.0) for by in wrt} for x in own(names)}
+    return Order(edge, mode, {x: named[x] for x in slopes}, slopes)
 
 
 def _disagreement(run: RunView, made: Transition, orders: Sequence[Order]) -> str | None:

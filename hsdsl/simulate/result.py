@@ -75,6 +75,7 @@ def written(
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         _of=_Written(under_way, columns),
         _made=under_way.made,
+        _enters_beyond=lambda: under_way.made > 0 and bool(columns["transition"]["entry"].any()),
     )
 
 

@@ -51,12 +51,13 @@ def difference(model: Any, by: str, **call: Any) -> dict[str, Any]:
     else:
         values = with_parameters(model.pipeline.values(arithmetic), {})
         value = values.parameters[model.program.parameters.index(name)]
+    step = arithmetic.constant(STEP) * (abs(value) if value else 1)
     for way in (1, -1):
-        moved = {kind: {name: value + way * arithmetic.constant(STEP)}}
+        moved = {kind: {name: value + way * step}}
         runs.append(recorded(model.simulate(precision=DIGITS, scheme="located", method="taylor", **moved, **call)))
     ahead, behind = runs
     assert ahead.keys() == behind.keys()
-    return {k: (ahead[k] - behind[k]) / (2 * arithmetic.constant(STEP)) for k in ahead}
+    return {k: (ahead[k] - behind[k]) / (2 * step) for k in ahead}
 
 
 def assert_agree(found: Any, model: Any, **call: Any) -> None:
