@@ -104,7 +104,8 @@ def influence(system: HybridSystem) -> Influence:
 
 
 def _names(expr: Any) -> Iterator[str]:
-    return (symbol.name for symbol in expr.free_symbols)
+    """The names in an expression; none in a plain number."""
+    return (symbol.name for symbol in getattr(expr, "free_symbols", ()))
 
 
 def _observed(system: HybridSystem) -> Iterator[Any]:
@@ -126,7 +127,7 @@ def _definitions(system: HybridSystem) -> Iterator[tuple[str, Any]]:
     yield from system.initial.values
     yield from ((parameter.name, parameter.value) for parameter in system.parameters)
     for given in system.inputs:
-        yield from ((given.name, value) for value in (*given.times, *given.values) if hasattr(value, "free_symbols"))
+        yield from ((given.name, value) for value in (*given.times, *given.values))
 
 
 def _settings(system: HybridSystem) -> list[Any]:

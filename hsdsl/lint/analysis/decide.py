@@ -159,9 +159,8 @@ class Decider:
     def _somewhere(self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Ranges) -> Answer:
         for symbol, limits in ranges.items():
             if symbol not in point and symbol not in solved:
-                low, high = reduced.bounds[symbol]
-                value = limits.typical if low is None else max(limits.typical, float(low))
-                point[symbol] = value if high is None else min(value, float(high))
+                low, high = map(float, reduced.bounds[symbol])
+                point[symbol] = min(max(limits.typical, low), high)
         free = list(point)
         values = StraightLine(solved.values(), free).at(np.array([[point[s] for s in free]]))[:, 0] if solved else ()
         whole = {**point, **dict(zip(solved, map(float, values), strict=True))}
@@ -179,25 +178,21 @@ def _solutions(reduced: Reduced) -> dict[Any, Any]:
 
 
 def _box(names: Sequence[Any], reduced: Reduced, ranges: Ranges) -> tuple[Array, Array]:
-    low: list[float] = []
-    high: list[float] = []
-    for symbol in names:
-        first, last = reduced.bounds[symbol]
-        near, far = ranges[symbol].search
-        start = near if first is None else float(first)
-        end = far if last is None else float(last)
-        low.append(start if first is not None else min(near, end - (far - near)))
-        high.append(end if last is not None else max(far, start + (far - near)))
-    return np.array(low), np.array(high)
+    """Where to look: between exact bounds, else as far from them as a range is wide, or in the range."""
+    ends = np.array([reduced.bounds[symbol] for symbol in names], dtype=float).reshape(-1, 2)
+    near, far = np.array([ranges[symbol].search for symbol in names]).reshape(-1, 2).T
+    start, end = (np.where(np.isinf(given), own, given) for given, own in zip(ends.T, (near, far), strict=True))
+    low = np.where(np.isinf(ends[:, 0]), np.minimum(near, end - (far - near)), start)
+    return low, np.where(np.isinf(ends[:, 1]), np.maximum(far, start + (far - near)), end)
 
 
 def _searched(names: Sequence[Any], reduced: Reduced, ranges: Ranges) -> tuple[tuple[Any, float, float], ...]:
     """How far was looked in names that nothing bounds: an end that the constraints themselves give is none."""
     found: list[tuple[Any, float, float]] = []
     for symbol, low, high in zip(names, *_box(names, reduced, ranges), strict=True):
-        first, last = reduced.bounds[symbol]
-        if first is None or last is None:
-            found.append((symbol, float(low if first is None else -np.inf), float(high if last is None else np.inf)))
+        without = np.isinf(np.array(reduced.bounds[symbol], dtype=float))
+        if without.any():
+            found.append((symbol, *np.where(without, (low, high), (-np.inf, np.inf)).tolist()))
     return tuple(found)
 
 

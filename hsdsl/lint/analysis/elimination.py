@@ -2,7 +2,7 @@
 """First step of a decision: elimination of linear equations between polynomials.
 
 Equations that are linear in a name are solved for it and put into the rest. The rest is compared with the bounds that
-the constraints give (`bound_propagation`). There is no search and no general solver.
+the constraints give (`rational_bounds`). There is no search and no general solver.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from hsdsl.lint.analysis.bound_propagation import Contradiction, Row, tighten
 from hsdsl.lint.analysis.normal_form import NormalForms
 from hsdsl.lint.analysis.polynomial import Polynomial, linear_in, number
 from hsdsl.lint.analysis.question import Constraint, Ranges, SearchRange
-from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.rational_bounds import Contradiction, RationalBounds, Row, bounds_of, holds, tighten
 
 
 @dataclass
@@ -43,7 +42,7 @@ def reduce(constraints: Sequence[Constraint], normal_forms: NormalForms, ranges:
     try:
         reduced = Reduced([(normal_forms.of(c.expr), c.relation) for c in constraints])
         _eliminate(reduced, normal_forms, ranges)
-        reduced.bounds = {symbol: (r.low, r.high) for symbol, r in ranges.items()}
+        reduced.bounds = {symbol: r.bounds for symbol, r in ranges.items()}
         tighten(reduced.rows, reduced.bounds)
     except Contradiction:
         return None
@@ -112,7 +111,7 @@ def _kept(rows: list[Row]) -> list[Row]:
     """The rows that are not settled by being numbers."""
     kept: list[Row] = []
     for p, relation in dict.fromkeys(rows):
-        settled = holds(bounds_of(p, of_constant), relation) if not p.names else None
+        settled = holds(bounds_of(p, {}), relation) if not p.names else None
         if settled is False:
             raise Contradiction
         if settled is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, Literal
 
 from hsdsl.errors import Decided
@@ -52,6 +53,11 @@ class SearchRange:
     high: Any | None
     search: tuple[float, float]
     typical: float
+
+    @property
+    def bounds(self) -> tuple[Any, Any]:
+        """The ends, infinite where there are none."""
+        return -inf if self.low is None else self.low, inf if self.high is None else self.high
 
 
 Ranges = Mapping[Any, SearchRange]  # by name

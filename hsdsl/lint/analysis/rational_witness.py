@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 from hsdsl.lint.analysis.elimination import Reduced
-from hsdsl.lint.analysis.polynomial import Atom, Polynomial, linear_in
+from hsdsl.lint.analysis.polynomial import Polynomial, linear_in
 from hsdsl.lint.analysis.question import Ranges, SearchRange
-from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds, of_constant
+from hsdsl.lint.analysis.rational_bounds import RationalBounds, bounds_of, holds
 
 
 def point(reduced: Reduced, ranges: Ranges) -> dict[Any, float] | None:
@@ -32,26 +32,21 @@ def _inside(bounds: RationalBounds, limits: SearchRange) -> Fraction:
     """A plain value within bounds, the typical one if it can be."""
     low, high = bounds
     typical = Fraction(limits.typical)
-    if (low is None or low < typical) and (high is None or typical < high):
+    if low < typical < high or (bounds == limits.bounds and low <= typical <= high):  # nothing but its own range
         return typical
-    if bounds == (limits.low, limits.high) and low is not None and high is not None and low <= typical <= high:
-        return typical  # nothing but its own range holds it
-    if low is not None and high is not None:
+    if isinstance(low, Fraction) and isinstance(high, Fraction):
         return (low + high) / 2
-    return low + 1 if low is not None else high - 1 if high is not None else typical
+    return low + 1 if isinstance(low, Fraction) else Fraction(high) - 1
 
 
 def _valued(p: Polynomial, values: Mapping[Any, Fraction]) -> RationalBounds:
-    def of_atom(atom: Atom) -> RationalBounds:
-        return (values[atom.head], values[atom.head]) if atom.kind == "name" else of_constant(atom)
-
-    return bounds_of(p, of_atom)
+    return bounds_of(p, {name: (values[name], values[name]) for name in p.names})
 
 
 def _repair(p: Polynomial, values: dict[Any, Fraction], bounds: Mapping[Any, RationalBounds]) -> bool:
     """Move one name so that a linear constraint holds with room to spare."""
     low, high = _valued(p, values)
-    if low is None or high is None:
+    if isinstance(low, float) or isinstance(high, float):
         return False
     for symbol in sorted(p.names, key=lambda s: s.name):
         coefficient = linear_in(p, symbol)
@@ -60,9 +55,9 @@ def _repair(p: Polynomial, values: dict[Any, Fraction], bounds: Mapping[Any, Rat
         first, last = bounds[symbol]
         edge = values[symbol] - high / coefficient
         far = edge - 1 if coefficient > 0 else edge + 1
-        if first is not None and last is not None:
+        if isinstance(first, Fraction) and isinstance(last, Fraction):
             far = (edge + (first if coefficient > 0 else last)) / 2
-        if (first is None or first <= far) and (last is None or far <= last):
+        if first <= far <= last:
             values[symbol] = far
             return True
     return False
@@ -72,8 +67,7 @@ def _complete(values: dict[Any, Fraction], reduced: Reduced) -> dict[Any, float]
     """Put values into what was eliminated, last first."""
     known: dict[Any, RationalBounds] = {s: (v, v) for s, v in values.items()}
     for symbol, p in reversed(reduced.solved):
-        low, high = bounds_of(p, lambda atom: known[atom.head] if atom.kind == "name" else of_constant(atom))
-        if low is None or high is None or high - low > Fraction(1, 10**15) * (1 + abs(low)):
+        low, high = known[symbol] = bounds_of(p, known)
+        if isinstance(low, float) or isinstance(high, float) or high - low > Fraction(1, 10**15) * (1 + abs(low)):
             return None
-        known[symbol] = low, high
-    return {s: float((low + high) / 2) for s, (low, high) in known.items() if low is not None and high is not None}
+    return {s: float((low + high) / 2) for s, (low, high) in known.items()}
