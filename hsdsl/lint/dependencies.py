@@ -76,14 +76,8 @@ def unused(document: ModelDocument, expressions: Iterable[SourceExpression]) -> 
 class Influence:
     """Names of states, parameters and sampled inputs, over all modes together.
 
-    Attributes
-    ----------
-    observed : frozenset of str
-        The names in guards, conditions, walls, outputs and the scene.
-    needed : frozenset of str
-        The names that can change the value of an observed one, or a setting of the experiment.
-    read : frozenset of str
-        The names in expressions other than a state's own flow and resets.
+    ``observed`` are in guards, conditions, walls, outputs and scenes. ``needed`` can change the value of such a name,
+    or a setting of the experiment. ``read`` are in expressions other than a state's own flow and resets.
     """
 
     observed: frozenset[str]

@@ -10,22 +10,10 @@ from hsdsl.errors import Decided, Edit, Severity, Span
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding of a rule, whose code it has.
+    """One finding of a rule: the smallest part of the file that has to change, one sentence, and what to write.
 
-    Attributes
-    ----------
-    span : Span
-        Where: the smallest part of the file that has to change.
-    message : str
-        One sentence, with the names it is about.
-    hint : str or None
-        What to write instead, when that is known.
-    decided : {"symbolic", "interval", "sampled"}
-        For all values, by bounds over boxes, or at points.
-    fix : tuple of Edit
-        Changes of the text that remedy it and keep the meaning of the model.
-    severity : {"warning", "note"} or None
-        Another severity than that of the rule.
+    It is decided for all values (``symbolic``), by bounds over boxes (``interval``) or at points (``sampled``). The
+    ``fix`` remedies it and keeps the meaning of the model. A ``severity`` takes the place of the rule's.
     """
 
     span: Span

@@ -93,17 +93,7 @@ def _attempt(
 
 def _meaning(system: HybridSystem) -> tuple[Any, ...]:
     """What no fix may change. Walls that guards repeat, priorities without a rival and defaults may go."""
-    modes = [
-        (
-            mode.name,
-            mode.states,
-            mode.flow,
-            mode.final,
-            mode.outputs,
-            mode.scene,
-            [(e.name, e.target, e.surface.residual, e.condition, e.reset) for e in mode.edges],
-        )
-        for mode in system.modes
-    ]
+    edges = [[(e.name, e.target, e.surface.residual, e.condition, e.reset) for e in m.edges] for m in system.modes]
+    modes = [(m.name, m.states, m.flow, m.final, m.outputs, m.scene) for m in system.modes]
     parameters = [(p.name, p.value, p.minimum, p.maximum) for p in system.parameters]
-    return (modes, parameters, system.inputs, system.outputs, system.initial, system.units, system.reference)
+    return (modes, edges, parameters, system.inputs, system.outputs, system.initial, system.units, system.reference)

@@ -35,20 +35,10 @@ _WANTED: dict[Role, Expected] = {"domain": "inequality", "when": "inequality", "
 
 @dataclass(frozen=True)
 class SourceExpression:
-    """One expression of a file.
+    """One expression of a file: what it is for, its text and place, and the mode it belongs to, if any.
 
-    Attributes
-    ----------
-    role : str
-        What the expression is for, one of :data:`Role`.
-    scalar : Scalar
-        Its text and place.
-    name : str
-        What it defines; empty for walls, surfaces and conditions.
-    mode : str or None
-        The mode it belongs to.
-    index : int
-        Of `domain`, `when`, `if` and `reset`: which wall or which transition of the mode.
+    ``name`` is what it defines; empty for walls, surfaces and conditions. ``index`` says of `domain`, `when`, `if` and
+    `reset` which wall or which transition of the mode it is.
     """
 
     role: Role

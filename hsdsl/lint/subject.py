@@ -44,16 +44,10 @@ class ModePart:
 
 
 class Subject:
-    """A model to look at. What is derived from it is computed once, and shared by all rules.
+    """A model to look at: its mathematics, its keys and scalars with their places, and the nodes of the file.
 
-    Attributes
-    ----------
-    system : HybridSystem
-        The mathematics; parameters are symbols, `let` and expression inputs are substituted.
-    document : Model
-        Keys and scalars of the file, each with its place.
-    root : Node
-        The nodes of the file.
+    In ``system`` parameters are symbols, `let` and expression inputs are substituted. What is derived is computed once,
+    and shared by all rules.
     """
 
     def __init__(self, reading: Elaboration) -> None:

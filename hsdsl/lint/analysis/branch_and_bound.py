@@ -19,18 +19,9 @@ _SMALLEST = 2.0**-40
 def excluded(
     program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array, most: int = MOST_BOXES
 ) -> bool:
-    """Whether no point of a box satisfies all constraints.
+    """Whether no point of a box satisfies all constraints, after at most so many boxes.
 
-    Parameters
-    ----------
-    program : StraightLine
-        The constraints' expressions.
-    relations : tuple of str
-        What each has to be.
-    low, high : array (names)
-        The box.
-    most : int
-        How many boxes to look at before giving up.
+    ``program`` has their expressions, ``relations`` what each has to be; ``low`` and ``high`` (names) are the box.
     """
     whole = np.maximum(high - low, 1e-300)
     lows, highs = low[None], high[None]

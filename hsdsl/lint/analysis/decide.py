@@ -43,14 +43,8 @@ class Decider:
     def decide(self, constraints: Sequence[Constraint], ranges: Ranges, prove: bool = False) -> Answer:
         """Answer whether there is a point that satisfies all constraints.
 
-        Parameters
-        ----------
-        constraints : sequence of Constraint
-            Their expressions hold the names of ``ranges``, exact numbers, and nothing else.
-        ranges : mapping
-            Each name's range; answers are remembered for this object.
-        prove : bool
-            Whether `never` matters as much as `somewhere`: else boxes are not tried.
+        Their expressions hold the names of ``ranges`` and exact numbers; answers are remembered for that object. Boxes
+        are tried only with ``prove``, when `never` matters as much as `somewhere`.
         """
         key = (tuple(constraints), id(ranges), prove)
         if key not in self._known:

@@ -32,13 +32,7 @@ Clause = tuple[Constraint, ...]
 
 
 class Dynamics:
-    """A hybrid system with numbers for its parameters, and a decider of questions about it.
-
-    Parameters
-    ----------
-    system : HybridSystem
-        The model.
-    """
+    """A hybrid system with numbers for its parameters, and a decider of questions about it."""
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
@@ -62,10 +56,7 @@ class Dynamics:
         return {symbol(s): self.placed(f) for s, f in zip(mode.states, mode.flow, strict=True)}
 
     def rate(self, mode: Mode, expr: Any | None) -> Any | None:
-        """L_f of an expression: how fast it changes along the flow.
-
-        None where that is not known: the expression is too large, or follows an input that is interpolated.
-        """
+        """L_f of an expression; None where it is too large, or follows an input that is interpolated."""
         return self.remembered(("rate", mode.name, expr), lambda: self.along(expr, self.flow(mode)))
 
     def along(self, expr: Any | None, flow: Mapping[Any, Any]) -> Any | None:
@@ -149,11 +140,8 @@ class Dynamics:
     @cached_property
     def incoming(self) -> dict[str, list[Edge]]:
         """The edges that lead to each mode."""
-        found: dict[str, list[Edge]] = {mode.name: [] for mode in self.system.modes}
-        for mode in self.system.modes:
-            for edge in mode.edges:
-                found[edge.target].append(edge)
-        return found
+        edges = [edge for mode in self.system.modes for edge in mode.edges]
+        return {name: [edge for edge in edges if edge.target == name] for name in self.modes}
 
     @cached_property
     def starting_point(self) -> dict[Any, float]:
@@ -217,10 +205,8 @@ class Dynamics:
                 p = self.decider.normal_forms.of(self.residual(surface))
                 for name in p.names if len(p.names) == 1 else ():
                     coefficient = linear_in(p, name)
-                    level = (
-                        float(min(abs(p.terms.get((), Fraction(0)) / coefficient), _LARGEST)) if coefficient else 0.0
-                    )
-                    found[name.name] = max(found.get(name.name, 0.0), level)
+                    level = abs(p.terms.get((), Fraction(0)) / coefficient) if coefficient else Fraction(0)
+                    found[name.name] = max(found.get(name.name, 0.0), float(min(level, _LARGEST)))
         return found
 
     @cached_property

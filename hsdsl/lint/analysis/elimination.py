@@ -20,16 +20,9 @@ from hsdsl.lint.analysis.rational_bounds import Contradiction, RationalBounds, R
 
 @dataclass
 class Reduced:
-    """What is left of a question when its linear equations are solved.
+    """What is left of a question when its linear equations are solved: constraints, and exact bounds of names.
 
-    Attributes
-    ----------
-    rows : list of (polynomial, relation)
-        The constraints that are left.
-    solved : list of (symbol, polynomial)
-        Names and what they are, in the order of elimination: each in the names that were left then.
-    bounds : dict
-        Exact bounds of the names that are left.
+    ``solved`` has names and what they are, in the order of elimination: each in the names that were left then.
     """
 
     rows: list[Row]
@@ -99,12 +92,9 @@ def _single(p: Polynomial) -> Polynomial:
 
 
 def _limits(value: Polynomial, limits: SearchRange) -> list[Row]:
-    rows: list[Row] = []
-    if limits.low is not None:
-        rows.append((number(limits.low) - value, "<= 0"))
-    if limits.high is not None:
-        rows.append((value - number(limits.high), "<= 0"))
-    return rows
+    low: list[Row] = [] if limits.low is None else [(number(limits.low) - value, "<= 0")]
+    high: list[Row] = [] if limits.high is None else [(value - number(limits.high), "<= 0")]
+    return low + high
 
 
 def _kept(rows: list[Row]) -> list[Row]:

@@ -16,24 +16,12 @@ from hsdsl.system import Edge, Surface
 
 @dataclass(frozen=True)
 class Landing:
-    """A reset that lands on a surface of the next mode, wherever its transition fires.
+    """A reset that lands on a surface of the next mode, wherever its transition fires, and how that is known.
 
-    Attributes
-    ----------
-    edge : Edge or None
-        The edge whose surface it is; None for a wall.
-    surface : Surface
-        That surface.
-    rate : sympy.Expr or None
-        How fast the surface function changes after landing, in the states before the reset.
-    bend : sympy.Expr or None
-        How fast that rate changes.
-    guard : list of clauses
-        Where the first transition fires and the condition of the second holds.
-    returns : bool
-        Whether the second transition leads back to the mode and state before the first.
-    decided : {"symbolic", "sampled"}
-        How it is known that it lands there.
+    The surface is that of ``edge``, or a wall (None). ``rate`` says how fast the surface function changes after
+    landing, in the states before the reset, and ``bend`` how fast that rate does. ``guard`` is where the first
+    transition fires and the condition of the second holds. With ``returns`` the second one leads back to the mode and
+    state before the first.
     """
 
     edge: Edge | None

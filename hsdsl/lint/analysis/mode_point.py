@@ -36,17 +36,7 @@ class Unsure(Exception):
 
 @dataclass(frozen=True)
 class ModePoint:
-    """A point of a mode.
-
-    Attributes
-    ----------
-    dynamics : Dynamics
-        The model.
-    mode : Mode
-        The mode.
-    point : mapping of symbols to numbers
-        The values of its states, the inputs and time.
-    """
+    """A point of a mode: the values of its states, the inputs and time, by symbol."""
 
     dynamics: Dynamics
     mode: Mode
@@ -88,13 +78,9 @@ class ModePoint:
     def first(self, residual: Any) -> tuple[int, int]:
         """The order and the sign of the first derivative of a surface function along the flow that is not 0.
 
-        Sign 0 where none is, up to order :data:`DEEPEST`.
-
-        Raises
-        ------
-        Unsure
-            The flow or the surface has a kink or a jump here, or depends on an input in a way that is not known. Or
-            what the errors of lower derivatives hide may outweigh this one, until the next one does.
+        Sign 0 where none is, up to order :data:`DEEPEST`. Raises :class:`Unsure` where the flow or the surface has a
+        kink or a jump, or depends on an input in a way that is not known. So it does where what the errors of lower
+        derivatives hide may outweigh this one, until the next one does.
         """
         piece = self.piece(residual, self.dynamics.flow(self.mode))
         expr, errors = piece.residual, list[float]()
@@ -125,10 +111,7 @@ class ModePoint:
     def piece(self, residual: Any, flow: Mapping[Any, Any]) -> SmoothPiece:
         """The piece that the point is inside of, and on which surface and flow have all derivatives here.
 
-        Raises
-        ------
-        Unsure
-            It is at a kink, or may be at a jump or at an infinite slope.
+        Raises :class:`Unsure` at a kink, and where there may be a jump or an infinite slope.
         """
         for piece in pieces(residual, flow) or ():
             if not piece.zeros and all(self.sign(side) > 0 for side in piece.sides):
@@ -146,17 +129,14 @@ class ModePoint:
         return all(sign == 0 if relation == "= 0" else sign <= 0 for sign, relation in signs)
 
     def holds(self, edge: Edge) -> bool:
-        """Whether the `if` of an edge holds.
+        """Whether the `if` of an edge holds; raises :class:`Unsure` where a comparison is at its end."""
+        return any(map(self._all, self._condition(edge)))
 
-        Raises
-        ------
-        Unsure
-            A comparison is at its end.
-        """
+    def _condition(self, edge: Edge) -> list[Clause]:
         clauses = self.dynamics.condition(edge)
         if clauses is None:
             raise Unsure
-        return any(self._all(clause) for clause in clauses)
+        return clauses
 
     def _all(self, clause: Clause) -> bool:
         signs = [self.sign(c.expr) for c in clause]
@@ -167,17 +147,8 @@ class ModePoint:
         return True
 
     def will_hold(self, edge: Edge) -> bool:
-        """Whether the `if` of an edge holds just after the point, along the flow.
-
-        Raises
-        ------
-        Unsure
-            A kink, a jump or an input decides that.
-        """
-        clauses = self.dynamics.condition(edge)
-        if clauses is None:
-            raise Unsure
-        return any(all(map(self._will_hold, clause)) for clause in clauses)
+        """Whether the `if` of an edge holds just after the point, along the flow; raises as :meth:`first` does."""
+        return any(all(map(self._will_hold, clause)) for clause in self._condition(edge))
 
     def _will_hold(self, constraint: Constraint) -> bool:
         sign = self.sign(constraint.expr) or self.first(constraint.expr)[1]
@@ -196,13 +167,7 @@ class ModePoint:
         return ModePoint(self.dynamics, target, kept | new)
 
     def next(self) -> Edge | None:
-        """The transition that a run makes at once that enters here (M4, M5, M6); None where it flows, or stops.
-
-        Raises
-        ------
-        Unsure
-            That is not known.
-        """
+        """The transition that a run makes at once that enters here (M4, M5, M6); None where it flows, or stops."""
         if self.mode.final:
             return None
         signs = {edge: self.sign(self.dynamics.residual(edge.surface)) for edge in self.mode.edges}

@@ -24,19 +24,7 @@ _STEP = 1e-7
 
 @dataclass(frozen=True)
 class NewtonSearch:
-    """Constraints as a program over a box.
-
-    Attributes
-    ----------
-    program : StraightLine
-        The constraints' expressions.
-    relations : tuple of str
-        What each of them has to be.
-    low, high : array
-        The box to search.
-    typical : array
-        A typical value of each name; the first start.
-    """
+    """Constraints as a program and what each has to be, and the box to search, with a typical point to start from."""
 
     program: StraightLine
     relations: tuple[Relation, ...]
@@ -52,9 +40,8 @@ class NewtonSearch:
         with quiet():
             points = self._starts()
             for _ in range(ROUNDS):
-                good = self._good(points)
-                if good.any():
-                    return self._plain(points[np.argmax(good)])
+                if self._good(points).any():
+                    break
                 points = self._moved(points)
             good = self._good(points)
         return self._plain(points[np.argmax(good)]) if good.any() else None

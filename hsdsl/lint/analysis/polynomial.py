@@ -20,13 +20,8 @@ UNIT: Monomial = ()
 class Atom:
     """What a polynomial is made of, one object for each: equal atoms are the same object.
 
-    Attributes
-    ----------
-    index : int
-        Its place in the order of atoms.
-    kind : str
-        ``name``, ``constant``, ``sum`` (a polynomial kept whole), ``root`` (the ``degree``-th root of its argument), or
-        ``call`` of the SymPy function ``head``.
+    ``index`` is its place in the order of atoms. Its kind is ``name``, ``constant``, ``sum`` (a polynomial kept whole),
+    ``root`` (the ``degree``-th root of its argument), or ``call`` of the SymPy function ``head``.
     """
 
     index: int

@@ -14,19 +14,7 @@ from hsdsl.system import TIME, Mode
 
 @dataclass
 class Proof:
-    """What is known to have no point in a mode.
-
-    Attributes
-    ----------
-    dynamics : Dynamics
-        The model.
-    mode : Mode
-        The mode of the states.
-    found : list of Answer
-        The answers that the proof rests on.
-    timed : bool
-        Whether it holds for the times of the run alone.
-    """
+    """What is known to have no point in a mode, by the answers found; where ``timed``, within the run's time alone."""
 
     dynamics: Dynamics
     mode: Mode

@@ -65,18 +65,10 @@ Ranges = Mapping[Any, SearchRange]  # by name
 
 @dataclass(frozen=True)
 class Answer:
-    """What is known of a question.
+    """What is known of a question: whether there is such a point, how that is known, and a point.
 
-    Attributes
-    ----------
-    verdict : {"never", "somewhere", "unknown"}
-        Whether there is such a point.
-    decided : {"symbolic", "interval", "sampled"}
-        How it is known, where it is.
-    point : mapping of symbols to numbers
-        Such a point.
-    searched : tuple of (symbol, low, high)
-        Of `never`: the names that nothing bounds, and how far was looked; infinite where that is no limit.
+    ``searched`` are, of `never`, the names that nothing bounds, and how far was looked; infinite where that is no
+    limit.
     """
 
     verdict: Literal["never", "somewhere", "unknown"]

@@ -92,13 +92,7 @@ def holds(bounds: RationalBounds, relation: Relation) -> bool | None:
 
 
 def tighten(rows: Sequence[Row], bounds: dict[Any, RationalBounds]) -> None:
-    """Narrow ``bounds`` by what rows say of names.
-
-    Raises
-    ------
-    Contradiction
-        Some rows exclude each other, or the bounds.
-    """
+    """Narrow ``bounds`` by what rows say of names; raise :class:`Contradiction` where they exclude each other."""
     # Of each direction the largest lower end, with whether it is open, and the least upper one: with whether closed.
     directions: dict[tuple[tuple[Monomial, Fraction], ...], list[tuple[End, bool]]] = {}
     for p, relation in rows:

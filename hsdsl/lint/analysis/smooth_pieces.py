@@ -26,18 +26,10 @@ KINKED = (*_SIGNS, *_SIZES, *_LEAST, *_LARGEST)
 
 @dataclass(frozen=True)
 class SmoothPiece:
-    """A part of the states and times.
+    """A part of the states and times, with the surface function and the flow there.
 
-    Attributes
-    ----------
-    sides : tuple of sympy.Expr
-        What is nowhere negative there.
-    zeros : tuple of sympy.Expr
-        What vanishes there: the piece has no inside.
-    residual : sympy.Expr
-        The surface function there.
-    flow : mapping of symbols to sympy.Expr
-        The flow there, of the states that the surface function depends on in the course of time.
+    There no ``sides`` are negative, and ``zeros`` vanish: with any the piece has no inside. The flow is that of the
+    states that the surface function depends on in the course of time.
     """
 
     sides: tuple[Any, ...]

@@ -39,15 +39,7 @@ class Operation:
 
 
 class StraightLine:
-    """Some expressions of the same names.
-
-    Parameters
-    ----------
-    expressions : iterable of sympy.Expr
-        They hold nothing but ``symbols``, numbers and the language's functions.
-    symbols : sequence of sympy.Symbol
-        The columns of the points and boxes.
-    """
+    """Some expressions of ``symbols``, the columns of points and boxes, numbers and the language's functions."""
 
     def __init__(self, expressions: Iterable[Any], symbols: Sequence[Any]) -> None:
         self._operations: list[Operation] = []
@@ -74,11 +66,9 @@ class StraightLine:
             for operation in self._operations:
                 values.append(operation.on_intervals(*(values[i] for i in operation.arguments)))
         shape = (len(self.results), len(low))
-        ends = (np.array([np.broadcast_to(end, len(low)) for end in row]).reshape(shape) for row in self._ends(values))
-        return Range(*ends)
-
-    def _ends(self, values: list[Range]) -> tuple[list[Any], list[Any]]:
-        return [values[i].low for i in self.results], [values[i].high for i in self.results]
+        rows = zip(*((values[i].low, values[i].high) for i in self.results), strict=True)
+        ends = [np.array([np.broadcast_to(end, len(low)) for end in row]).reshape(shape) for row in rows]
+        return Range(*ends) if ends else Range(np.zeros(shape), np.zeros(shape))
 
     def _of(self, expr: Any) -> int:
         found = self._known.get(expr)

@@ -14,10 +14,7 @@ MOST = 40
 def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
     """Follow an edge and the transitions that are made at the same instant: each with where it leads to.
 
-    Raises
-    ------
-    Unsure
-        What comes next is not known, or has no end.
+    Raises :class:`Unsure` where what comes next is not known, or has no end.
     """
     following: Edge | None = edge
     for _ in range(MOST):

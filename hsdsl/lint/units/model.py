@@ -34,15 +34,7 @@ class Misread:
 
 
 class Units:
-    """The units of one model.
-
-    Parameters
-    ----------
-    document : ModelDocument
-        The file.
-    expressions : tuple of SourceExpression
-        Its expressions.
-    """
+    """The units of one model, from its file and its expressions."""
 
     def __init__(self, document: ModelDocument, expressions: tuple[SourceExpression, ...]) -> None:
         self._document = document

@@ -24,16 +24,9 @@ Powers = tuple[tuple[str, Fraction], ...]
 
 @dataclass(frozen=True)
 class Unit:
-    """What something is measured in.
+    """What something is measured in: its size in SI base units, and its dimensions, sorted, without those of power 0.
 
-    Attributes
-    ----------
-    factor : float
-        Its size in SI base units.
-    powers : tuple of (str, Fraction)
-        Its dimensions, sorted, without those of power 0.
-    names : tuple of (str, Fraction)
-        The units of the file it is made of, as ``mV/ms``: how messages say it.
+    ``names`` are the units of the file it is made of, as ``mV/ms``: how messages say it.
     """
 
     factor: float = 1.0
@@ -99,17 +92,10 @@ def _order(item: tuple[str, Fraction]) -> tuple[bool, str]:
 
 
 ONE = Unit()
-_RAISED = {ord(sign): f"**{digit}" for digit, sign in zip("123456789", "¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
-_RAISED |= {ord("⁻"): "**-"}
-_BASE = {
-    "[length]": "m",
-    "[mass]": "kg",
-    "[time]": "s",
-    "[current]": "A",
-    "[temperature]": "K",
-    "[substance]": "mol",
-    "[luminosity]": "cd",
-}
+_ELSEWHERE = {ord(sign): f"**{digit}" for digit, sign in zip("123456789", "¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
+_ELSEWHERE |= str.maketrans({"⁻": "**-", "^": "**", "·": "*", "⋅": "*", "µ": "u"})
+_BASE = {"[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A"}
+_BASE |= {"[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd"}
 
 
 def _plain(power: Fraction) -> str:
@@ -126,13 +112,7 @@ class UnknownUnit(Exception):
 
 
 def read(text: str) -> Unit:
-    """The unit that a text such as ``kg*m/s**2`` means.
-
-    Raises
-    ------
-    UnknownUnit
-        It is not written so, or has an unknown name.
-    """
+    """The unit that a text such as ``kg*m/s**2`` means; raises :class:`UnknownUnit` for another text or name."""
     if len(text) > _LONGEST:
         raise UnknownUnit
     try:
@@ -144,14 +124,7 @@ def read(text: str) -> Unit:
 
 def _better(text: str) -> str | None:
     """A unit written as elsewhere (``m/s^2``, ``N·m``, ``kg m/s²``) as it is written here; None where it is none."""
-    plain = (
-        text.translate(_RAISED)
-        .replace("**-**", "**-")
-        .replace("^", "**")
-        .replace("·", "*")
-        .replace("⋅", "*")
-        .replace("µ", "u")
-    )
+    plain = text.translate(_ELSEWHERE).replace("**-**", "**-")
     plain = re.sub(r"(?<=[\w)])\s+(?=[A-Za-z(])", "*", plain.strip())
     try:
         return plain if plain != text and _of(parse(plain)) else None
