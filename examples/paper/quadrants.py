@@ -11,8 +11,7 @@ import references.digital_control as exact
 
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import rho
-from hsdsl.metrics.points import SpacePoint
-from hsdsl.metrics.pointwise import SpaceMetric
+from hsdsl.metrics.points import SpaceMetric, SpacePoint
 from hsdsl.metrics.space import make_space
 from hsdsl.model import Model
 from hsdsl.model.distances import distance_of_runs as distance

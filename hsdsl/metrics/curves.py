@@ -18,7 +18,7 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.interval import CERTIFIED, ZERO, Interval
 from hsdsl.metrics.merge import Cells, common_span, merge
 from hsdsl.metrics.on_space import OnSpace
-from hsdsl.metrics.pointwise import SpaceMetric
+from hsdsl.metrics.points import SpaceMetric
 from hsdsl.metrics.supremum import Supremum, supremum
 from hsdsl.metrics.trace import Trace, names_of, trace
 

@@ -1,7 +1,7 @@
 """Distances where guards, resets or domains are not affine: the best path that local solves find.
 
 Its length is an upper bound: it is a path of the space, and whether its straight pieces stay in curved domains is
-proved where enclosures can (:mod:`hsdsl.metrics.segment_containment`). Nothing here bounds from below: that comes from
+proved where enclosures can (:mod:`hsdsl.metrics.guard_clearance`). Nothing here bounds from below: that comes from
 :mod:`hsdsl.metrics.guard_clearance`, and from the affine part of the model.
 """
 
@@ -17,9 +17,9 @@ import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
+from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
 from hsdsl.metrics.search import End, SearchResult
-from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.socp import one_thread
 
 MOST_SEQUENCES = 6

@@ -13,7 +13,7 @@ import numpy as np
 
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
-from hsdsl.metrics.guard_clearance import to_passages
+from hsdsl.metrics.guard_clearance import OUTSIDE, UNDECIDED, segments_inside, to_passages
 from hsdsl.metrics.interval import CERTIFIED, SAMPLED, SEARCHED
 from hsdsl.metrics.local import improve, onto
 from hsdsl.metrics.nonaffine import search_nonaffine
@@ -21,7 +21,6 @@ from hsdsl.metrics.passage_bounds import ROUNDING, Indices, unchanged
 from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.routes import Route
 from hsdsl.metrics.search import End, most_hops, search
-from hsdsl.metrics.segment_containment import OUTSIDE, UNDECIDED, segments_inside
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for

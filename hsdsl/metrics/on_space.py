@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hsdsl.execution import Array
 from hsdsl.metrics.bernstein import bernstein, largest_norm, length
-from hsdsl.metrics.geometry import Array
 from hsdsl.metrics.merge import Side
-from hsdsl.metrics.pointwise import ModePoints, SpaceMetric
+from hsdsl.metrics.points import ModePoints, SpaceMetric
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from hsdsl.execution import Array, Execution
 from hsdsl.metrics.curves import merged
 from hsdsl.metrics.labelled_sup import Labelled
 from hsdsl.metrics.on_space import OnSpace
-from hsdsl.metrics.pointwise import SpaceMetric
+from hsdsl.metrics.points import SpaceMetric
 from hsdsl.metrics.supremum import CellDistance
 
 POINTS = 1500

@@ -11,7 +11,7 @@ import numpy as np
 
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain, Gate, Space
-from hsdsl.metrics.segment_containment import OUTSIDE, segments_inside
+from hsdsl.metrics.guard_clearance import OUTSIDE, segments_inside
 
 # Where a leg that is held is held: dense towards its ends, at which it may leave a boundary it begins on.
 SHARES = (0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999)
@@ -213,7 +213,7 @@ class Route:
         return self.length(unknowns) + 2 * excess * moved
 
     def judged(self, unknowns: Array) -> list[int]:
-        """Containment of each leg in its domain, see :mod:`hsdsl.metrics.segment_containment`."""
+        """Containment of each leg in its domain, see :mod:`hsdsl.metrics.guard_clearance`."""
         if not np.all(np.isfinite(unknowns)):
             return [OUTSIDE]
         legs = self.legs(unknowns)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.curves import CurveDistance, rho
-from hsdsl.metrics.labelled_sup import sup_norm
-from hsdsl.metrics.pointwise import SpaceMetric
-from hsdsl.metrics.rho_hat import rho_hat
+from hsdsl.metrics.labelled_sup import rho_hat, sup_norm
+from hsdsl.metrics.points import SpaceMetric
 from hsdsl.metrics.skorokhod import skorokhod
 from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.names import did_you_mean

@@ -17,8 +17,7 @@ from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.interval import Interval
-from hsdsl.metrics.points import SpacePoint
-from hsdsl.metrics.pointwise import SpaceMetric
+from hsdsl.metrics.points import SpaceMetric, SpacePoint
 from hsdsl.metrics.table import CurvePair, between, check_same_model
 from hsdsl.model.options import parameters_of
 from hsdsl.simulate.stops import show

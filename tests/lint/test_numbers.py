@@ -8,8 +8,7 @@ import sympy as sp
 
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import Scope, Value, symbol
-from hsdsl.lint.numbers import evaluate, holds, rational, sample_at
-from hsdsl.lint.start import BEYOND, INSIDE, ON, leaves, side
+from hsdsl.lint.numbers import BEYOND, INSIDE, ON, evaluate, holds, leaves, rational, sample_at, side
 from hsdsl.system import TIME, Mode, SampledInput, Surface
 
 X, Y = symbol("x"), symbol("y")

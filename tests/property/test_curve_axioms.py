@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsdsl.metrics.curves import rho
-from hsdsl.metrics.labelled_sup import sup_norm
-from hsdsl.metrics.rho_hat import rho_hat
+from hsdsl.metrics.labelled_sup import rho_hat, sup_norm
 from hsdsl.metrics.skorokhod import skorokhod
 from hsdsl.metrics.tau_epsilon import tau_epsilon
 

@@ -15,9 +15,8 @@ from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.metrics.bernstein import bernstein, largest_norm, length, restrict
 from hsdsl.metrics.curves import rho
-from hsdsl.metrics.labelled_sup import sup_norm
+from hsdsl.metrics.labelled_sup import rho_hat, sup_norm
 from hsdsl.metrics.profile import profiles
-from hsdsl.metrics.rho_hat import rho_hat
 from hsdsl.metrics.skorokhod import skorokhod
 from hsdsl.metrics.table import CURVE_METRICS, CurvePair, between
 from hsdsl.metrics.tau_epsilon import tau_epsilon

@@ -10,9 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 import hsdsl
-from hsdsl.metrics.guard_clearance import to_passages
+from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, segments_inside, to_passages
 from hsdsl.metrics.points import SpacePoint, distance
-from hsdsl.metrics.segment_containment import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.space import make_space
 from hsdsl.model.distances import distance_of_runs as between_runs
 

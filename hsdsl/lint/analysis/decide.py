@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from hsdsl.errors import Decided
-from hsdsl.lint.analysis import branch_and_bound, elimination, rational_witness
+from hsdsl.lint.analysis import elimination
 from hsdsl.lint.analysis.elimination import Reduced
-from hsdsl.lint.analysis.newton_search import ROUNDS, STARTS, NewtonSearch
+from hsdsl.lint.analysis.newton_search import MOST_BOXES, ROUNDS, STARTS, NewtonSearch, excluded
 from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.polynomial import Polynomial
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Ranges
@@ -57,7 +57,7 @@ class Decider:
         reduced = self._reduced(constraints, ranges)
         if reduced is None:
             return NEVER
-        point = rational_witness.point(reduced, ranges)
+        point = elimination.witness(reduced, ranges)
         if point is not None:
             return Answer("somewhere", "symbolic", point)
         return self._numerically(constraints, ranges, reduced, prove)
@@ -108,7 +108,7 @@ class Decider:
         if search is None:
             return UNKNOWN
         never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
-        if branch_and_bound.excluded(search.program, search.relations, search.low, search.high, 1):
+        if excluded(search.program, search.relations, search.low, search.high, 1):
             return never
         found = search.point()
         if found is not None:
@@ -146,9 +146,9 @@ class Decider:
 
     def _excluded(self, search: NewtonSearch) -> bool:
         length = len(search.program)
-        most = min(branch_and_bound.MOST_BOXES, MOST_WORK // length, self.left // (8 * length))
+        most = min(MOST_BOXES, MOST_WORK // length, self.left // (8 * length))
         self.left -= 8 * length * most
-        return most > 0 and branch_and_bound.excluded(search.program, search.relations, search.low, search.high, most)
+        return most > 0 and excluded(search.program, search.relations, search.low, search.high, most)
 
     def _somewhere(self, point: dict[Any, float], solved: dict[Any, Any], reduced: Reduced, ranges: Ranges) -> Answer:
         for symbol, limits in ranges.items():

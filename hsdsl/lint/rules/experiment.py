@@ -10,8 +10,7 @@ from hsdsl.expression import numeric
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.finding import Finding
-from hsdsl.lint.numbers import Number, evaluate, holds
-from hsdsl.lint.start import BEYOND, ON, leaves, side
+from hsdsl.lint.numbers import BEYOND, ON, Number, evaluate, holds, leaves, side
 from hsdsl.lint.subject import ModePart, Subject
 from hsdsl.schema import ReferenceDocument
 from hsdsl.source import Scalar
