@@ -23,6 +23,8 @@ from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of, status_of
 from hsdsl.metrics.search import End, most_hops, search
 
+__all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
+
 QUICK, SLOW = 50_000, 20_000
 
 
@@ -191,6 +193,3 @@ class SpaceMetric:
         x, edge = tuple(points.x[k].tolist()), str(points.edge[k]) or None
         depth = min(float(points.depth[k]), self.relaxation or 0.0)
         return SpacePoint(points.mode, x, edge, depth, float(points.t[k]) if self.timed else None)
-
-
-__all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]

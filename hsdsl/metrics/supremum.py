@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -93,8 +94,12 @@ def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, mos
 
 
 def _bounds(cells: Cells, distance: CellDistance) -> Array:
-    parts = [distance.over(*cells[k : k + CHUNK].sides()) for k in range(0, len(cells), CHUNK)]
-    return np.concatenate(parts)
+    return np.concatenate([distance.over(*sides) for sides in _chunks(cells)])
+
+
+def _chunks(cells: Cells) -> Iterator[tuple[Side, Side]]:
+    """Both curves on some cells after the other."""
+    return (cells[k : k + CHUNK].sides() for k in range(0, len(cells), CHUNK))
 
 
 @dataclass
@@ -229,11 +234,7 @@ def _largest(bound: Array, size: int) -> Array:
 
 def _ways(cells: Cells, distance: CellDistance) -> Array:
     """Bound how far both curves together move in each cell."""
-    parts: list[Array] = []
-    for k in range(0, len(cells), CHUNK):
-        a, b = cells[k : k + CHUNK].sides()
-        parts.append(distance.motion(a) + distance.motion(b))
-    return np.concatenate(parts)
+    return np.concatenate([distance.motion(a) + distance.motion(b) for a, b in _chunks(cells)])
 
 
 def _breaks(cells: Cells, number: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The table of distances between executions: a name, what it is, and the function that computes it."""
+"""The table of distances between executions: a name, and the function that computes it."""
 
 from __future__ import annotations
 
@@ -29,14 +29,6 @@ class CurvePair:
     hops: int | None = None
 
 
-@dataclass(frozen=True)
-class CurveMetric:
-    """One distance between executions."""
-
-    summary: str
-    compute: Callable[[CurvePair], CurveDistance]
-
-
 def _quotient(request: CurvePair) -> CurveDistance:
     return rho(request.a, request.b, request.space(None))
 
@@ -54,16 +46,14 @@ def _rho(request: CurvePair) -> CurveDistance:
     return _quotient(request) if request.relaxation is None else _relaxed(request)
 
 
-CURVE_METRICS: dict[str, CurveMetric] = {
-    "rho": CurveMetric("largest quotient distance over time; with a relaxation, on the relaxed space", _rho),
-    "quotient": CurveMetric("the same on the quotient space, a strip's points counting as the guard's", _quotient),
-    "relaxed": CurveMetric("the same on the relaxed space, its strips as deep as the runs' own", _relaxed),
-    "rho-hat": CurveMetric(
-        "largest difference of states at the first run's samples", lambda r: rho_hat(r.a, r.b, r.coordinates)
-    ),
-    "sup": CurveMetric("largest difference of states, plus 1 in different modes", lambda r: sup_norm(r.a, r.b)),
-    "skorokhod": CurveMetric("the same under the best retiming, which is paid for", lambda r: skorokhod(r.a, r.b)),
-    "tau-epsilon": CurveMetric("closeness of hybrid arcs, jump by jump", lambda r: tau_epsilon(r.a, r.b)),
+CURVE_METRICS: dict[str, Callable[[CurvePair], CurveDistance]] = {
+    "rho": _rho,  # largest quotient distance over time; with a relaxation, on the relaxed space
+    "quotient": _quotient,  # the same on the quotient space, a strip's points counting as the guard's
+    "relaxed": _relaxed,  # the same on the relaxed space, its strips as deep as the runs' own
+    "rho-hat": lambda r: rho_hat(r.a, r.b, r.coordinates),  # largest difference of states at the first run's samples
+    "sup": lambda r: sup_norm(r.a, r.b),  # largest difference of states, plus 1 in different modes
+    "skorokhod": lambda r: skorokhod(r.a, r.b),  # the same under the best retiming, which is paid for
+    "tau-epsilon": lambda r: tau_epsilon(r.a, r.b),  # closeness of hybrid arcs, jump by jump
 }
 
 RELAXED = ("rho", "relaxed")
@@ -81,7 +71,7 @@ def between(metric: str, request: CurvePair) -> CurveDistance:
         raise UsageError(f"the distance '{metric}' has no paths", f"hops are for {', '.join(ON_THE_SPACE)}")
     if request.coordinates is not None and metric != "rho-hat":
         raise UsageError(f"the distance '{metric}' takes all states; coordinates are for rho-hat")
-    return replace(CURVE_METRICS[metric].compute(request), metric=metric)
+    return replace(CURVE_METRICS[metric](request), metric=metric)
 
 
 def check_same_model(a: Execution, b: Execution) -> None:
