@@ -24,6 +24,7 @@ TARGETS = {
     "c": "a program in C99 that allocates nothing",
     "latex": "the model as mathematics, a LaTeX document",
     "mermaid": "the mode graph as a Mermaid diagram",
+    "web": "one HTML page that runs the model in a browser",
 }
 
 

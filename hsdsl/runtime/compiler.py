@@ -49,8 +49,12 @@ class Compiler:
     command: tuple[str, ...]
     identity: str
 
-    def build(self, source: Path, includes: Sequence[Path], target: Path, effort: Effort) -> None:
-        """Compile a source to a shared library in the same folder, with so much effort to make it fast.
+    def build(
+        self, sources: Sequence[Path], includes: Sequence[Path], target: Path, effort: Effort, flags: Sequence[str]
+    ) -> None:
+        """Compile sources to a file in a folder for temporary files, with so much effort to make it fast.
+
+        :data:`FLAGS` make a shared library of them.
 
         Raises
         ------
@@ -62,8 +66,8 @@ class Compiler:
         if _responding.get(self) is False:
             raise NoCompiler(self._endless())
         seconds = limits.current().compile
-        options = (effort, *FLAGS, *(f"-I{folder}" for folder in includes))
-        command = [*self.command, *options, "-o", str(target), str(source), "-lm"]
+        options = (effort, *flags, *(f"-I{folder}" for folder in includes))
+        command = [*self.command, *options, "-o", str(target), *map(str, sources), "-lm"]
         try:
             done = process.run(command, target.parent, seconds, lambda: _responds(self))
         except OSError as error:
@@ -122,11 +126,17 @@ def find_compiler() -> Compiler:
     for name in NAMES:
         if path := shutil.which(name):
             return Compiler((path,), _identity(path))
+    if zig := zig_compiler():
+        return zig
+    raise NoCompiler("no C compiler was found (cc, gcc, clang, or the package ziglang: pip install 'hsdsl[compiler]')")
+
+
+def zig_compiler() -> Compiler | None:
+    """Return the compiler inside the package `ziglang`, which compiles for other machines too."""
     from importlib.util import find_spec
 
-    if spec := find_spec("ziglang"):
-        return Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(str(spec.origin)))
-    raise NoCompiler("no C compiler was found (cc, gcc, clang, or the package ziglang: pip install 'hsdsl[compiler]')")
+    spec = find_spec("ziglang")
+    return Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(str(spec.origin))) if spec else None
 
 
 def _words(text: str) -> list[str]:

@@ -86,7 +86,7 @@ def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], str], 
 def _compile(compiler: Compiler, source: str, library: Path, effort: Effort) -> None:
     text = library.with_name("model.c")
     text.write_text(source)
-    compiler.build(text, [RUNTIME], library, effort)
+    compiler.build([text], [RUNTIME], library, effort, FLAGS)
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:

@@ -19,7 +19,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.errors import UsageError
 from hsdsl.model import Model
 from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import find_compiler
+from hsdsl.runtime.compiler import FLAGS, find_compiler
 from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -44,7 +44,7 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
     source, library = tmp_path / "layout.c", tmp_path / "layout.so"
     numbers = ", ".join(f"(long long)({line})" for line in lines)
     source.write_text(f'#include <stddef.h>\n#include "hs_simulate.h"\nHS_EXPORT long long layout[] = {{{numbers}}};\n')
-    find_compiler().build(source, [structures.FOLDER], library, "-O1")
+    find_compiler().build([source], [structures.FOLDER], library, "-O1", FLAGS)
     theirs = (ctypes.c_longlong * len(ours)).in_dll(ctypes.CDLL(str(library)), "layout")
     assert list(theirs) == ours
     assert len(ours) > 200

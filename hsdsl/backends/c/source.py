@@ -84,9 +84,25 @@ def lines(program: Program) -> int:
 
 def constant_bodies(program: Program) -> dict[str, str]:
     """The bodies of `Program.constants`' routines in C, of parameters ``p``, by their names."""
-    names = {f"p{i}": f"p[{i}]" for i in range(len(program.parameters))}
+    return _bodies(program.constants, {f"p{i}": f"p[{i}]" for i in range(len(program.parameters))})
+
+
+def switching_bodies(program: Program) -> dict[str, str]:
+    """The bodies of `Program.switching`'s routines in C, of the data ``p`` of a segment and ``t``, by their names."""
+    return _bodies(program.switching, data_names(program) | {"t": "t"})
+
+
+def data_names(program: Program) -> dict[str, str]:
+    """What parameters, segments of inputs and switches are called in C."""
+    names = [f"p{i}" for i in range(len(program.parameters))]
+    names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
+    names += [f"k{i}" for i in range(len(program.switches))]
+    return {name: f"p[{i}]" for i, name in enumerate(names)}
+
+
+def _bodies(routines: Routines, names: dict[str, str]) -> dict[str, str]:
     found: dict[str, str] = {}
-    for name, text in _DEFINITION.findall(program.constants.source):
+    for name, text in _DEFINITION.findall(routines.source):
         definition = ast.parse(dedent(f"    def routine{_GIVEN.sub('', text)}")).body[0]
         assert isinstance(definition, ast.FunctionDef)
         found[name] = function_body(definition, names)
@@ -95,10 +111,7 @@ def constant_bodies(program: Program) -> dict[str, str]:
 
 class _Writer:
     def __init__(self, program: Program) -> None:
-        names = [f"p{i}" for i in range(len(program.parameters))]
-        names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
-        names += [f"k{i}" for i in range(len(program.switches))]
-        self.data = {name: f"p[{i}]" for i, name in enumerate(names)}
+        self.data = data_names(program)
         self.states = program.all_states
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []

@@ -35,7 +35,7 @@ int problem_start(const hs_real *p, hs_real *x) {{
 def derived(problem: Problem) -> set[str]:
     """The parameters that are expressions of others, and not overridden."""
     program = problem.program
-    used = _used(program)
+    used = used_by(program)
     return {
         name
         for i, name in enumerate(program.parameters)
@@ -46,20 +46,20 @@ def derived(problem: Problem) -> set[str]:
 def structural(problem: Problem) -> set[str]:
     """The parameters that decide the samples of inputs or when switches of time change; such times are data."""
     program, own = problem.program, derived(problem)
-    used = _used(program)
+    used = used_by(program)
     direct = {i for name, needed in used.items() if name.startswith("input_") for i in needed}
     body = program.switching.source.partition("\n")[2]
     direct |= {int(i) for i in _NUMBERED.findall(body)}
-    return {program.parameters[i] for i in _closed(program, used, own, direct)}
+    return {program.parameters[i] for i in with_sources(program, used, own, direct)}
 
 
-def _used(program: Program) -> dict[str, set[int]]:
+def used_by(program: Program) -> dict[str, set[int]]:
     """The parameters that each constant is computed from."""
     texts: Iterable[tuple[str, str]] = _ROUTINE.findall(program.constants.source)
     return {name: {int(i) for i in _GIVEN.findall(body)} for name, body in texts}
 
 
-def _closed(program: Program, used: dict[str, set[int]], own: set[str], direct: set[int]) -> set[int]:
+def with_sources(program: Program, used: dict[str, set[int]], own: set[str], direct: set[int]) -> set[int]:
     """Parameters with those that they are derived from, which come before them."""
     found = set(direct)
     for i in reversed(range(len(program.parameters))):

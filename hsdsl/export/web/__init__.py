@@ -1,0 +1,84 @@
+"""The model as one HTML page that runs it: sliders, live plots, transitions, scene; without server or network."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from hsdsl.execution import Execution
+from hsdsl.export.source import Source
+from hsdsl.export.web.model import model_of
+from hsdsl.export.web.wasm import PARTS, wasm_module
+from hsdsl.names import visible
+from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.simulate import Problem, prepare
+
+SCRIPTS = ("text.js", "controls.js", "axes.js", "plots.js", "scene.js", "facts.js", "page.js")
+_PLACE = re.compile(r"\{\{(\w+)\}\}")
+
+
+def files(source: Source) -> dict[str, bytes]:
+    """One page.
+
+    Raises UsageError: the C runtime has no such scheme, or no compiler for WebAssembly is there.
+    """
+    shown = with_scene(source)
+    module = wasm_module(shown)
+    model = model_of(source, shown, _exported(source))
+    return {f"{source.name}.html": page(model, module).encode()}
+
+
+def with_scene(source: Source) -> Source:
+    """The source with the numbers of its scene as further outputs, which the runtime then records."""
+    system = source.system
+    if not system.scene:
+        return source
+    from hsdsl.lower import lower
+
+    count = sum(shape.numbers for shape in system.scene)
+    modes = tuple(replace(mode, outputs=(*mode.outputs, *mode.scene)) for mode in system.modes)
+    outputs = (*system.outputs, *(f"scene {i}" for i in range(count)))  # no name of a model has a blank
+    system = replace(system, modes=modes, outputs=outputs)
+    given = source.problem
+    program = lower(system)
+    return Source(
+        system, Problem(program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x)
+    )
+
+
+def _exported(source: Source) -> Execution:
+    """The run of the exported settings, by the compiled loop where there is a compiler."""
+    problem = source.problem.with_settings(source.problem.settings)
+    try:
+        return prepare(problem, CompiledModel(problem.program)).simulate()
+    except NoCompiler:
+        return prepare(problem).simulate()
+
+
+def page(model: dict[str, Any], module: bytes) -> str:
+    """The page; every text of the model in it is escaped for the place where it is."""
+    parts = {
+        "title": escape(visible(model["title"])),
+        "generator": escape(visible("; ".join(model["about"])), quote=True),
+        "style": _part("page.css"),
+        "model": _inert(json.dumps(model, allow_nan=False, separators=(",", ":"))),
+        "wasm": base64.b64encode(module).decode(),
+        "worker": _part("worker.js"),
+        "script": "\n".join(map(_part, SCRIPTS)),
+    }
+    return _PLACE.sub(lambda place: parts[place[1]], _part("page.html"))
+
+
+def _part(name: str) -> str:
+    return (Path(PARTS) / name).read_text(encoding="utf-8")
+
+
+def _inert(text: str) -> str:
+    """JSON that is no markup, and in one line: the signs that could end an element are escapes."""
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,0 +1,102 @@
+// What a run says in words: why it ended, what it noted, its transitions; and why settings are refused.
+
+const MOST_ROWS = 500;
+const time = (t) => `t = ${format(t, 10)}`;
+const edgeOf = (mode, k) => model.modes[mode]?.edges[k]?.name ?? "?";
+const modeOf = (k) => model.modes[k]?.name ?? "?";
+
+function refusal({refusal: why, at}) {
+  const parameter = model.controls[at]?.name, start = model.startStates[at], setting = model.settings[at];
+  return [
+    "", `parameter ${parameter} has no finite value with these parameters`,
+    `parameter ${parameter} is below its minimum`, `parameter ${parameter} is above its maximum`,
+    `initial.${start} has no finite value with these parameters`, `${setting} has no finite value with these parameters`,
+    `${setting} must be positive`, `input ${model.inputs[at]} has a sample that is not finite`,
+    `the sample times of input ${model.inputs[at]} do not increase`,
+    "floor, sign, abs, min, max or atan2 of time switches too often in this run", "the memory of the page is full",
+  ][why];
+}
+
+function stopped(run) {
+  const {reason, mode, edge, surface, time: t, most} = run, wall = model.modes[mode].walls[surface - model.modes[mode].edges.length];
+  const ends = `the domain of mode ${modeOf(mode)} ends at ${wall}: at ${time(t)} the state`;
+  const nothing = `in mode ${modeOf(mode)} an expression has no finite value at ${time(t)}`;
+  const sentences = {
+    "until": `until: reached ${time(t)}`,
+    "until in strip": `until: reached ${time(t)} inside the strip of ${edgeOf(mode, edge)}, mode unchanged`,
+    "until on guard": `until: reached ${time(t)} on the guard of ${edgeOf(mode, edge)}, mode unchanged`,
+    "final": `final: entered final mode ${modeOf(mode)} at ${time(t)}`,
+    "zeno": `zeno: at ${time(t)} transitions return to the same state in mode ${modeOf(mode)} without end`,
+    "limit": `transition_limit: made ${most} transitions by ${time(t)}; a page makes no more than 20,000`,
+    "reset not finite": `not_finite: the reset of ${edgeOf(mode, edge)} has no finite value at ${time(t)}`,
+    "here not finite": `not_finite: ${nothing}`,
+    "step not finite": `not_finite: ${nothing}`,
+    "entered outside": `left_domain: ${ends} was entered outside it`,
+    "left": `left_domain: ${ends} leaves it`,
+    "stuck": `step_underflow: in mode ${modeOf(mode)} no step from ${time(t)} is short enough`,
+    "interrupted": `interrupted at ${time(t)}: a run in a page may take 10 s and 256 MB`,
+    "accumulated": `zeno: transitions accumulate at ${time(t)}, and something else moves on there`,
+  };
+  if (model.reasons[reason] === "stuck" && wall !== undefined) return `left_domain: ${ends} leaves it`;
+  return sentences[model.reasons[reason]];
+}
+
+function noted({kind, mode, surface, number, time: t, other}) {
+  const edge = edgeOf(mode, surface);
+  return {
+    "crowded": `more than 16 transitions within the relaxation, from ${time(t)} on in strips`,
+    "at rest": `at rest on the guard of ${edge} from ${time(t)} to ${time(other)}`,
+    "replaced": `Zeno at ${time(t)}: the transitions of ${edge} after number ${number} are replaced by their limit`,
+    "accumulates": `the transitions of ${edge} accumulate at ${time(t)}`,
+    "unsettled": `surface ${surface} of mode ${modeOf(mode)} would not settle on a polynomial at ${time(t)}`,
+    "slides": `sliding at ${time(t)}: the flows of ${modeOf(mode)} and ${modeOf(number)} lead into each other`,
+  }[model.notices[kind]];
+}
+
+function changes({mode, edge, before, after, resumed}) {
+  if (Number.isNaN(resumed)) return "the run ended first";
+  const from = model.modes[mode].states, to = model.modes[mode].edges[edge].states;
+  const texts = to.map((name, k) => [name, after[k], before[from.indexOf(name)]]).filter(([, a, b]) => a !== b)
+    .map(([name, a, b]) => `${name}: ${b === undefined ? "" : `${format(b)} \u2192 `}${format(a)}`);
+  return texts.join(", ") || "unchanged";
+}
+
+function transitionRow(made, index) {
+  const edge = model.modes[made.mode].edges[made.edge];
+  const tied = made.alternatives.map((k) => edgeOf(made.mode, k)).join(", ");
+  const name = element("td", {textContent: tied ? `${edge.name} (with ${tied})` : edge.name});
+  if (tied) name.title = `reached together with ${tied}`;
+  const to = element("td", {textContent: `${modeOf(made.mode)} \u2192 ${modeOf(edge.target)}`});
+  return element("tr", {}, element("td", {textContent: index}), cell(made.time), name, to, element("td", {textContent: changes(made)}));
+}
+
+function showFacts(run) {
+  const tied = run.transitions.filter((made) => made.alternatives.length).length;
+  const facts = [stopped(run), `${run.transitions.length} transitions, ${run.rows} rows, computed in ${run.milliseconds.toFixed(1)} ms`,
+    ...run.notes.map(noted), ...tied ? [`${tied} transitions with other guards reached at the same instant`] : []];
+  $("run").replaceChildren(...facts.map((textContent) => element("li", {textContent})));
+  $("outcome").className = "";
+  $("outcome").textContent = `${stopped(run)}, after ${run.transitions.length} transitions`;
+  const left = run.transitions.length - MOST_ROWS;
+  const rows = run.transitions.slice(0, MOST_ROWS).map(transitionRow);
+  if (left > 0) rows.push(element("tr", {}, element("td", {colSpan: 5, textContent: `${left} more`})));
+  $("transitions").tBodies[0].replaceChildren(...rows);
+}
+
+function showRefusal(result) {
+  $("outcome").className = "alarm";
+  $("outcome").textContent = `Refused: ${refusal(result)}. The pictures are those of the settings before.`;
+}
+
+function buildFacts() {
+  const heads = ["", "t", "edge", "modes", "changes"].map((textContent) => element("th", {textContent, scope: "col"}));
+  $("transitions").tHead.append(element("tr", {}, ...heads));
+  $("verdict").textContent = `${model.verdict.theorem} (${model.exported})`;
+  $("reasons").replaceChildren(...model.verdict.reasons.map((textContent) => element("li", {textContent})));
+  $("about").replaceChildren(...model.about.map((textContent) => element("li", {textContent})));
+}
+
+function showWhoseVerdict(own) {
+  $("verdict-title").textContent = own ? "Verdict of the exported settings" : "Verdict of the exported settings, not of these";
+  for (const id of ["verdict", "reasons"]) $(id).classList.toggle("stale", !own);
+}

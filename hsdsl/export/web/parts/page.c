@@ -1,0 +1,129 @@
+/* A run of the model on a page: its settings are written to `given`, and what is drawn is read from `view`. */
+
+#include "page.h"
+
+#include <time.h>
+
+#include "page_numbers.h"
+#include "timeline.c"
+
+#define PAGE_EXPORT(name) __attribute__((export_name(name)))
+__attribute__((import_module("page"), import_name("now"))) double page_now(void); /* milliseconds */
+
+/* The runtime asks for the time to know when to poll; there is no other clock here. */
+clock_t clock(void) { return (clock_t)(page_now() * (CLOCKS_PER_SEC / 1000)); }
+
+/* Parameters and then states of the start, not-a-number for what the model's own expressions give; then the time in
+   milliseconds that a run may take, the most samples over it, and the most transitions. */
+enum { PAGE_LEAST_SAMPLES = 1000 };
+enum { PAGE_GIVEN = PROBLEM_PARAMETERS + PAGE_STARTS, PAGE_TIME = PAGE_GIVEN, PAGE_SAMPLES, PAGE_TRANSITIONS };
+static double given[PAGE_TRANSITIONS + 1];
+
+static struct {
+  hs_task task;
+  hs_timeline timeline;
+  double parameters[PROBLEM_PARAMETERS + 1], x[PAGE_STARTS + 1], scale[PAGE_STATES + 1];
+  double stop_x[PROBLEM_WIDTH + 1], stop_slope[PROBLEM_WIDTH + 1], stop_scales[PROBLEM_WIDTH + 1];
+  double *workspace, deadline;
+  int32_t *layouts;
+  double *time, *states, *results, *arc_of;
+  int64_t *row, points, room;
+} run;
+
+/* Where everything is, as numbers; see `read` in worker.js. */
+enum { PAGE_VIEW = 32 };
+static double view[PAGE_VIEW];
+
+PAGE_EXPORT("given") double *page_given(void) { return given; }
+PAGE_EXPORT("view") double *page_view(void) { return view; }
+
+#include "settings.c"
+
+static int poll(hs_task *task) {
+  (void)task;
+  return page_now() > run.deadline;
+}
+
+/* Give a chunk twice the room; what is written stays, so that in the end it is the whole run. */
+static int flush(hs_task *task) {
+  hs_chunk *c = &task->chunk;
+  const int w = PROBLEM_WIDTH, m = PROBLEM_OUTPUTS, e = PROBLEM_EDGES;
+  const int64_t rows = c->row_room < 1024 ? 1024 : 2 * c->row_room, arcs = rows / 2 + 8, made = rows / 4 + 8;
+  if (rows * 8 * (2 + w * (1 + PROBLEM_DEGREE) + m) > PAGE_MEMORY) return 2;
+  if (PAGE_GROW(c->times, rows) || PAGE_GROW(c->values, rows * w + 1) || PAGE_GROW(c->outputs, rows * m + 1) ||
+      PAGE_GROW(c->depth, rows) || PAGE_GROW(c->pieces, (rows + 1) * PROBLEM_DEGREE * w + 1) ||
+      PAGE_GROW(c->arc, arcs) || PAGE_GROW(run.layouts, arcs) ||
+      PAGE_GROW(c->transition, made) || PAGE_GROW(c->before, made * w + 1) || PAGE_GROW(c->after, made * w + 1) ||
+      PAGE_GROW(c->alternatives, made * e + 1) || PAGE_GROW(c->note, made))
+    return 2;
+  c->row_room = rows, c->arc_room = arcs, c->transition_room = c->note_room = made;
+  return 0;
+}
+
+static int grow(hs_task *task, hs_visited *larger) {
+  const int64_t room = 2 * task->visited.room + 64;
+  larger->mode = malloc((size_t)room * sizeof *larger->mode);
+  larger->state = malloc((size_t)room * (PROBLEM_WIDTH + 1) * sizeof *larger->state);
+  larger->slot = calloc((size_t)(2 * room), sizeof *larger->slot);
+  larger->room = room, larger->count = 0;
+  return !larger->mode || !larger->state || !larger->slot;
+}
+
+static page_refusal set_task(void) {
+  hs_task *t = &run.task;
+  hs_chunk *c = &t->chunk;
+  c->rows = c->arcs = c->transitions = c->notes = c->alternatives_used = 0;
+  if (!run.workspace) {
+    run.workspace = malloc((size_t)hs_workspace(&hs_the_model, &problem_method, (hs_scheme)problem_settings.scheme) *
+                           sizeof(double));
+    if (!run.workspace || flush(t) || grow(t, &t->visited)) return PAGE_NO_MEMORY;
+  }
+  t->model = &hs_the_model, t->method = &problem_method, t->timeline = &run.timeline;
+  t->interpolation = problem_interpolation;
+  t->mode = problem_mode, t->dimension = PAGE_STARTS, t->x = run.x;
+  t->workspace = run.workspace;
+  t->flush = flush, t->poll = poll, t->grow = grow;
+  t->stop.x = run.stop_x, t->stop.slope = run.stop_slope, t->stop.scales = run.stop_scales;
+  t->stop.edge = t->stop.surface = -1;
+  return PAGE_RAN;
+}
+
+#include "samples.c"
+
+static void show(void) {
+  const hs_task *t = &run.task;
+  const hs_chunk *c = &t->chunk;
+  const hs_stop *s = &t->stop;
+  const double numbers[PAGE_VIEW] = {
+      refused_at, s->reason, s->mode, s->edge, s->surface, s->failure, s->time, (double)run.points, (double)c->arcs,
+      (double)c->transitions, (double)c->notes, (double)t->settings.max_transitions, t->settings.until,
+      (double)(size_t)run.parameters, (double)(size_t)run.x, (double)(size_t)run.time, (double)(size_t)run.arc_of,
+      (double)(size_t)run.states, (double)(size_t)run.results, (double)(size_t)c->arc, (double)(size_t)c->times,
+      (double)(size_t)c->transition, (double)(size_t)c->before, (double)(size_t)c->after,
+      (double)(size_t)c->alternatives, (double)(size_t)c->note, (double)c->rows};
+  for (int i = 0; i < PAGE_VIEW; i++) view[i] = numbers[i];
+}
+
+/* Prepare a run: 0, or why the settings are refused. */
+static page_refusal prepare(void) {
+  hs_settings *s = &run.task.settings;
+  page_refusal refusal;
+  refused_at = -1;
+  run.deadline = page_now() + given[PAGE_TIME];
+  if ((refusal = set_parameters(run.parameters)) || (refusal = set_start(run.parameters, run.x)) ||
+      (refusal = set_settings(run.parameters, s)) ||
+      (refusal = make_timeline(run.parameters, s->until, &run.timeline)))
+    return refusal == PAGE_NO_SAMPLE || refusal == PAGE_UNSORTED ? refuse(refusal, refused_input) : refusal;
+  return set_task();
+}
+
+PAGE_EXPORT("run") int page_run(void) {
+  page_refusal refusal = prepare();
+  if (refusal == PAGE_RAN) {
+    hs_simulate(&run.task);
+    refusal = choose_times(hs_min(given[PAGE_SAMPLES], hs_max(PAGE_LEAST_SAMPLES, 16.0 * run.task.chunk.rows)));
+    if (refusal == PAGE_RAN) evaluate();
+  }
+  show();
+  return (int)refusal;
+}

@@ -1,0 +1,67 @@
+"""A model with its runtime as a WebAssembly module without imports but a clock, for `parts/worker.js`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from hsdsl import limits
+from hsdsl.cache import find, keep, key_of
+from hsdsl.errors import UsageError
+from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
+from hsdsl.export.source import Source
+from hsdsl.export.web.numbers import page_numbers
+from hsdsl.runtime.compiler import Compiler, NoCompiler, zig_compiler
+from hsdsl.runtime.process import workshop
+
+PARTS = Path(__file__).parent / "parts"
+FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wl,--strip-all", *EXACT_FLAGS)
+COMPILED = ("model.c", "problem.c", "page.c", "runtime/hs.c")
+OWN = ("page.c", "page.h", "settings.c", "timeline.c", "samples.c")
+KIND = "pages"
+FIRST_TIME = 10  # times the limit: before its first module the compiler makes its C library
+
+
+def wasm_module(source: Source) -> bytes:
+    """Compile a model; the same model gives the same bytes with the same compiler. What was compiled before is kept.
+
+    Raises UsageError: there is no compiler for WebAssembly, it fails, or the runtime has no such scheme.
+    """
+    sources = c_sources(source)  # what no C program can keep is refused first
+    compiler = zig_compiler()
+    if compiler is None:
+        raise UsageError("a page needs a compiler for WebAssembly: the package ziglang", "pip install 'hsdsl[web]'")
+    sources |= {name: (PARTS / name).read_bytes() for name in OWN}
+    sources["page_numbers.h"] = page_numbers(source.problem).encode()
+    key = key_of(compiler.identity, *FLAGS, *(part for item in sources.items() for part in item))
+    if made := find(KIND, key):
+        return made.read_bytes()
+    try:
+        module = _compiled(compiler, sources)
+    except NoCompiler as error:
+        raise UsageError(f"the page cannot be compiled: {error}") from None
+    except OSError as error:
+        raise UsageError(f"there is no room to compile the page: {error.strerror or error}") from None
+    with suppress(OSError):  # then it is compiled again
+        keep(KIND, key, ".wasm", lambda path: _write(path, module))
+    return module
+
+
+def _write(path: Path, module: bytes) -> None:
+    path.write_bytes(module)
+
+
+def _compiled(compiler: Compiler, sources: Mapping[str, bytes]) -> bytes:
+    with workshop() as folder:
+        for name, content in sources.items():
+            path = folder / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(content)
+        module = folder / "page.wasm"
+        includes = [folder, folder / "runtime"]
+        given = limits.current()
+        with limits.applied(replace(given, compile=given.compile * FIRST_TIME)):
+            compiler.build([folder / name for name in COMPILED], includes, module, "-O2", FLAGS)
+        return module.read_bytes()
