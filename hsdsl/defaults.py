@@ -8,6 +8,7 @@ from typing import Any
 DEFAULTS: dict[str, Any] = {
     "scheme": "located",
     "method": "auto",
+    "completion": "contact",
     "relaxation": Fraction("1e-6"),
     "max_transitions": 10**6,
 }

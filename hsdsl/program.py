@@ -100,6 +100,8 @@ class EdgeProgram:
     """An edge; indices count modes in file order.
 
     ``conditional`` says whether it has an `if`, and ``condition_text`` how that is written.
+    ``contact`` is the number, among `Program.flows`, of the motion along its guard; None where there is none.
+    ``releases`` says that the edge ends such a motion.
     """
 
     name: str
@@ -111,6 +113,8 @@ class EdgeProgram:
     text: str
     reset_texts: tuple[str, ...]
     condition_text: str = ""
+    contact: int | None = None
+    releases: bool = False
 
 
 @dataclass(frozen=True)
@@ -154,6 +158,9 @@ class ModeProgram:
 
     ``diagnosis`` has one routine ``expression_K`` for each of ``expressions`` (flows, surfaces, conditions as a person
     knows them), to tell which of them has no finite value.
+
+    ``push_order`` is given for a motion along a guard: the derivative of the guard along the flow that pushes.
+    ``slides`` names the two modes between which a mode of a completion slides.
     """
 
     name: str
@@ -168,6 +175,8 @@ class ModeProgram:
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines
+    push_order: int = 0
+    slides: tuple[str, ...] = ()
 
     @property
     def jumps(self) -> bool:
@@ -189,6 +198,9 @@ class Program:
     of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
     of its slope. A switch depends on earlier ones only.
 
+    ``contacts`` are motions along guards of modes: each has the name, states and walls of its mode and, in the place of
+    the edge that it is in contact with, one that releases it.
+
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
     """
 
@@ -204,11 +216,18 @@ class Program:
     initial_states: tuple[str, ...]
     scheme: str | None
     method: str | None
+    completion: str | None
     constants: Routines
     left_out: tuple[str, ...] = ()
     switches: tuple[Switch, ...] = ()
     switching: Routines = NOTHING
     scaled_states: tuple[str, ...] = ()
+    contacts: tuple[ModeProgram, ...] = ()
+
+    @property
+    def flows(self) -> tuple[ModeProgram, ...]:
+        """The modes, then the motions along guards: what a kernel has routines for."""
+        return self.modes + self.contacts
 
     @property
     def all_states(self) -> tuple[str, ...]:

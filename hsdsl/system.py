@@ -114,8 +114,9 @@ class Mode:
 
     ``outputs`` has one entry for each output of the system, None where the mode does not define it. ``scene`` likewise
     has the numbers of the system's shapes, one shape behind the other.
-    A final mode without flow has ``states == ()`` here: it has the states it is entered with. The last ``derived``
-    states are derivatives of the others: no surface or condition depends on them, and their flow is linear in them.
+    ``slides`` names the two modes between which a mode of a completion slides. A final mode without flow has
+    ``states == ()`` here: it has the states it is entered with. The last ``derived`` states are derivatives of the
+    others: no surface or condition depends on them, and their flow is linear in them.
     """
 
     name: str
@@ -126,6 +127,7 @@ class Mode:
     edges: tuple[Edge, ...]
     outputs: tuple[sp.Expr | None, ...]
     final: bool = False
+    slides: tuple[str, str] | None = None
     scene: tuple[sp.Expr | None, ...] = ()
     derived: int = 0
 
@@ -166,6 +168,7 @@ class Experiment:
 
     until: sp.Expr
     scheme: str | None = None
+    completion: str | None = None
     method: str | None = None
     step: sp.Expr | None = None
     tolerance: sp.Expr | None = None

@@ -64,11 +64,11 @@ class PythonKernel:
 
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments."""
-        routines = self._program.modes[mode].routines
+        routines = self._program.flows[mode].routines
         if mode not in self._modes:
             self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
-        program = self._program.modes[mode]
+        program = self._program.flows[mode]
         edges, surfaces = len(program.edges), len(program.edges) + len(program.walls)
         return ModeKernel(
             **{name: bound[name] for name in PLAIN},
@@ -86,7 +86,7 @@ class PythonKernel:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
         from hsdsl.backends.taylor import compile_tape  # only Taylor's method needs it
 
-        program = self._program.modes[mode]
+        program = self._program.flows[mode]
         if program.tape is None:
             return None
         if mode not in self._tapes:
@@ -95,7 +95,7 @@ class PythonKernel:
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states; compiled on first use."""
-        program = self._program.modes[mode]
+        program = self._program.flows[mode]
         if mode not in self._jacobians:
             text = program.jacobian.routines
             self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
@@ -104,7 +104,7 @@ class PythonKernel:
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
-        program = self._program.modes[mode]
+        program = self._program.flows[mode]
         functions = compile_routines(program.diagnosis, self.arithmetic, f"expressions of mode {mode}")(*data)
         return tuple(zip(program.expressions, functions, strict=True))
 

@@ -10,6 +10,7 @@ from typer import Option
 from hsdsl.cli.console import print_json, say
 from hsdsl.cli.options import (
     AllowPath,
+    CompletionName,
     Json,
     Limit,
     MethodName,
@@ -46,6 +47,7 @@ def export(
     step: StepSize = None,
     tolerance: Tolerance = None,
     relaxation: Relaxation = None,
+    completion: CompletionName = None,
     outputs: Annotated[str | None, option("A,B", KEEP)] = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -59,8 +61,9 @@ def export(
         if out is not None:
             check_folder(out, force)
         settings = settings_of(
-            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation
-        )
+            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
+            completion=completion,
+        )  # fmt: skip
         loaded = load(model)
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
         files = files_of(source, to)

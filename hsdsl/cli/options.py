@@ -24,6 +24,7 @@ def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | 
 
 
 Scheme = Literal["relaxed", "located", "paoli-schatzman"]
+Completion = Literal["contact", "auto", "none"]
 Engine = Literal["auto", "c", "python"]
 Metric = Literal["quotient", "relaxed", "rho", "rho-hat", "sup", "skorokhod", "tau-epsilon"]
 Format = Literal["text", "json", "sarif", "github"]
@@ -49,6 +50,7 @@ SchemeName = Annotated[Scheme | None, option("S", "relaxed, located or paoli-sch
 MethodName = Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")]
 StepSize = Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")]
 Tolerance = Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")]
+CompletionName = Annotated[Completion | None, option("C", "Where transitions accumulate: contact, auto or none.")]
 Relaxation = Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")]
 AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
 Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]

@@ -12,6 +12,7 @@ from typer import Exit, Option
 from hsdsl.cli.console import Text, print_json, progress, say
 from hsdsl.cli.options import (
     AllowPath,
+    CompletionName,
     Engine,
     Json,
     Limit,
@@ -55,6 +56,7 @@ def run(
     step: StepSize = None,
     tolerance: Tolerance = None,
     relaxation: Relaxation = None,
+    completion: CompletionName = None,
     engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
     precision: Annotated[int | None, option("DIGITS", PRECISION)] = None,
     outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
@@ -76,7 +78,7 @@ def run(
         loaded = _load(model, engine, precision, scheme)
         settings = settings_of(
             overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
-            relaxation=relaxation, engine=engine, precision=precision,
+            relaxation=relaxation, completion=completion, engine=engine, precision=precision,
         )  # fmt: skip
         names = chosen_names(outputs, loaded.columns)
         result: Any

@@ -65,6 +65,7 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     return Experiment(
         until=until,
         scheme=symbols.text(document.scheme),
+        completion=symbols.text(document.completion),
         method=Key.at(method.value, method.place) if method and method.value != ABSENT else None,
         samples=_samples(symbols, scope, document.samples),
         scale=_scale(symbols, scope, document.scale),

@@ -7,12 +7,13 @@ The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from hsdsl import limits
 from hsdsl import program as lowered
+from hsdsl.completion import Contact, contact
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
@@ -58,24 +59,48 @@ def _lower(system: HybridSystem) -> lowered.Program:
     names = _number(system, switches.symbols)
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
+    modes, contacts = _modes(system, names, indices)
     return lowered.Program(
         path=system.path,
         digest=system.digest,
         title=system.title,
         parameters=tuple(p.name for p in system.parameters),
         inputs=tuple(_sampled(i) for i in system.inputs),
-        modes=tuple(_Mode(mode, names).program(indices) for mode in system.modes),
+        modes=modes,
+        contacts=contacts,
         outputs=system.outputs,
         units=system.units,
         initial_mode=indices[system.initial.mode],
         initial_states=tuple(name for name, _ in system.initial.values),
         scheme=experiment.scheme,
         method=experiment.method,
+        completion=experiment.completion,
         constants=print_routines(_constants(system, names), ()),
         switches=switch_programs(switches),
         switching=print_routines(switch_routines(switches, names.shared), names.data),
         scaled_states=tuple(name for name, _ in experiment.scale),
     )
+
+
+def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
+    """The modes, and the motions along their guards."""
+    modes: list[lowered.ModeProgram] = []
+    contacts: list[lowered.ModeProgram] = []
+    for mode in system.modes:
+        program = _Mode(mode, names).program(indices)
+        edges = list(program.edges)
+        for k in range(len(edges)):
+            if (held := contact(mode, k)) is not None:
+                edges[k] = replace(edges[k], contact=len(system.modes) + len(contacts))
+                contacts.append(_contact(held, len(edges), _Mode(held.mode, names).program(indices)))
+        modes.append(replace(program, edges=tuple(edges)))
+    return tuple(modes), tuple(contacts)
+
+
+def _contact(held: Contact, edges: int, program: lowered.ModeProgram) -> lowered.ModeProgram:
+    """Mark the edges that release a motion along a guard: its own, and those beyond the mode's."""
+    marked = (replace(edge, releases=k == held.edge or k >= edges) for k, edge in enumerate(program.edges))
+    return replace(program, edges=tuple(marked), push_order=held.order)
 
 
 def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
@@ -169,6 +194,7 @@ class _Mode:
             tape=make_tape(self.flow, self.residuals, self.states, data),
             expressions=tuple(texts),
             diagnosis=print_routines(self._diagnosis(expressions), data),
+            slides=mode.slides or (),
         )
 
     def _has_constant_slopes(self, residual: sp.Basic) -> bool:

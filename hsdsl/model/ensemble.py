@@ -267,7 +267,8 @@ def run_ensemble(
     if threads is not None:
         whole(threads, "threads", least=1)
     request = EnsembleRequest.of(call, samples, transition_times)
-    return prepare_ensemble(model, request).run(threads or cores(), progress)
+    completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
+    return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
 
 
 def cores() -> int:

@@ -114,6 +114,7 @@ class Model:
         scale: Mapping[str, Any] | None = None,
         samples: Any = None,
         max_transitions: Any = None,
+        completion: str | None = None,
         parameters: Mapping[str, Any] | None = None,
         initial: Mapping[str, Any] | None = None,
         settings: Mapping[str, Any] | None = None,
@@ -143,6 +144,8 @@ class Model:
             How many equally spaced samples, or their times; what files are written at.
         max_transitions : int or str, optional
             Stop rather than make more.
+        completion : {"contact", "auto", "none"}, optional
+            How a run goes on where transitions accumulate.
         parameters, initial : mapping, optional
             Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed anew.
         settings : mapping, optional
@@ -159,7 +162,7 @@ class Model:
         Raises UsageError: a name, value or combination that cannot be served.
         """
         arguments = (
-            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions,
+            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions, completion,
             parameters, initial, settings, engine, precision,
         )  # fmt: skip
         if outputs is not None:
@@ -276,6 +279,11 @@ class Model:
 
         call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
         return run_ensemble(self, call, samples, transition_times, threads, progress)
+
+    @property
+    def sliding(self) -> Model:
+        """The model with a mode for each surface that two modes press on; this one where there is none."""
+        return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)
 
     def only(self, outputs: Sequence[str]) -> Model:
         """Return the model with these states and outputs and those they, or any transition, depend on.

@@ -18,7 +18,10 @@ from hsdsl.integrators import AUTO, METHODS, Method
 from hsdsl.names import did_you_mean
 from hsdsl.simulate import SCHEMES
 
-KEYS = ("until", "scheme", "method", "step", "tolerance", "relaxation", "scale", "samples", "max_transitions")
+KEYS = (
+    "until", "scheme", "method", "step", "tolerance", "relaxation", "scale", "samples", "max_transitions", "completion",
+)  # fmt: skip
+COMPLETIONS = ("contact", "auto", "none")
 ARGUMENTS = (*KEYS, "parameters", "initial", "settings", "engine", "precision")  # of a single run
 OWN_FORMULA = ("paoli-schatzman",)
 SCALE = "scale."  # and a state: its given size
@@ -96,6 +99,10 @@ def resolve(sources: Mapping[str, Mapping[str, Any]]) -> Options:
     scheme, origin = values["scheme"].value, values["scheme"].origin
     if scheme not in SCHEMES:
         raise UsageError(f"there is no scheme '{scheme}' ({origin})", did_you_mean(str(scheme), [*SCHEMES]))
+    completion, by = values["completion"].value, values["completion"].origin
+    if completion not in COMPLETIONS:
+        hint = did_you_mean(str(completion), COMPLETIONS) or f"choose from {', '.join(COMPLETIONS)}"
+        raise UsageError(f"there is no completion '{completion}' ({by})", hint)
     if scheme in OWN_FORMULA:
         _own_formula(scheme, values)
         return Options(scheme, None, size, values)

@@ -51,7 +51,7 @@ class Pipeline:
     """The stages of a checked model, and runs prepared from them; ``seconds`` is the time spent on them.
 
     Pickled it is the model's files and its program. ``part`` has the names that it was reduced to, and ``left_out`` the
-    states that it lost by that.
+    states that it lost by that; ``slides`` says that surfaces on which modes press have modes of their own.
     """
 
     def __init__(
@@ -62,19 +62,22 @@ class Pipeline:
         program: Program | None = None,
         part: program_cache.Part = (),
         left_out: tuple[str, ...] = (),
+        slides: bool = False,
     ) -> None:
         if system is not None:
             self.system = system
         if program is not None:
             self.program = program
-        self._files, self._part, self._left_out = files, part, left_out
+        self._files, self._part, self._left_out, self._slides = files, part, left_out, slides
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         program = self.program  # needed first by whoever gets it, and costly
-        state = {key: value for key, value in vars(self).items() if key not in ("system", "_compiled", "kernels")}
+        state = {
+            key: value for key, value in vars(self).items() if key not in ("system", "sliding", "_compiled", "kernels")
+        }
         return state | {"program": program} | ({"system": self.system} if self._files is None else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -99,7 +102,21 @@ class Pipeline:
         system = _elaborated(self._files)
         for names in self._part:
             system = only(system, names)
-        return system
+        return self._with_sliding(system) if self._slides else system
+
+    def _with_sliding(self, system: HybridSystem) -> HybridSystem:
+        from hsdsl.completion import with_sliding
+
+        with self._stage():
+            return with_sliding(system)
+
+    @cached_property
+    def sliding(self) -> Pipeline:
+        """The pipeline of the model with a mode for each surface that two modes press on."""
+        system = self._with_sliding(self.system)
+        whole = self._slides or system is self.system
+        files, part, left_out = self._files, self._part, self._left_out
+        return self if whole else Pipeline(system, self.seconds["load"], files, None, part, left_out, slides=True)
 
     @cached_property
     def program(self) -> Program:
@@ -114,7 +131,7 @@ class Pipeline:
         return program
 
     def _keep(self, program: Program, part: program_cache.Part) -> None:
-        if self._files is not None:
+        if self._files is not None and not self._slides:
             program_cache.keep(self._files, program, part)
 
     @property
@@ -126,6 +143,7 @@ class Pipeline:
         """Resolve the options of the file, of ``settings`` and of a call."""
         program, given = self.program, self.program.constants.names
         in_file: dict[str, Any] = {"scheme": program.scheme, "method": program.method}
+        in_file["completion"] = program.completion
         in_file |= {key: key for key in KEYS if key in given}  # their values are routines
         in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
         if "sample_times" in given or "sample_count" in given:
@@ -159,6 +177,8 @@ class Pipeline:
         engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
         options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
         engines.check(engine)
+        if options.values["completion"].value == "auto" and self.sliding is not self:
+            return self.sliding.prepare(arguments)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))

@@ -45,6 +45,7 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
     method = options.method and options.method.for_tolerance(tolerance, arithmetic)
     return Settings(
         scheme=options.scheme,
+        completion=options.values["completion"].value,
         method=method,
         **numbers,
         samples=_samples(options, values),

@@ -85,7 +85,7 @@ class CompiledModel:
 
     def __init__(self, program: Program) -> None:
         data = len(program.parameters), len(program.inputs), len(program.switches)
-        content = repr(((*data, len(program.outputs), program.initial_states), program.modes))
+        content = repr(((*data, len(program.outputs), program.initial_states), program.flows))
         try:
             self._library = load(content, SYMBOL, lambda: _source(program), _model_effort(content))
         except TooSlow as error:
@@ -100,7 +100,7 @@ class CompiledModel:
 
     def mode(self, number: int) -> Any:
         """The ``hs_mode`` of a mode."""
-        return structures.array_at(structures.Mode, self.table.mode, self.table.modes)[number]
+        return structures.array_at(structures.Mode, self.table.mode, self.table.flows)[number]
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made on first use."""
@@ -139,7 +139,7 @@ class CompiledKernel(PythonKernel):
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
-        tape = self._program.modes[mode].tape
+        tape = self._program.flows[mode].tape
         return None if tape is None else _taylor(self._compiled.mode(mode), tape, data)
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag
 
 from hsdsl.schema.fields import (
     AnyKey,
+    Completion,
     Document,
     Expression,
     Flag,
@@ -149,6 +150,11 @@ class ExperimentDocument(Document):
 
     until: Expression = required("The time at which a run ends; it starts at 0.", "40*pi")
     scheme: Scheme = optional("How transitions are made.", "relaxed")
+    completion: Completion = optional(
+        "How a run goes on where transitions accumulate: `contact` along the guard of a transition to the same mode, "
+        "`auto` also along a surface that two modes press on (sliding), `none` not at all. Left out, `contact`.",
+        "auto",
+    )
     method: Word = optional("The integrator, such as `midpoint`, or `auto`.", "auto", "midpoint")
     step: OptionalExpression = optional("The step of a fixed-step method. Excludes `tolerance`.", "1e-3")
     tolerance: OptionalExpression = optional(

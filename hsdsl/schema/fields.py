@@ -220,6 +220,11 @@ Scheme = Annotated[
     PlainValidator(choice("relaxed", "located", "paoli-schatzman")),
     WithJsonSchema({"type": "string", "enum": ["relaxed", "located", "paoli-schatzman"]}),
 ]
+Completion = Annotated[
+    Scalar | None,
+    PlainValidator(choice("contact", "auto", "none")),
+    WithJsonSchema({"type": "string", "enum": ["contact", "auto", "none"]}),
+]
 Hold = Annotated[
     Literal["zero", "linear"],
     PlainValidator(lambda value: choice("zero", "linear")(value).value),

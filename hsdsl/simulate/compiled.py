@@ -24,7 +24,7 @@ from hsdsl.simulate.columns import Columns, Shape
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.input_segments import Timeline
-from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
+from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.settings import Settings
@@ -51,7 +51,7 @@ class CompiledPlan:
         key = settings.method, scheme, shape
         self.workspaces: Workspaces = compiled.shared(key, lambda: Workspaces(compiled, method, scheme, shape))
         self._settings = task_settings(settings, program.all_states)
-        self._interpolation = _interpolations(settings)
+        self._interpolation = _interpolation(settings)
         self._columns = _Timeline(problem.timeline)
         self.timeline = self._columns.pointer
         self.sampled = Sampled(runtime(), compiled, self.timeline)
@@ -88,17 +88,19 @@ def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
         settings.until,
         min(settings.max_transitions, 2**62),
         structures.SCHEMES.index(settings.scheme),
+        settings.completion != "none",
         _doubles(scale),
         len(settings.first_steps),
         _doubles(settings.first_steps),
     )
 
 
-def _interpolations(settings: Settings) -> Any:
-    """Surfaces along steps, and a push over time."""
-    pair = [(interpolation(degree, FLOAT64), share) for degree, share in (along_steps(settings), OVER_TIME)]
-    tables_of = [methods.interpolation_table(b.nodes, b.tests, b.matrix, share + b.rounding) for b, share in pair]
-    return structures.address((structures.Interpolation * 2)(*tables_of))
+def _interpolation(settings: Settings) -> Any:
+    """Surfaces along steps."""
+    degree, share = along_steps(settings)
+    by = interpolation(degree, FLOAT64)
+    table = methods.interpolation_table(by.nodes, by.tests, by.matrix, share + by.rounding)
+    return structures.address((structures.Interpolation * 1)(table))
 
 
 class _Timeline:

@@ -65,7 +65,7 @@ def stepping(run: Run, here: ModeState) -> Stepping:
     """Choose by the method."""
     method = run.settings.method
     if method is not None and method.kind == "taylor":
-        series = run.kernel.taylor(here.index, here.segment.data)
+        series = run.kernel.taylor(here.flow, here.segment.data)
         assert series is not None
         return SeriesSteps(run, here, method, series, run.stepper(here))
     return TableSteps(run, here, run.stepper(here))

@@ -36,10 +36,11 @@ class Diagnostics:
                 f"more than {free} transitions within the relaxation, from t = {show(t)} on in strips"
             )
 
-    def at_rest(self, edge: str, start: Number, end: Number) -> None:
-        """The state rested on a guard; for less than can be seen, that is no rest."""
+    def in_contact(self, edge: str, start: Number, end: Number, still: bool) -> None:
+        """The state moved along a guard, or rested on it; for less than can be seen, that is neither."""
         if show(start) != show(end):
-            self.departures.append(f"at rest on the guard of {edge} from t = {show(start)} to t = {show(end)}")
+            how = "at rest on" if still else "motion along"
+            self.departures.append(f"{how} the guard of {edge} from t = {show(start)} to t = {show(end)}")
 
     def replaced(self, edge: str, number: int, end: Number, left: Number) -> None:
         """The transitions after ``number`` were replaced by their limit."""
@@ -49,8 +50,10 @@ class Diagnostics:
         )
 
     def accumulates(self, edge: str, end: Number, t: Number) -> Stop:
-        """Transitions accumulate at ``end`` while something else moves on: the run stops at t."""
-        sentence = f"the transitions of {edge} accumulate at t = {show(end)}, and something else moves on there"
+        """Transitions accumulate at ``end``, and no motion along the guard goes on there: the run stops at t."""
+        sentence = (
+            f"the transitions of {edge} accumulate at t = {show(end)}, and no motion along its guard goes on there"
+        )
         self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
         return Stop("zeno", t, sentence)
 

@@ -1,4 +1,4 @@
-"""How functions are interpolated by polynomials, and how finely: surfaces along a step, and a push over time."""
+"""How surfaces along a step are interpolated by polynomials, and how finely."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ SERIES_DEGREE = 6  # along a step of Taylor's method, where a surface has no ser
 # Where between nodes an interpolation is tested: parts of no simple ratio to them, since what oscillates in step with
 # the nodes, as the guard of a clock may, would else pass for a constant.
 BETWEEN = Fraction(3_819_661, 10**7), Fraction(6_180_339, 10**7), Fraction(4_142_137, 10**7)
-OVER_TIME = 8, 1e-9  # degree and residual of the interpolation of a push
 
 
 def along_steps(settings: Settings) -> tuple[int, Number]:

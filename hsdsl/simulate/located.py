@@ -8,10 +8,12 @@ time, unless more than `FREE` transitions fall within the relaxation: then each 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, releases
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
@@ -19,7 +21,6 @@ from hsdsl.simulate.relaxed import Event, go_on, sizes, standing_on
 from hsdsl.simulate.root_isolation import stays_below
 from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.standstill import standstill
-from hsdsl.simulate.sticking import RestSteps, release, rests
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
@@ -44,18 +45,42 @@ def located(run: Run, here: ModeState | Stop) -> Stop:
 
 
 def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
-    """Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state."""
-    edge = rests(run, here)
-    until = None if edge is None else release(run, here, edge)
-    if edge is None or until is None:
-        return follow(run, here, stepping(run, here), here.segment.end)
-    still = here.resting(edge)
-    outcome = follow(run, still, RestSteps(run, still), until)
-    run.diagnostics.at_rest(here.mode.edges[edge].name, here.t, here.arc.times[-1])
-    if not isinstance(outcome, ModeState) or not until < here.segment.end:
-        return outcome
-    mode, surfaces = here.index, here.surfaces
-    return run.place(mode, here.mode.states, until, here.x, surfaces.scale, active=surfaces.active)
+    """Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go."""
+    held, limit = contact_at(run, here), here.segment.end
+    if held is None:
+        return follow(run, here, stepping(run, here), limit)
+    edge = next(k for k in here.surfaces.active if here.mode.edges[k].contact == held.flow)
+    outcome = along_guard(run, here, held, edge)
+    run.diagnostics.in_contact(here.mode.edges[edge].name, here.t, here.arc.times[-1], here.arc.values[-1] == here.x)
+    return outcome
+
+
+def along_guard(run: Run, here: ModeState, held: ModeState, k: int) -> Event | ModeState | Stop:
+    """Flow along the guard of edge k until it lets go of the state."""
+    while True:
+        outcome = follow(run, held, stepping(run, held), here.segment.end)
+        if isinstance(outcome, ModeState):
+            return after_contact(here, held, k, outcome.t, outcome.x)
+        if isinstance(outcome, Stop):
+            return outcome
+        crossing = outcome.crossing
+        if not releases(held, crossing.edge):
+            own = here.mode.edges[k].name
+            return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name != own))
+        t, x = crossing.time, crossing.state
+        let_go = (t, x) if crossing.edge == k else condition_ends(run, here, held, k, t, x)
+        if let_go is not None:
+            return released(run, here, held, k, outcome, *let_go)
+        held.surfaces.active.add(crossing.edge)
+        held = held.moved(t, x)
+
+
+def released(run: Run, here: ModeState, held: ModeState, k: int, event: Event, t: Number, x: State) -> ModeState:
+    """Go on in the mode itself from a point that the guard of edge k no longer holds."""
+    if t > event.crossing.time:
+        here.arc.append(t, x, (tuple(b - a for a, b in zip(event.crossing.state, x, strict=True)),))
+    active = after_contact(here, held, k, t, x).surfaces.active
+    return run.place(here.index, here.mode.states, t, x, event.scale, active=active)
 
 
 def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event | ModeState | Stop:
@@ -219,8 +244,7 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
-    here = here.resting(rests(run, here))
-    standing = standing_on(run, here)
+    standing = standing_on(run, contact_at(run, here) or here)
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)

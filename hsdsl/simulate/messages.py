@@ -27,8 +27,8 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
         return diagnostics.unsettled(mode.name, k, time)
     if kind == "crowded":
         return diagnostics.crowded(FREE, time)
-    if kind == "at rest":
-        return diagnostics.at_rest(mode.edges[k].name, time, other)
+    if kind == "in contact":
+        return diagnostics.in_contact(mode.edges[k].name, time, other, bool(count))
     if kind == "replaced":
         return diagnostics.replaced(mode.edges[k].name, count, time, other)
     if kind == "slides":

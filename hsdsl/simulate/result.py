@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsdsl.arithmetic import Number
+from hsdsl.defaults import DEFAULTS
 from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
 from hsdsl.program import Program
 from hsdsl.runtime.sampling import Sampler
@@ -169,6 +170,7 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
         **size,
         **({"relaxation": settings.relaxation} if settings.method else {}),
         "max_transitions": settings.max_transitions,
+        **({"completion": settings.completion} if settings.completion != DEFAULTS["completion"] else {}),
         **({"scale": dict(settings.scale)} if settings.scale else {}),
         **({} if samples is None else {"samples": samples}),
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),

@@ -23,9 +23,14 @@ from hsdsl.simulate.surfaces import Crossing, Surfaces
 
 @dataclass(frozen=True)
 class ModeState:
-    """Mode and its number, input segment, time and state of a run, ready to flow."""
+    """Mode and its number, input segment, time and state of a run, ready to flow.
+
+    ``flow`` is the number of what flows, among `Program.flows`: the mode itself, or a motion along one of its guards,
+    whose ``mode``, ``kernel`` and ``surfaces`` these are then.
+    """
 
     index: int
+    flow: int
     mode: ModeProgram
     kernel: ModeKernel
     surfaces: Surfaces
@@ -37,10 +42,6 @@ class ModeState:
     def moved(self, t: Number, x: State) -> ModeState:
         """Return the same place in the mode's life, later."""
         return replace(self, t=t, x=x)
-
-    def resting(self, edge: int | None) -> ModeState:
-        """Return the same place as one at rest on the guard of an edge."""
-        return replace(self, surfaces=replace(self.surfaces, resting=edge))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class Run(Problem):
         assert method is not None
         if method.kind == "table":
             return stepper(method, len(here.x), self.arithmetic)
-        mode = here.index
+        mode = here.flow
         if method.kind == "radau":
             from hsdsl.integrators.radau import radau_stepper
 
@@ -91,7 +92,7 @@ class Run(Problem):
         self.control.begin_arc(program.name)
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
         surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
-        return ModeState(mode, program, kernel, surfaces, segment, arc, t, x)
+        return ModeState(mode, mode, program, kernel, surfaces, segment, arc, t, x)
 
     def wait(self, here: ModeState, rows: list[tuple[Number, Number]], q: State) -> None:
         """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""

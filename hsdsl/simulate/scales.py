@@ -38,7 +38,7 @@ def error_ratio(
 
 def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
     """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
-    mode, scales = here.index, here.arc.scales
+    mode, scales = here.flow, here.arc.scales
     found: Vector = []
     rows = rows_of(run.kernel.jacobian(mode, here.segment.data)(here.t, *here.x), len(here.x))
     for f, row in zip(slope, rows, strict=True):

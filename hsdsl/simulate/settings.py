@@ -39,6 +39,7 @@ class Settings:
     ``method_chosen`` says which method `auto` is here, and why; None where the method was named.
     ``overrides`` are the values given beyond the model's file, as written, by the names of `--set`.
     ``memory`` is how many bytes of rows a run may keep.
+    ``completion`` is `none` where no state moves along a guard that holds it.
     ``longest_step`` bounds the steps of an adaptive method further, ``first_steps`` the first ones of each arc of flow,
     0 where it does not: by this number, then twice, then four times as much.
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
@@ -57,6 +58,7 @@ class Settings:
     method_chosen: str | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False)
     memory: int = DEFAULT.memory
+    completion: str = "contact"
     longest_step: Number | None = None
     first_steps: Sequence[Number] = ()
 

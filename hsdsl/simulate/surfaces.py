@@ -117,8 +117,7 @@ class Surfaces:
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
     ``active``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
-    state while it waited in a strip, and that the flow leads back through. ``resting`` is the edge on whose guard the
-    state rests, if it does.
+    state while it waited in a strip, and that the flow leads back through.
     """
 
     kernel: ModeKernel
@@ -127,7 +126,6 @@ class Surfaces:
     arithmetic: Arithmetic
     active: set[int] = field(default_factory=set[int])
     emerging: set[int] = field(default_factory=set[int])
-    resting: int | None = None
 
     def roundoff_bound(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
         """Round-off of surface k at a point; where its gradient has no value only the sides count."""
@@ -201,16 +199,14 @@ class Surfaces:
     def standing(self, t: Number, x: State, since: Number) -> list[int]:
         """Edges on whose guards the state is, with the flow pointing out and `if` true.
 
-        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that. Of a
-        state at rest only time goes on.
+        On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
         """
         found: list[int] = []
-        rates = self.kernel.rates if self.resting is None else self.kernel.gradients
         for k in range(len(self.edges)):
-            if k == self.resting:
+            if self.edges[k].releases:
                 continue
             try:
-                r, rate = self.kernel.surfaces(t, *x)[k], rates[k](t, *x)[0]
+                r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
                 near = abs(r) <= max(self.roundoff_bound(k, t, x), rate * since)
                 if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)

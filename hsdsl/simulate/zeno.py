@@ -12,10 +12,12 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate.contact import in_contact, keeps, presses
+from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
-from hsdsl.simulate.sticking import is_pushed, moves_alone, stays
 
 LEAST_FLIGHTS = 3
+MOST_CORRECTIONS = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
 
 
@@ -38,7 +40,7 @@ def _one_edge(one: Transition, other: Transition) -> bool:
 
 
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
-    """Go to the limit of a tail that is nearly over; stop at one where more than the impacts goes on."""
+    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
     made = run.recorder.transitions
     found = contraction(made)
     if found is None or here.mode.states != here.arc.states:
@@ -48,26 +50,48 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     end = here.t + left
     if left > run.settings.relaxation or end > here.segment.end:
         return here
+    edge = here.mode.edges[k]
     try:
-        q = fixed_point(here, k, end)
-        if q is None:
+        q = limit_of(run, here, k, end)
+        if q is None or not keeps(run, limit := here.moved(end, q), k):
             return here
-        limit = here.moved(end, q)
-        if not is_pushed(run, limit, k) or not stays(run, limit, k) or meets_another(here, limit, k):
+        if edge.contact is None or run.settings.completion == "none":
+            return run.diagnostics.accumulates(edge.name, end, here.t)
+        if presses(run, limit, k) is None or meets_another(here, limit, k):
             return here
-        alone = moves_alone(run, limit, k)
     except DOMAIN_ERRORS:
         return here
-    edge = here.mode.edges[k].name
-    if not alone:
-        return run.diagnostics.accumulates(edge, end, here.t)
-    run.diagnostics.replaced(edge, len(made) - 1, end, left)
+    run.diagnostics.replaced(edge.name, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
-    mode = here.index
-    rest = run.place(mode, here.mode.states, end, q, here.surfaces.scale)
+    rest = run.place(here.index, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
     rest.surfaces.active.add(k)
     return rest
+
+
+def limit_of(run: Run, here: ModeState, k: int, end: Number) -> State | None:
+    """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
+    q = fixed_point(here, k, here.t, here.x)
+    edge = here.mode.edges[k]
+    if edge.contact is not None:
+        slope = in_contact(run, here, k, edge.contact).kernel.flow(here.t, *q)
+        q = onto_guard(here, k, end, tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True)))
+    q = fixed_point(here, k, end, q)
+    far = abs(here.kernel.surfaces(end, *q)[k]) > here.surfaces.roundoff_bound(k, end, q, entry=True)
+    return None if far else q
+
+
+def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
+    """A point near a guard taken to it, each state in proportion to its scale."""
+    for _ in range(MOST_CORRECTIONS):
+        r, gradient = here.kernel.surfaces(t, *x)[k], here.kernel.gradients[k](t, *x)[1:]
+        if abs(r) <= here.surfaces.roundoff_bound(k, t, x):
+            break
+        weights = [g * s * s for g, s in zip(gradient, here.arc.scales, strict=True)]
+        across = total((g * w for g, w in zip(gradient, weights, strict=True)), r * 0)
+        if across > 0:
+            x = tuple(a - r / across * w for a, w in zip(x, weights, strict=True))
+    return x
 
 
 def meets_another(here: ModeState, limit: ModeState, k: int) -> bool:
@@ -83,17 +107,15 @@ def meets_another(here: ModeState, limit: ModeState, k: int) -> bool:
     return False
 
 
-def fixed_point(here: ModeState, k: int, t: Number) -> State | None:
-    """The point on the guard that repeated resets run to (Aitken's acceleration, by component)."""
-    reset, x = here.kernel.resets[k], here.x
+def fixed_point(here: ModeState, k: int, t: Number, x: State) -> State:
+    """The point that repeated resets run to (Aitken's acceleration, by component)."""
+    reset = here.kernel.resets[k]
     for _ in range(MOST_ROUNDS):
         one = reset(t, *x)
         if one == x:
             break
         two = reset(t, *one)
         x = tuple(map(_accelerated, x, one, two))
-    if abs(here.kernel.surfaces(t, *x)[k]) > here.surfaces.roundoff_bound(k, t, x, entry=True):
-        return None
     return x
 
 

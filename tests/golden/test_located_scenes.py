@@ -113,15 +113,19 @@ experiment: {until: 5, scheme: located}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_ball_that_bounces_and_rolls_is_not_frozen(method: str, tmp_path: Any) -> None:
+def test_ball_that_bounces_and_rolls_goes_on(method: str) -> None:
     """It falls for 1; flights of 1, 1/2, 1/4, ... follow and end at t = 3."""
-    path = tmp_path / "rolling.yaml"
-    path.write_text(ROLLING)
-    run = hsdsl.load(path).simulate(method=method)
-    assert run.stop.reason == "zeno" and "something else moves on" in run.stop.message
+    run = hsdsl.loads(ROLLING).simulate(method=method)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    assert any("Zeno at t = 3:" in reason for reason in run.verdict.reasons)
+    assert any("motion along the guard of fly->fly from t = 3 to t = 5" in reason for reason in run.verdict.reasons)
+    assert run.final.state["x"] == pytest.approx(5, abs=1e-9)
+
+
+def test_without_completion_the_run_stops_at_the_zeno_point() -> None:
+    run = hsdsl.loads(ROLLING).simulate(completion="none")
+    assert run.stop.reason == "zeno" and "accumulate at t = 3" in run.stop.message
     assert run.stop.time == pytest.approx(3, abs=2e-6)
-    assert run.verdict.theorem == "left"
-    assert run.final.state["x"] == pytest.approx(run.stop.time, abs=1e-9)
 
 
 EDGES = ["aerial->left", "left->ground", "ground->last_right", "last_right->ascent", "ascent->apex"]

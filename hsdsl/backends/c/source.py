@@ -60,12 +60,12 @@ static int NAME(const hs_real *p, int order, hs_real *lines) {{
 def model_source(program: Program) -> str:
     """Write a program as C99, to be compiled together with the headers of `hsdsl/runtime/c`."""
     writer = _Writer(program)
-    modes = [writer.mode(k, mode) for k, mode in enumerate(program.modes)]
+    modes = [writer.mode(k, mode) for k, mode in enumerate(program.flows)]
     table = writer.table("hs_mode", "modes", modes)
     model = (
         f"extern const hs_model hs_the_model;\n"
-        f"HS_EXPORT const hs_model hs_the_model = {{{len(modes)}, {width(program)}, "
-        f"{max(len(m.edges) + len(m.walls) for m in program.modes)}, {max(len(m.edges) for m in program.modes)}, "
+        f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
+        f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
         f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
@@ -79,7 +79,7 @@ def width(program: Program) -> int:
 
 def lines(program: Program) -> int:
     """How many lines the largest tape has."""
-    return max((line_count(m.tape, len(m.states)) for m in program.modes if m.tape), default=0)
+    return max((line_count(m.tape, len(m.states)) for m in program.flows if m.tape), default=0)
 
 
 def constant_bodies(program: Program) -> dict[str, str]:
@@ -134,6 +134,7 @@ class _Writer:
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
+            str(mode.push_order),
         ]
         return f"{{{', '.join(fields)}}}"
 
@@ -168,7 +169,8 @@ class _Writer:
         numbers = (edge.target, len(edge.target_states), int(edge.conditional), edge.priority, len(parts))
         return (
             f"{{{', '.join(map(str, numbers))}, {self.pointers(parts)}, "
-            f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}}}"
+            f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, "
+            f"{-1 if edge.contact is None else edge.contact}, {int(edge.releases)}}}"
         )
 
     def pointers(self, names: Iterable[str]) -> str:

@@ -65,12 +65,9 @@ def _numbers(values: Sequence[Number]) -> str:
     return ", ".join(map(constant, values))
 
 
-def interpolation_text(pair: Sequence[tuple[Interpolation, Number]]) -> str:
-    """The definition of ``problem_interpolation``: surfaces along steps, and a push over time."""
-    tables, rows = list[str](), list[str]()
-    for k, (by, share) in enumerate(pair):
-        columns = {"nodes": by.nodes, "tests": by.tests, "matrix": [number for line in by.matrix for number in line]}
-        tables += [f"static const hs_real {name}_{k}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items()]
-        rows.append(f"{{{len(by.nodes) - 1}, nodes_{k}, tests_{k}, matrix_{k}, {constant(share + by.rounding)}}}")
-    listed = ",\n  ".join(rows)
-    return "".join(tables) + f"const hs_interpolation problem_interpolation[2] = {{\n  {listed}}};\n"
+def interpolation_text(by: Interpolation, share: Number) -> str:
+    """The definition of ``problem_interpolation``: how surfaces along steps are interpolated."""
+    columns = {"nodes": by.nodes, "tests": by.tests, "matrix": [number for line in by.matrix for number in line]}
+    tables = "".join(f"static const hs_real {name}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items())
+    row = f"{len(by.nodes) - 1}, nodes, tests, matrix, {constant(share + by.rounding)}"
+    return f"{tables}const hs_interpolation problem_interpolation = {{{row}}};\n"

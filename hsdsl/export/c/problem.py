@@ -18,7 +18,7 @@ from hsdsl.runtime.methods import method_table
 from hsdsl.runtime.structures import METHOD_KINDS, SCHEMES
 from hsdsl.simulate import Problem, Settings
 from hsdsl.simulate.control import make_control
-from hsdsl.simulate.interpolation import OVER_TIME, along_steps, interpolation
+from hsdsl.simulate.interpolation import along_steps, interpolation
 
 _HEADER = """
 #ifndef PROBLEM_H
@@ -31,7 +31,7 @@ extern const hs_model hs_the_model;
 extern const hs_method problem_method;
 extern const hs_timeline problem_timeline;
 extern const hs_settings problem_settings;
-extern const hs_interpolation problem_interpolation[2];
+extern const hs_interpolation problem_interpolation;
 extern const int problem_mode, problem_dimension; /* the start */
 extern const hs_real problem_x[];
 
@@ -67,8 +67,8 @@ def _sizes(problem: Problem) -> str:
     sizes = {
         "MODES": len(modes),
         "WIDTH": width(program),
-        "SURFACES": max(len(mode.edges) + len(mode.walls) for mode in modes),
-        "EDGES": max(len(mode.edges) for mode in modes),
+        "SURFACES": max(len(mode.edges) + len(mode.walls) for mode in program.flows),
+        "EDGES": max(len(mode.edges) for mode in program.flows),
         "LINES": lines(program),
         "STATES": len(program.all_states),
         "OUTPUTS": len(program.outputs),
@@ -112,7 +112,7 @@ def numbers(source: Source) -> str:
         comment(source.heading),
         '\n#include "problem.h"\n\n#include "hs_math.h"\n\n',
         in_both(*(_method(settings) for settings, _ in pair)),
-        in_both(*(_interpolations(settings, arithmetic) for settings, arithmetic in pair)),
+        in_both(*(_interpolation(settings, arithmetic) for settings, arithmetic in pair)),
         _timeline(problem),
         in_both(*(_settings(settings, problem.program, arithmetic) for settings, arithmetic in pair)),
         f"const int problem_mode = {problem.mode}, problem_dimension = {len(problem.x)};\n",
@@ -128,9 +128,9 @@ def _method(settings: Settings) -> str:
     return method_text(method_table(settings.method))
 
 
-def _interpolations(settings: Settings, arithmetic: Arithmetic) -> str:
-    pair = [(interpolation(degree, arithmetic), share) for degree, share in (along_steps(settings), OVER_TIME)]
-    return interpolation_text(pair)
+def _interpolation(settings: Settings, arithmetic: Arithmetic) -> str:
+    degree, share = along_steps(settings)
+    return interpolation_text(interpolation(degree, arithmetic), share)
 
 
 def _timeline(problem: Problem) -> str:
@@ -148,10 +148,11 @@ def _timeline(problem: Problem) -> str:
 def _settings(settings: Settings, program: Program, arithmetic: Arithmetic) -> str:
     control = make_control(settings, arithmetic)
     scale = [settings.scale.get(name, 0.0) for name in program.all_states] if settings.scale else []
+    contacts = int(settings.completion != "none")
     values = [control.h, control.tolerance or 0.0, control.largest, settings.relaxation]
     return (
         (array("static const hs_real", "scales", map(constant, scale)) if scale else "")
         + f"const hs_settings problem_settings = {{\n  {', '.join(map(constant, values))}, {literal(settings.until)}, "
-        + f"{min(settings.max_transitions, 2**62)}, {SCHEMES.index(settings.scheme)}, {'scales' if scale else 0}, "
-        + "0, 0};\n"
+        + f"{min(settings.max_transitions, 2**62)}, {SCHEMES.index(settings.scheme)}, {contacts}, "
+        + f"{'scales' if scale else 0}, 0, 0}};\n"
     )

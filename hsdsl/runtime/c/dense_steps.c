@@ -26,7 +26,6 @@ static int span_point(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
   *time = s == 1 ? span->t1 : span->t + s * span->h;
   if (s == 1) return copy(*state, run->z, n), 0;
   if (!(s > 0)) return copy(*state, run->x, n), 0;
-  if (run->resting >= 0) return copy(*state, run->x, n), 0;
   if (run->method->kind == HS_TAYLOR) return at(run, &span->piece, s, *state), 0;
   aside(run, state);
   const int status = part_of_step(run, n, span->t, s * span->h);
@@ -44,7 +43,7 @@ static int shorter_piece(hs_run *run, hs_real s, hs_polynomial *piece) {
 /* The interpolant of the states up to the share s of the step, over [0, 1]. */
 static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece) {
   int status = 1;
-  if (run->method->kind != HS_TAYLOR && run->resting < 0) {
+  if (run->method->kind != HS_TAYLOR) {
     aside(run, &run->q);
     status = shorter_piece(run, s, piece);
     aside(run, &run->q);

@@ -189,13 +189,12 @@ HS_INLINE hs_real span_size(const hs_run *run, const hs_span *span, hs_real s, i
 static void begin_span(hs_run *run, hs_real h, hs_time t1);
 HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
-/* sticking.c */
-static int stays(hs_run *run, hs_time t, const hs_real *x, int k);
-static int is_pushed(hs_run *run, hs_time t, const hs_real *x, int k);
-static int moves_alone(hs_run *run, hs_time t, const hs_real *x, int k);
-static int rests(hs_run *run);
-static int release(hs_run *run, int k, hs_time *until);
-static hs_step_failure next_rest(hs_run *run, int n, hs_time limit);
+/* contact.c */
+static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
+static int presses(hs_run *run, hs_time t, const hs_real *x, int k);
+static int contact_at(hs_run *run);
+static void after_contact(hs_run *run, int k);
+static int condition_ends(hs_run *run, int k, hs_time *t);
 
 /* zeno.c */
 static const hs_made *made_before(const hs_run *run, int back);

@@ -34,7 +34,7 @@
 #include "root_isolation.c"
 #include "surface_polynomials.c"
 #include "dense_steps.c"
-#include "sticking.c"
+#include "contact.c"
 #include "zeno.c"
 #include "touching.c"
 #include "located.c"
@@ -153,7 +153,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->starts = numbers(store, m);
   run->middle = numbers(store, m);
   run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
-  run->second = numbers(store, 4 * (int64_t)run->model->lines);
+  run->began = numbers(store, w);
   run->left = numbers(store, most + 1);
   run->bernstein = numbers(store, most + 1);
   run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);

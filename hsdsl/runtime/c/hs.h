@@ -42,6 +42,8 @@ typedef struct {
   hs_routine *const *condition;
   hs_routine *reset;
   hs_routine *spread;
+  int contact;  /* index of the motion along its guard, behind the modes; -1 for none */
+  int releases; /* whether it ends such a motion */
 } hs_edge;
 
 typedef struct {
@@ -63,10 +65,12 @@ typedef struct {
   int affine;              /* whether every surface's gradient is the same everywhere */
   int jumps;               /* whether the flow has `sign` or `floor` */
   const int *state;        /* for each state its number among those of all modes */
+  int push_order;          /* of a motion along a guard: the derivative of the guard along the flow that pushes */
 } hs_mode;
 
 typedef struct {
   int modes;
+  int flows;    /* the modes, then motions along their guards */
   int width;    /* states of the largest mode */
   int surfaces; /* of the mode with most */
   int edges;    /* of the mode with most */

@@ -67,8 +67,6 @@ typedef struct {
   hs_real share; /* how far a function may be off, relative to its largest value */
 } hs_interpolation;
 
-enum { HS_ALONG_STEPS, HS_OVER_TIME };
-
 typedef enum { HS_RELAXED, HS_LOCATED } hs_scheme;
 
 typedef struct {
@@ -79,6 +77,7 @@ typedef struct {
   hs_time until;
   int64_t max_transitions;
   int64_t scheme;
+  int64_t contacts; /* whether states that a guard holds move along it */
   const hs_real *scale; /* a size of each state of all modes, 0 where none is given; 0 where none at all */
   int64_t arcs;              /* that have a bound on their first step */
   const hs_real *first_steps; /* of each arc of flow, 0 where there is no bound */
@@ -102,7 +101,7 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
-typedef enum { HS_CROWDED, HS_AT_REST, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
+typedef enum { HS_CROWDED, HS_IN_CONTACT, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
 
 /* A diagnostic: see hsdsl/simulate/diagnostics.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
@@ -191,7 +190,7 @@ typedef struct hs_task {
   const hs_method *method;
   const hs_timeline *timeline;
   hs_settings settings;
-  const hs_interpolation *interpolation; /* two of them, for the located scheme */
+  const hs_interpolation *interpolation; /* of surfaces along steps of the located scheme */
   int32_t mode, dimension; /* the start */
   const hs_real *x;
   double *workspace; /* hs_workspace() numbers */

@@ -100,7 +100,8 @@ static void write_crossing(hs_run *run, const hs_crossing *crossing) {
 
 static int walked_out(hs_run *run, const hs_crossing *wall) {
   write_crossing(run, wall);
-  run->task->stop.surface = wall->edge;
+  copy(run->x, wall->state, run->here.dimension);
+  run->task->stop.surface = wall->edge - run->here.table->edges + run->model->mode[run->here.mode].edges;
   return stopped(run, HS_LEFT, wall->time);
 }
 
@@ -188,7 +189,7 @@ static int follow(hs_run *run, hs_time limit) {
   forget_steps(run);
   while (here->t < limit) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
-    const hs_step_failure failure = run->resting < 0 ? next_span(run, n, limit) : next_rest(run, n, limit);
+    const hs_step_failure failure = next_span(run, n, limit);
     if (failure != HS_CLEAR) return located_stuck(run, failure);
     const int event = first_event(run);
     if (event == WITHOUT_VALUE) return step_not_finite(run);
@@ -200,27 +201,63 @@ static int follow(hs_run *run, hs_time limit) {
   return AT_BOUNDARY;
 }
 
-/* Rest until a surface is crossed, to the segment's end, or until the guard of edge k lets go of the state. */
-static int rest(hs_run *run, int k, hs_time until) {
+/* Forget the ends of a motion along the guard of edge k among what else might have been. */
+static void drop_releases(hs_run *run, int k) {
+  int kept = 0;
+  for (int i = 0; i < run->alternatives_count; i++) {
+    const int other = run->alternatives[i];
+    if (other != k && !run->here.table->edge[other].releases) run->alternatives[kept++] = other;
+  }
+  run->alternatives_count = kept;
+}
+
+/* Go on in the mode itself from run->x, which the guard of edge k no longer holds. */
+static int released(hs_run *run, int k, hs_time t) {
   hs_mode_state *const here = &run->here;
-  const hs_time from = here->t;
-  run->resting = k;
-  const int outcome = follow(run, until);
-  note(run, HS_AT_REST, k, 0, from, run->task->now);
-  if (outcome != AT_BOUNDARY || !(until < run->task->timeline->end[here->segment])) return outcome;
+  after_contact(run, k);
   const int standing_before = here->standing;
-  place(run, here->mode, here->dimension, until, 0);
+  copy(run->scale, run->landed, here->dimension);
+  place(run, here->mode, here->dimension, t, 0);
   here->standing = standing_before;
   return GOES_ON;
 }
 
-/* Flow or rest until a surface is crossed, to the segment's end, or until a guard lets go of the state. */
+/* Flow along the guard of edge k until it lets go of the state. */
+static int along_guard(hs_run *run, int k, hs_time limit) {
+  hs_mode_state *const here = &run->here;
+  for (;;) {
+    const int outcome = follow(run, limit), end = run->chosen.edge;
+    if (outcome == LANDED && here->table->edge[end].releases) {
+      hs_time t = run->chosen.time;
+      copy(run->x, run->chosen.state, here->dimension);
+      if (end == k) return released(run, k, t);
+      if (condition_ends(run, k, &t)) {
+        secant(run, &run->cubic);
+        append(run, t, run->z, &run->cubic);
+        swap(&run->x, &run->z);
+        return released(run, k, t);
+      }
+      run->active_surfaces[end] = 1;
+      here->standing++;
+      here->t = t;
+      continue;
+    }
+    if (outcome == LANDED) drop_releases(run, k);
+    after_contact(run, k);
+    return outcome;
+  }
+}
+
+/* Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go. */
 static int located_flow(hs_run *run) {
-  const hs_time limit = run->task->timeline->end[run->here.segment];
-  const int edge = rests(run);
-  hs_time until;
-  if (edge >= 0 && release(run, edge, &until)) return rest(run, edge, until);
-  return follow(run, limit);
+  const hs_time limit = run->task->timeline->end[run->here.segment], from = run->here.t;
+  const int k = contact_at(run), n = run->here.dimension;
+  if (k < 0) return follow(run, limit);
+  copy(run->began, run->x, n);
+  const int outcome = along_guard(run, k, limit);
+  const int still = same_state(run->began, outcome == LANDED ? run->chosen.state : run->x, n);
+  note(run, HS_IN_CONTACT, k, still, from, run->task->now);
+  return outcome;
 }
 
 /* Whether the transition before this one was made at the same instant. */
@@ -283,12 +320,13 @@ static int jump(hs_run *run) {
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t < run->until) return go_on(run);
-  run->resting = rests(run);
-  const int count = standing_on(run);
-  if (!count) return stopped(run, HS_UNTIL, t);
-  choose(run, count);
-  sizes(run, run->x, run->x);
-  return jump(run);
+  const int held = contact_at(run), count = standing_on(run);
+  if (count) {
+    choose(run, count);
+    sizes(run, run->x, run->x);
+  }
+  if (held >= 0) after_contact(run, held);
+  return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);
 }
 
 /* Follow the execution until it stops. */

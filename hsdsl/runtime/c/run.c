@@ -49,7 +49,6 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
   here.t = here.entered_at = t;
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
-  run->resting = -1;
   if (run->task->settings.arcs) bound_first_step(run, mode);
   begin(run, HS_FLOW);
   append(run, t, run->x, 0);

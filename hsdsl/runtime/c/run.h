@@ -146,13 +146,6 @@ typedef struct {
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
-/* What holds a state at rest on a window of time: an edge, and the derivative of its surface that does. */
-typedef struct {
-  int edge, order;
-  hs_time start;
-  hs_real width;
-} hs_held;
-
 /* One step of the located scheme. */
 typedef struct {
   hs_time t, t1;
@@ -180,7 +173,7 @@ typedef struct {
   hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
   hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
   int *lifted;
-  hs_real *flow_sizes, *jacobian; /* see sticking.c; jacobian: width * width */
+  hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: width * width */
   hs_real **k;          /* stages, then the flow at the end */
   hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */
@@ -207,11 +200,10 @@ typedef struct {
   hs_curves curves;
   hs_cut *cuts;
   const hs_real *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
-  hs_real *bernstein, *binomials, *left, *rows, *second; /* second: series of order 2 */
+  hs_real *bernstein, *binomials, *left, *rows;
   hs_real *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
-  int resting;                      /* the edge on whose guard the state rests, or -1 */
-  hs_held held;
+  hs_real *began;                   /* where a motion along a guard began */
   int *doubted, noted_crowded;      /* doubted: for each mode and surface */
   hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */

@@ -233,7 +233,7 @@ static void lose(hs_run *run) {
 
 /* All surfaces along the step's interpolant. */
 static int curves_along(hs_run *run) {
-  const hs_interpolation *by = &run->task->interpolation[HS_ALONG_STEPS];
+  const hs_interpolation *by = run->task->interpolation;
   if (run->here.table->affine) return affine_curves(run, by->share);
   const int lost = run->lost[run->here.mode], most = lost ? LOST_IN_A_STEP : IN_A_STEP;
   const int refuse = run->span.h * (lost ? LOST_SHORTEST : SHORTEST) > run->until;

@@ -147,23 +147,15 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   return answer;
 }
 
-/* How fast surface k changes. */
-static int rate_of(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *rate) {
-  if (run->resting < 0) return run->here.table->rates[k](run->here.p, t, x, rate) ? RAISED : 0;
-  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
-  *rate = run->gradient[0];
-  return 0;
-}
-
 /* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
-   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. Of a state at
-   rest only time goes on. */
+   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
 static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
   int count = 0;
   for (int k = 0; k < run->here.table->edges; k++) {
     hs_real r, rate, noise;
     found[k] = 0;
-    if (k == run->resting || surface(run, k, t, x, &r) || rate_of(run, k, t, x, &rate)) continue;
+    if (run->here.table->edge[k].releases || surface(run, k, t, x, &r)) continue;
+    if (run->here.table->rates[k](run->here.p, t, x, &rate)) continue;
     if (roundoff_bound(run, k, t, x, 0, &noise)) continue;
     if (fabs(r) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1) found[k] = 1, count++;
   }

@@ -25,8 +25,8 @@
 
 #define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
 #define HS_LOCATED_SPACE_OF(w, m, modes, lines, stages, extra, degree, most)                                       \
-  (HS_NUMBERS((w) * (w)) + 2 * HS_SPAN(w, degree) + 2 * HS_NUMBERS(w) + HS_STAGES(w, (stages) + 1 + (extra)) +     \
-   3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) + HS_NUMBERS(4 * (lines)) +                       \
+  (HS_NUMBERS((w) * (w)) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + HS_STAGES(w, (stages) + 1 + (extra)) +     \
+   3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
    (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
    HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
    2 * HS_NUMBERS(MOST_PARTS) + HS_NUMBERS(MOST_PARTS * (m) * ((most) + 1)) + HS_NUMBERS(MOST_PARTS * (m)) +       \

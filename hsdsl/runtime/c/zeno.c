@@ -4,6 +4,7 @@
 #include "functions.h"
 
 #define LEAST_FLIGHTS 3
+#define MOST_CORRECTIONS_TO_GUARD 4
 #define MOST_ROUNDS 60
 
 /* Transition `back` before the last one. */
@@ -34,20 +35,55 @@ static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
   return bend != 0 ? a - (b - a) * (b - a) / bend : c;
 }
 
-/* The point on the guard of edge k that repeated resets run to, to run->z: 1, or 0. */
+/* The point that repeated resets of edge k run to from run->z, to run->z. */
 static int fixed_point(hs_run *run, int k, hs_time t) {
   const hs_mode_state *here = &run->here;
   const hs_edge *edge = &here->table->edge[k];
   const int n = here->dimension;
-  hs_real *const x = run->z, *const one = run->after, *const two = run->at, r, noise;
-  copy(x, run->x, n);
+  hs_real *const x = run->z, *const one = run->after, *const two = run->at;
   for (int i = 0; i < MOST_ROUNDS; i++) {
     if (edge->reset(here->p, t, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
     if (edge->reset(here->p, t, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
   }
-  if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 1, &noise)) return RAISED;
+  return 0;
+}
+
+/* A point near the guard of edge k taken to it, each state in proportion to its scale. */
+static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
+  const int n = run->here.dimension;
+  hs_real *const weights = run->at;
+  for (int i = 0; i < MOST_CORRECTIONS_TO_GUARD; i++) {
+    hs_real r, noise;
+    if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
+    if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
+    if (fabs(r) <= noise) break;
+    hs_real across = r * 0;
+    for (int s = 0; s < n; s++) {
+      weights[s] = run->gradient[s + 1] * run->scales[s] * run->scales[s];
+      across = across + run->gradient[s + 1] * weights[s];
+    }
+    if (across > 0)
+      for (int s = 0; s < n; s++) x[s] = x[s] - r / across * weights[s];
+  }
+  return 0;
+}
+
+/* The point that a tail of edge k runs to at its end, to run->z: 1; 0 where it is not on the guard. */
+static int limit_of(hs_run *run, int k, hs_time end) {
+  const hs_mode_state *here = &run->here;
+  const int n = here->dimension, contact = here->table->edge[k].contact;
+  hs_real r, noise, *const q = run->z;
+  copy(q, run->x, n);
+  if (fixed_point(run, k, here->t)) return RAISED;
+  if (contact >= 0) {
+    if (run->model->mode[contact].flow(here->p, here->t, q, run->end)) return RAISED;
+    for (int s = 0; s < n; s++) q[s] = q[s] + (end - here->t) * run->end[s];
+    if (onto_guard(run, k, end, q)) return RAISED;
+  }
+  if (fixed_point(run, k, end) || surface(run, k, end, q, &r) || roundoff_bound(run, k, end, q, 1, &noise))
+    return RAISED;
   return !(fabs(r) > noise);
 }
 
@@ -66,7 +102,7 @@ static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, 
   return 0;
 }
 
-/* Go to the limit of a tail of edge k that is nearly over; stop at one where more than the impacts goes on. */
+/* Go to the limit of a tail of edge k that is nearly over; stop at one where no motion along the guard goes on. */
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_real flight, ratio;
@@ -76,14 +112,12 @@ static int close_tail(hs_run *run, int k) {
   const hs_time end = here->t + left;
   if (left > run->epsilon || end > run->task->timeline->end[here->segment]) return GOES_ON;
   hs_real *const q = run->z;
-  if (fixed_point(run, k, end) != 1 || is_pushed(run, end, q, k) != 1 || stays(run, end, q, k) != 1) return GOES_ON;
-  if (meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
-  const int alone = moves_alone(run, end, q, k);
-  if (alone == RAISED) return GOES_ON;
-  if (!alone) {
+  if (limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
+  if (here->table->edge[k].contact < 0 || !run->task->settings.contacts) {
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
+  if (presses(run, end, q, k) != 1 || meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
   note(run, HS_REPLACED, k, run->jump - 1, end, left);
   secant(run, &run->cubic);
   append(run, end, q, &run->cubic);

@@ -28,7 +28,7 @@ from collections.abc import Iterator, Sequence
 from hsdsl.execution import Stop, Transition, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.accumulation import accumulations
+from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import choices
 from hsdsl.simulate.verdict.crossings import crossings
 from hsdsl.simulate.verdict.finding import Finding
@@ -55,7 +55,7 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
-    left, unknown, margins = [*diagnostics.departures], [*diagnostics.doubts], list[str]()
+    left, unknown, margins = [*diagnostics.departures, *slidings(run)], [*diagnostics.doubts], list[str]()
     left += [sentence for sentence in accumulations(run) if not diagnostics.departures]
     if run.stop.reason in LEFT:
         left.append(run.stop.message)

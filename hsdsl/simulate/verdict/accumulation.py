@@ -14,6 +14,15 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.run_view import RunView
 
 
+def slidings(run: RunView) -> Iterator[str]:
+    """Say where the run slid on a surface that two modes press on: the theorem knows no such motion."""
+    modes = {mode.name: mode.slides for mode in run.problem.program.modes if mode.slides}
+    for arc in run.flows if modes else ():
+        if arc.mode in modes:
+            between, start, end = " and ".join(modes[arc.mode]), run.times[arc.first], run.times[arc.last]
+            yield f"sliding between {between} from t = {show(start)} to t = {show(end)}"
+
+
 def accumulations(run: RunView) -> Iterator[str]:
     """Say where transitions first crowd together, and where they are last seen to."""
     relaxation, made = run.problem.settings.relaxation, run.transitions

@@ -101,7 +101,7 @@ void hs_open(hs_instance *instance) {
   task->method = &problem_method;
   task->timeline = &instance->timeline;
   task->settings = problem_settings;
-  task->interpolation = problem_interpolation;
+  task->interpolation = &problem_interpolation;
   task->mode = problem_mode;
   task->dimension = problem_dimension;
   task->x = instance->x;

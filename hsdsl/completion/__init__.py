@@ -1,0 +1,12 @@
+"""Completions of a system: flows for states that its own flows and resets hold on a guard.
+
+`contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions.
+`sliding` is motion on a surface that two modes press on.
+"""
+
+from __future__ import annotations
+
+from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.sliding import Sliding, slidings, with_sliding
+
+__all__ = ["Contact", "Sliding", "contact", "slidings", "with_sliding"]

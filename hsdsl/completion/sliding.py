@@ -1,0 +1,129 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+"""Sliding: the flow on a surface that two modes press on (Filippov 1988, doi:10.1007/978-94-015-7793-3).
+
+Mode a has an edge to b where r >= 0, b one back where r <= 0, and neither changes a state. Where r grows along the flow
+of a and falls along that of b, a state can follow neither. It stays on the surface and follows s b + (1 - s) a with
+the share s for which r does not change. Off the surface s brings it back, in a time that its own size over its rates
+gives: round-off and errors of steps do not add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from hsdsl.completion.contact import along, cancelled, zero_surface
+from hsdsl.expression.scope import symbol
+from hsdsl.system import TIME, Edge, HybridSystem, Mode
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Sliding between two modes: ``mode`` slides, ``entries`` are the edges of both modes into it."""
+
+    mode: Mode
+    entries: tuple[Edge, Edge]
+
+
+def with_sliding(system: HybridSystem) -> HybridSystem:
+    """The system with a mode for each surface that two modes press on; the same where there is none."""
+    found = slidings(system)
+    if not found:
+        return system
+    modes = {mode.name: mode for mode in system.modes}
+    for sliding in found:
+        for entry in sliding.entries:
+            mode = modes[entry.source]
+            modes[mode.name] = replace(mode, edges=(*mode.edges, entry))
+    return replace(system, modes=(*modes.values(), *(sliding.mode for sliding in found)))
+
+
+def slidings(system: HybridSystem) -> list[Sliding]:
+    """The slidings of a system, in file order of the edges into their surfaces."""
+    names = {mode.name for mode in system.modes}
+    found: list[Sliding] = []
+    for a, out, b, back in _pairs(system):
+        name = base = f"sliding_{a.name}_{b.name}"
+        number = 2
+        while name in names:
+            name, number = f"{base}_{number}", number + 1
+        names.add(name)
+        found.append(_sliding(name, a, out, b, back))
+    return found
+
+
+def _pairs(system: HybridSystem) -> Iterator[tuple[Mode, Edge, Mode, Edge]]:
+    """Two modes with the edges from one to the other on one surface, each pair once."""
+    modes = list(system.modes)
+    for i, a in enumerate(modes):
+        for b in modes[i + 1 :]:
+            if a.states == b.states and a.states:
+                for out in a.edges:
+                    for back in b.edges:
+                        if out.target == b.name and back.target == a.name and _opposite(out, back):
+                            yield a, out, b, back
+
+
+def _opposite(out: Edge, back: Edge) -> bool:
+    """Whether two edges that change no state cross one surface in opposite directions, whenever it is reached."""
+    plain = all(e.condition is None and e.reset == tuple(map(symbol, e.target_states)) for e in (out, back))
+    return plain and sp.expand(out.surface.residual + back.surface.residual) == 0
+
+
+def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
+    states = [symbol(state) for state in a.states]
+    r = out.surface.residual
+    outwards, inwards = (cancelled(along(r, states, mode.flow)) for mode in (a, b))
+    share = outwards / (outwards - inwards) + _correction(r, states)
+    flow = tuple(cancelled(f + share * (g - f)) for f, g in zip(a.flow, b.flow, strict=True))
+    stay = {"target_states": a.states, "reset": tuple(states), "reset_texts": a.states, "condition": None}
+    leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **stay)
+    leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **stay)
+    mode = replace(
+        a,
+        name=name,
+        flow=flow,
+        flow_texts=tuple(map(str, flow)),
+        edges=(leave_a, leave_b, *_others(name, a, out, b, back)),
+        walls=tuple(dict.fromkeys((*a.walls, *b.walls))),
+        outputs=tuple(_blended(f, g, share) for f, g in zip(a.outputs, b.outputs, strict=True)),
+        scene=tuple(_blended(f, g, share) for f, g in zip(a.scene, b.scene, strict=True)),
+        slides=(a.name, b.name),
+    )
+    enter = {**stay, "target": name}
+    into_a = replace(out, name=f"{a.name}->{name}", priority=out.priority + 1, **enter)
+    into_b = replace(back, name=f"{b.name}->{name}", priority=back.priority + 1, **enter)
+    entries = (replace(into_a, condition=sp.Lt(inwards, 0)), replace(into_b, condition=sp.Gt(outwards, 0)))
+    return Sliding(mode, entries)
+
+
+def _correction(r: sp.Expr, states: list[sp.Symbol]) -> sp.Expr:
+    """What brings a state back to a curved surface; a surface that is affine is kept by the methods themselves."""
+    slopes = [sp.diff(r, x) for x in states]
+    if not any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME))):
+        return sp.S.Zero
+    size = sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
+    return r / sp.sqrt(size)
+
+
+def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
+    """The further edges of both modes, those of the first one first; one of two on the same surface."""
+    found: list[Edge] = []
+    for mode, own in ((a, out), (b, back)):
+        for edge in mode.edges:
+            if edge is own or any(sp.expand(e.surface.residual - edge.surface.residual) == 0 for e in found):
+                continue
+            taken = {e.name for e in found}
+            label = edge.name if edge.name not in taken else f"{edge.name}_{mode.name}"
+            found.append(replace(edge, name=label, source=name))
+    return found
+
+
+def _blended(f: sp.Expr | None, g: sp.Expr | None, share: sp.Expr) -> sp.Expr | None:
+    """An output in between, as the flow is."""
+    if f is None or g is None or f == g:
+        return f if f == g else None
+    return cancelled(f + share * (g - f))
