@@ -146,9 +146,8 @@ CASES: list[tuple[str, dict[str, float], dict[str, Any]]] = [
 ]
 
 
+@in_browser
 class TestASlider:
-    pytestmark = in_browser
-
     def test_a_slider_moves_the_numbers_that_are_shown(self, driver, tmp_path):
         from selenium.webdriver.common.keys import Keys
 
@@ -165,9 +164,9 @@ class TestASlider:
         assert f"after {len(expected)} transitions" in driver.find_element("id", "outcome").text
 
 
+@pytest.mark.slow
+@in_browser
 class TestInABrowser:
-    pytestmark = (*in_browser, pytest.mark.slow)
-
     @pytest.mark.parametrize(("name", "changes", "arguments"), CASES)
     def test_moved_settings_give_the_run_with_them(self, driver, name, changes, arguments, tmp_path):
         model = hsdsl.load(MODELS / f"{name}.yaml")
@@ -289,9 +288,8 @@ class TestInABrowser:
             assert ground == ("rgb(20, 24, 29)" if dark else "rgb(255, 255, 255)")
 
 
+@needs_compiler
 class TestText:
-    pytestmark = needs_compiler
-
     def test_it_is_one_small_page_of_itself(self):
         for name in ("pronking-runner", "oscillator-with-stop-1"):
             (content,) = files_of(source_of(hsdsl.load(MODELS / f"{name}.yaml"), {}), "web").values()
