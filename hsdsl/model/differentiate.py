@@ -43,7 +43,8 @@ class Differentiator:
         In ties an edge in ``firsts`` goes first.
         """
         check_arguments(arguments, "a sensitivity", REFUSED)
-        key = call_key(wrt if isinstance(wrt, str) else tuple(wrt), tuple(firsts), dict(arguments))
+        wrt = tuple(map(str, [wrt] if isinstance(wrt, str) else wrt))  # names of a file know their places
+        key = call_key(wrt, tuple(map(str, firsts)), dict(arguments))
         ready = self._prepared.find(key)
         if ready is None:
             ready = self._ready(wrt, arguments, tuple(firsts))
@@ -69,10 +70,10 @@ class Differentiator:
             del kept["method"]
         return self.sensitivity(wrt, kept)
 
-    def _ready(self, wrt: str | Sequence[str], arguments: Mapping[str, Any], firsts: tuple[str, ...]) -> _Ready:
+    def _ready(self, wrt: Sequence[str], arguments: Mapping[str, Any], firsts: tuple[str, ...]) -> _Ready:
         from hsdsl.sensitivity.overrides import overridden
 
-        call = _located(self.pipeline, arguments)
+        call = located_arguments(self.pipeline, arguments)
         plain = self.pipeline.prepare(call)
         parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
         values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
@@ -82,7 +83,7 @@ class Differentiator:
         change = overridden(self.pipeline.system, parameters, initial, experiment)
         span, samples = moving_times(change, by, values)
         setting = Setting(plain, plain, self.pipeline.program.outputs, span, samples)
-        return self._prepare(_Ready(by, change, call, setting, firsts, entries=False))
+        return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
 
     def _with_entries(self, ready: _Ready) -> _Ready:
         return self._prepare(replace(ready, entries=True))
@@ -101,7 +102,7 @@ class Differentiator:
         method = settings.method.name
         if method == AUTO and settings.method_chosen is not None and arithmetic.digits is None:
             method = FINE
-        if method in (SERIES, FINE):
+        if method in (SERIES, FINE) and not ready.exact:
             tolerance = max(min(tolerance, FINEST), 4 * arithmetic.unit)
         numbers: dict[str, Number] = {
             UNIT: arithmetic.unit,
@@ -127,17 +128,18 @@ class Differentiator:
 
 @dataclass(frozen=True)
 class _Ready:
-    """A sensitivity as far as the arguments of its call decide it."""
+    """A sensitivity as far as the arguments of its call decide it; ``exact`` says that they give the tolerance."""
 
     by: tuple[Target, ...]
     change: Overridden
     call: dict[str, Any]
     setting: Setting
     firsts: tuple[str, ...]
-    entries: bool
+    exact: bool
+    entries: bool = False
 
 
-def _located(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments of a located run with a tolerance: what a file or `--set` says of steps is for other runs."""
     call = {name: value for name, value in arguments.items() if value is not None} | {"scheme": "located"}
     given: Mapping[str, Any] = arguments.get("settings") or {}

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hsdsl.model.differentiate import Differentiator
     from hsdsl.model.estimate import Estimate
     from hsdsl.model.stream import Streamed
+    from hsdsl.orbits.orbit import Orbit
     from hsdsl.sensitivity.result import Sensitivity
     from hsdsl.system import HybridSystem
 
@@ -207,6 +208,28 @@ class Model:
         Raises UsageError: an unknown name, or an argument that cannot be served.
         """
         return self._differentiator.sensitivity(wrt, arguments)
+
+    def orbit(self, section: str, *, laps: int = 1, period: Any = None, **arguments: Any) -> Orbit:
+        """Find a periodic orbit by shooting on a section, with its Floquet multipliers.
+
+        The first guess is where the model's own run changes least from one passage of the section to the next.
+
+        Parameters
+        ----------
+        section : str
+            The name of a transition.
+        laps : int
+            How many transitions of the section close the orbit.
+        period : number or str, optional
+            The period of the forcing; left out, that of the sines and cosines of time in the model.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+
+        Raises UsageError: no such transition, an unknown argument, or no orbit near the run.
+        """
+        from hsdsl.model.orbits import Orbits
+
+        return Orbits(self, section, laps, period, arguments).find()
 
     def stream(
         self,

@@ -26,8 +26,8 @@ def targets(wrt: str | Sequence[str], program: Program, states: Sequence[str]) -
 
     Raises UsageError: a name that is neither, or none at all.
     """
-    given = wrt.split(",") if isinstance(wrt, str) else wrt
-    labels = list(dict.fromkeys(str(name).strip() for name in given if str(name).strip()))
+    given = [name.strip() for text in ([wrt] if isinstance(wrt, str) else wrt) for name in text.split(",")]
+    labels = list(dict.fromkeys(name for name in given if name))
     if not labels:
         raise UsageError("expected names to differentiate by, got none", "for example c or initial.v")
     return tuple(_target(label, program, states) for label in labels)

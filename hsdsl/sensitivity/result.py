@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -111,6 +111,11 @@ class Sensitivity:
         """The derivatives of the executions on either side of a tie, by the edge that goes first in all of them."""
         firsts = dict.fromkeys(order.first for tie in self._parting for order in tie.orders)
         return {first: self.one_sided((*self.first, first)) for first in firsts}
+
+    def as_made(self) -> Sensitivity:
+        """The derivatives of the executions on which tied transitions go in the order of this run."""
+        made = self.execution.transitions
+        return replace(self, first=(*self.first, *(made[tie.index].edge for tie in self._parting)))
 
     @cached_property
     def _parting(self) -> tuple[Tie, ...]:

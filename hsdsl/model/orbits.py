@@ -1,0 +1,219 @@
+"""Periodic orbits of a model: sections, guesses from a run, and what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.model.options import check_arguments, overrides_of
+from hsdsl.model.pipeline import Pipeline
+from hsdsl.model.settings import whole
+from hsdsl.model.values import with_parameters
+from hsdsl.names import did_you_mean
+from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
+from hsdsl.orbits.section import NoReturn, Section
+from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
+from hsdsl.sensitivity.result import Sensitivity
+
+if TYPE_CHECKING:
+    from hsdsl.execution import Array
+    from hsdsl.model.model import Model
+
+REFUSED = ("step", "scheme", "samples", "precision")
+MOST_GUESSES = 6
+SHRUNK = 1e-6  # a period below this share of the guess is none
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A state after a transition of the section, at a time, and how long it took to come back."""
+
+    point: Array
+    phase: float
+    time: float
+
+
+class Orbits:
+    """The orbits of a model through one section, with the arguments of its runs."""
+
+    def __init__(self, model: Model, section: str, laps: int, period: Any, arguments: Mapping[str, Any]) -> None:
+        from hsdsl.orbits.forcing import PHASE, forced, shifted
+
+        check_arguments(arguments, "an orbit", REFUSED)
+        self.model, self.laps, self.arguments = model, whole(laps, "laps", 1), dict(arguments)
+        self.edge = _edge(model, section)
+        self.forced = forced(model.system)
+        if period is not None and not self.forced:
+            raise UsageError("the model does not depend on time, so its forcing has no period")
+        self._period = period
+        self._phase = PHASE if self.forced else None
+        self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
+        self._parameters = overrides_of(arguments, "parameters")
+
+    def forcing(self, parameters: Mapping[str, Any]) -> float | None:
+        """The period of the forcing with these parameters."""
+        if not self.forced:
+            return None
+        values = with_parameters(self.model.pipeline.values(FLOAT64), parameters)
+        if self._period is not None:
+            found = float(values.number(self._period, "period"))
+        else:
+            from hsdsl.orbits.forcing import forcing_period
+
+            found = abs(float(values.evaluate({"period": forcing_period(self.model.system)})["period"]))
+        if not found > 0:
+            raise UsageError(f"the period of the forcing must be positive, not {found:g}")
+        return found
+
+    def section(self, parameters: Mapping[str, Any], tolerance: float | None = None) -> Section:
+        """The section and its map with these parameters."""
+        mode, states = self._entered()
+        arguments = {k: v for k, v in self.arguments.items() if k not in ("until", "initial", "parameters")}
+        if tolerance is not None:
+            arguments["tolerance"] = tolerance
+
+        def run(start: Mapping[str, float], phase: float, until: float, wrt: Sequence[str]) -> Sensitivity:
+            given = dict(parameters) | ({self._phase: phase} if self._phase else {})
+            initial = {"mode": mode, **start}
+            return self._moving.sensitivity(wrt, until=until, initial=initial, parameters=given, **arguments)
+
+        return Section(self.edge, mode, states, self.laps, self._phase, run)
+
+    def _entered(self) -> tuple[str, tuple[str, ...]]:
+        """The mode and the states that a lap begins with; after a final mode without a flow, those of the start."""
+        program = self.model.program
+        edge = next(e for m in program.modes for e in m.edges if e.name == self.edge)
+        target = program.modes[edge.target]
+        if not target.final:
+            return target.name, target.states
+        start = program.modes[program.initial_mode]
+        if set(start.states) - set(edge.target_states):
+            raise UsageError(
+                f"{self.edge} leads to the final mode {target.name}, whose states are not those of the start",
+                "choose a section whose transition the execution goes on from",
+            )
+        return start.name, start.states
+
+    def guesses(self, run: Execution) -> list[Guess]:
+        """States after the section's transitions in a run, those first that a lap changes least."""
+        mode, states = self._entered()
+        passed = [made for made in run.transitions if made.edge == self.edge and made.after is not None]
+        points = [np.array([made.after[x] for x in states], float) for made in passed if made.after]
+        times = [float(made.time) for made in passed]
+        size = np.max(np.abs(points), axis=0) if points else np.zeros(0)
+        size = np.where(size > 0, size, 1.0)
+        found: list[tuple[float, Guess]] = []
+        for k in range(len(points) - self.laps):
+            change = float(np.max(np.abs(points[k + self.laps] - points[k]) / size))
+            found.append((change, Guess(points[k], times[k], times[k + self.laps] - times[k])))
+        first = run.arcs[0]
+        if points and first.mode == mode:  # the run may begin on the orbit
+            found.append((np.inf, Guess(np.array(run.values[0][: len(states)], float), 0.0, times[0])))
+        if len(points) == 1:
+            found.append((np.inf, Guess(points[0], times[0], times[0])))
+        return [guess for _, guess in sorted(found, key=lambda each: each[0])][:MOST_GUESSES]
+
+    def find(self) -> Orbit:
+        """Find the orbit that the model's own run comes closest to.
+
+        Raises UsageError: the run does not pass the section, or no orbit is found.
+        """
+        run = self.model.simulate(scheme="located", **self._run_arguments())
+        guesses = self.guesses(run)
+        if not guesses:
+            raise UsageError(
+                f"the run does not make the transition {self.edge} up to t = {run.times[-1]:g} ({run.stop.reason})",
+                "choose another section, a later end, or other initial values",
+            )
+        problem = ""
+        for guess in guesses:
+            try:
+                return self.shoot(guess, self._parameters)
+            except NotClosed as error:
+                problem = problem or str(error)
+        raise UsageError(
+            f"no periodic orbit was found near the run: {problem}",
+            "begin closer to it with --set initial.NAME=VALUE, or try more laps",
+        )
+
+    def _run_arguments(self) -> dict[str, Any]:
+        from hsdsl.model.differentiate import located_arguments
+
+        return {k: v for k, v in located_arguments(self.model.pipeline, self.arguments).items() if k != "scheme"}
+
+    def shoot(self, guess: Guess, parameters: Mapping[str, Any]) -> Orbit:
+        """Find the orbit near a guess.
+
+        Raises NotClosed: there is none.
+        """
+        forcing = self.forcing(parameters)
+        multiple = None if forcing is None else forcing * max(1, round(guess.time / forcing))
+        phase = guess.phase if forcing is None else guess.phase % forcing
+        sections = self.section(parameters), self.section(parameters, COARSER)
+        found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple)
+        if found.passage.time < SHRUNK * guess.time:
+            raise NotClosed("passages become ever shorter, so the execution ends in a point")
+        return self.judge(found, parameters, forcing)
+
+    def judge(self, found: Closed, parameters: Mapping[str, Any], forcing: float | None) -> Orbit:
+        """Say what is known of an orbit."""
+        forced, passage = forcing is not None, found.passage
+        sensitivity = passage.sensitivity
+        multipliers = multipliers_of(found, passage.slopes, forced)
+        verdict, reason = judged(multipliers, self._error(found, parameters, multipliers, forced))
+        broken = sensitivity.reasons if sensitivity.exists is False else ()
+        verdict, reasons = "undecided" if broken else verdict, (reason, *broken)
+        states = self._entered()[1]
+        return Orbit(
+            self.edge,
+            self.laps,
+            self._entered()[0],
+            dict(zip(states, found.point.tolist(), strict=True)),
+            None if forcing is None else found.phase % forcing,
+            passage.time,
+            multipliers,
+            {states[k]: float(passage.point[k] - found.point[k]) for k in found.drifting},
+            found.residual,
+            verdict,
+            reasons,
+            self._sides(found, forced),
+            dict(parameters),
+            found,
+        )
+
+    def _error(self, found: Closed, parameters: Mapping[str, Any], multipliers: Array, forced: bool) -> float:
+        """How far the largest multiplier moves with a coarser tolerance."""
+        try:
+            again = self.section(parameters, COARSER).follow(found.point, found.phase, 1.5 * found.passage.time)
+        except NoReturn:
+            return float("inf")
+        other = multipliers_of(found, again.slopes, forced)
+        return abs(float(np.abs(other[0])) - float(np.abs(multipliers[0]))) if len(multipliers) else 0.0
+
+    def _sides(self, found: Closed, forced: bool) -> dict[str, Array]:
+        """The multipliers for each order of simultaneous transitions, where they differ."""
+        sides: dict[str, Array] = {}
+        passage, index = found.passage, found.passage.execution.transitions
+        for edge, side in (passage.sensitivity.sides if passage.sensitivity.breaks else {}).items():
+            passed = [made.index for made in side.execution.transitions if made.edge == self.edge]
+            if len(passed) >= self.laps and len(index) >= 1:
+                slopes = self.section({}).slopes(side, passed[self.laps - 1], side.wrt, None)
+                if not np.isnan(slopes).any():
+                    sides[edge] = multipliers_of(found, slopes, forced)
+        return sides
+
+
+def _edge(model: Model, section: str) -> str:
+    names = [edge.name for mode in model.program.modes for edge in mode.edges]
+    if section not in names:
+        hint = did_you_mean(section, names)
+        if section in model.columns:
+            hint = "a section is a transition, by its name; " + (hint or "")
+        raise UsageError(f"the model has no transition '{section}'", hint)
+    return section

@@ -1,0 +1,109 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false
+"""Time in a system: whether it depends on it, with which period, and the same system begun at another phase."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import reduce
+
+import sympy as sp
+
+from hsdsl.errors import UsageError
+from hsdsl.expression.scope import symbol
+from hsdsl.lower.straight import replaced
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, Surface
+
+PHASE = "phase of the start"  # a parameter of a system that can begin at any phase
+PERIODIC = {sp.sin: 2, sp.cos: 2, sp.tan: 1}  # periods in multiples of pi
+HINT = "give the period of the forcing as an expression: --period 2*pi/omega"
+
+
+def forced(system: HybridSystem) -> bool:
+    """Whether anything but outputs depends on time."""
+    if system.inputs:
+        names = ", ".join(i.name for i in system.inputs)
+        raise UsageError(
+            f"the sampled input {names} does not repeat, so no execution does", "write it as an expression"
+        )
+    return any(TIME in e.free_symbols for e in _expressions(system))
+
+
+def forcing_period(system: HybridSystem) -> sp.Expr:
+    """The period of the forcing as an expression of parameters: that of every sine, cosine and tangent of time.
+
+    Raises UsageError: time is elsewhere, or the periods have no common multiple that can be seen.
+    """
+    constants = set(system.parameter_symbols)
+    periods = [period for expression in _expressions(system) for period in _periods(expression, constants)]
+    return reduce(_common, dict.fromkeys(periods))
+
+
+def _periods(expression: sp.Basic, constants: set[sp.Symbol]) -> Iterator[sp.Expr]:
+    if TIME not in expression.free_symbols:
+        return
+    if type(expression) in PERIODIC:
+        frequency = sp.diff(expression.args[0], TIME)
+        if frequency == 0 or not frequency.free_symbols <= constants:
+            raise UsageError(f"{expression} does not have a constant period", HINT)
+        yield PERIODIC[type(expression)] * sp.pi / frequency
+    elif not expression.args:
+        raise UsageError("the model depends on time outside of sines, cosines and tangents", HINT)
+    else:
+        for part in expression.args:
+            yield from _periods(part, constants)
+
+
+def _common(one: sp.Expr, other: sp.Expr) -> sp.Expr:
+    """The shortest multiple of two periods."""
+    ratio = sp.simplify(one / other)
+    if not ratio.is_Rational:
+        raise UsageError(f"the forcing has the periods {one} and {other}, without a common multiple", HINT)
+    return one * ratio.q
+
+
+def shifted(system: HybridSystem) -> HybridSystem:
+    """The system with its time begun at the phase that the parameter :data:`PHASE` is."""
+    at = {TIME: TIME + symbol(PHASE)}
+    done: dict[sp.Basic, sp.Basic] = {}
+
+    def move(expression):
+        return None if expression is None else replaced(sp.sympify(expression), at, done)
+
+    return replace(
+        system,
+        parameters=(*system.parameters, Parameter(PHASE, sp.S.Zero, "0")),
+        modes=tuple(_moved(mode, move) for mode in system.modes),
+        reference=(),
+        scene=(),
+    )
+
+
+def _moved(mode: Mode, move: Callable) -> Mode:
+    return replace(
+        mode,
+        flow=tuple(map(move, mode.flow)),
+        walls=tuple(_surface(wall, move) for wall in mode.walls),
+        edges=tuple(_edge(edge, move) for edge in mode.edges),
+        outputs=tuple(map(move, mode.outputs)),
+        scene=(),
+    )
+
+
+def _surface(surface: Surface, move: Callable) -> Surface:
+    return replace(surface, **{part: move(getattr(surface, part)) for part in ("left", "right", "residual")})
+
+
+def _edge(edge: Edge, move: Callable) -> Edge:
+    reset = tuple(map(move, edge.reset))
+    return replace(edge, surface=_surface(edge.surface, move), condition=move(edge.condition), reset=reset)
+
+
+def _expressions(system: HybridSystem) -> Iterator[sp.Basic]:
+    for mode in system.modes:
+        yield from map(sp.sympify, mode.flow)
+        yield from (sp.sympify(surface.residual) for surface in mode.surfaces)
+        for edge in mode.edges:
+            yield from map(sp.sympify, edge.reset)
+            if edge.condition is not None:
+                yield edge.condition

@@ -1,0 +1,93 @@
+"""The return map of a section: from the state right after a transition to that after a later one of the same edge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution
+from hsdsl.sensitivity.result import Sensitivity
+
+Differentiate = Callable[[Mapping[str, float], float, float, Sequence[str]], Sensitivity]
+LONGER = 4  # a run that does not return is made so many times longer, as often as this
+MOST_LONGER = 5
+
+
+class NoReturn(Exception):
+    """A run from the section does not come back to it; the message says what it does."""
+
+
+@dataclass(frozen=True)
+class Return:
+    """One passage of the map.
+
+    With n states, ``point`` (n,) is where it leads and ``slopes`` (n + 1, n + 2) its derivatives: rows are the states
+    and the time it takes, columns the states, the phase of the start, and the parameter that is followed (else 0).
+    """
+
+    point: Array
+    time: float
+    slopes: Array
+    sensitivity: Sensitivity
+
+    @property
+    def execution(self) -> Execution:
+        """The run."""
+        return self.sensitivity.execution
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section and its map; ``run`` makes a run from a state, a phase, until a time, by names of derivatives.
+
+    ``edge`` is its transition, ``mode`` and ``states`` those it leads to, ``laps`` how many transitions of it close an
+    orbit. ``phase`` is the name of the parameter of the phase, None where the system does not depend on time.
+    """
+
+    edge: str
+    mode: str
+    states: tuple[str, ...]
+    laps: int
+    phase: str | None
+    run: Differentiate
+
+    def follow(self, point: Array, phase: float, horizon: float, parameter: str | None = None) -> Return:
+        """Make the map at a point.
+
+        Raises NoReturn: the run does not come back.
+        """
+        names = [f"initial.{x}" for x in self.states]
+        wrt = [*names, *([self.phase] if self.phase else []), *([parameter] if parameter else [])]
+        start = dict(zip(self.states, point.tolist(), strict=True))
+        found = self.run(start, phase, horizon, wrt)
+        for _ in range(MOST_LONGER):
+            passed = [made.index for made in found.execution.transitions if made.edge == self.edge]
+            if len(passed) >= self.laps:
+                return self._return(found, passed[self.laps - 1], wrt, parameter)
+            if found.execution.stop.reason != "until":
+                break
+            horizon *= LONGER
+            found = self.run(start, phase, horizon, wrt)
+        stop = found.execution.stop
+        raise NoReturn(f"a run from there does not come back to {self.edge}: it stops ({stop.reason}): {stop.message}")
+
+    def _return(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Return:
+        made = found.execution.transitions[index]
+        assert made.after is not None
+        point = np.array([made.after[x] for x in self.states], float)
+        slopes = self.slopes(found.as_made(), index, wrt, parameter)
+        if not np.isfinite(slopes).all():
+            raise NoReturn(f"no derivative exists there: {found.breaks[0][1] if found.breaks else 'it is not finite'}")
+        return Return(point, float(made.time), slopes, found)
+
+    def slopes(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Array:
+        """The derivatives of a passage that ends with a transition."""
+        moves, n = found.transitions[index], len(self.states)
+        slopes = np.zeros((n + 1, n + 2))
+        columns = [*range(n), *([n] if self.phase else []), *([n + 1] if parameter else [])]
+        for column, by in zip(columns, wrt, strict=True):
+            slopes[:n, column] = [moves.after[x][by] for x in self.states]
+            slopes[n, column] = moves.time[by]
+        return slopes

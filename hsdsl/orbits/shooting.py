@@ -1,0 +1,147 @@
+"""Newton's method for fixed points of a return map: periodic orbits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsdsl.execution import Array
+from hsdsl.orbits.section import NoReturn, Return, Section
+
+MOST_STEPS, MOST_HALVINGS = 40, 12
+SMALLEST = 1e-10  # singular values below this share of the largest one are directions in which orbits form families
+CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off of a run
+SYMMETRY = 1e-9  # a column of the identity to this
+COARSER = 1e-10  # a tolerance for runs that show how good others are
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A fixed point: where, at which phase, the last passage, and how far from closing it is relative to the sizes.
+
+    ``drifting`` has the indices of states that nothing depends on: they may end elsewhere than they began. ``sizes``
+    are the scales of the states.
+    """
+
+    point: Array
+    phase: float
+    passage: Return
+    residual: float
+    drifting: tuple[int, ...]
+    sizes: Array
+
+
+class NotClosed(Exception):
+    """Newton's method did not come to a fixed point; the message says where it ended."""
+
+
+def closed(
+    section: Section, coarse: Section, point: Array, phase: float, horizon: float, multiple: float | None
+) -> Closed:
+    """Solve for a fixed point from a guess.
+
+    Parameters
+    ----------
+    coarse : Section
+        The same section with runs at the tolerance :data:`COARSER`.
+    horizon : float
+        The end of the first run; it is made longer where that is not enough.
+    multiple : float or None
+        The time that an orbit of a forced system takes.
+
+    Raises NotClosed: it did not converge.
+    """
+    try:
+        passage = section.follow(point, phase, horizon)
+        sizes = _sizes(passage, point, coarse.follow(point, phase, horizon))
+    except NoReturn as error:
+        raise NotClosed(str(error)) from None
+    best: Closed | None = None
+    for _ in range(MOST_STEPS):
+        here = _looked_at(point, phase, passage, sizes, multiple)
+        if best is not None and here.residual >= best.residual and best.residual < CLOSED:
+            return best
+        best = here if best is None or here.residual < best.residual else best
+        if here.residual == 0:
+            return here
+        point, phase, passage = _damped(section, here, newton_step(here, multiple), multiple)
+    if best is not None and best.residual < CLOSED:
+        return best
+    left = f", by {best.residual:.2g}" if best else ""
+    raise NotClosed(f"after {MOST_STEPS} steps of Newton's method the orbit does not close{left}")
+
+
+def _looked_at(point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None) -> Closed:
+    free = drifting(passage)
+    missing = np.abs(gap(passage, point, multiple)) / np.append(sizes, multiple or 1.0)
+    missing[list(free)] = 0
+    return Closed(point, phase, passage, float(np.max(missing)), free, sizes)
+
+
+def _sizes(passage: Return, point: Array, coarse: Return) -> Array:
+    """The scales of the states of a section: their largest sizes on a passage, or what its error is relative to.
+
+    A state that is zero but for round-off, as the pitch of a symmetric body, has no size of its own.
+    """
+    run = passage.execution
+    names = [by.removeprefix("initial.") for by in passage.sensitivity.wrt[: len(point)]]
+    found = np.maximum.reduce([np.abs(point), np.abs(passage.point), np.abs(passage.point - coarse.point) / COARSER])
+    for arc in run.arcs:
+        for k, name in enumerate(names):
+            if name in arc.states:
+                column = run.values[arc.first : arc.last + 1, arc.states.index(name)]
+                found[k] = max(found[k], float(np.max(np.abs(column.astype(float)))))
+    return np.where(found > 0, found, 1.0)
+
+
+def gap(passage: Return, point: Array, multiple: float | None) -> Array:
+    """What an orbit lacks: states, and for a forced system the time."""
+    late = 0.0 if multiple is None else passage.time - multiple
+    return np.append(passage.point - point, late)
+
+
+def drifting(passage: Return) -> tuple[int, ...]:
+    """The states that shift the return by as much and change nothing else, and that do not return."""
+    n = len(passage.point)
+    found: list[int] = []
+    for k in range(n):
+        column = passage.slopes[:, k].copy()
+        column[k] -= 1
+        if np.max(np.abs(column)) < SYMMETRY:
+            found.append(k)
+    return tuple(found)
+
+
+def newton_step(here: Closed, multiple: float | None) -> Array:
+    """The step of states and phase towards a fixed point: of least length where orbits form a family."""
+    n = len(here.point)
+    kept = [k for k in range(n + (multiple is not None)) if k not in here.drifting]
+    matrix = here.passage.slopes[:, : n + 1] - np.eye(n + 1)
+    if multiple is not None:
+        matrix[n, n] += 1  # the time itself must be the multiple, not as much as the phase
+    scale = np.append(here.sizes, multiple or 1.0)
+    scaled = matrix[np.ix_(kept, kept)] * scale[kept] / scale[kept][:, None]
+    missing = gap(here.passage, here.point, multiple)[kept] / scale[kept]
+    step = np.zeros(n + 1)
+    step[kept] = -np.linalg.lstsq(scaled, missing, rcond=SMALLEST)[0] * scale[kept]
+    return step
+
+
+def _damped(section: Section, here: Closed, step: Array, multiple: float | None) -> tuple[Array, float, Return]:
+    """Take a step, halved until the run comes back and the gap does not grow much."""
+    problem = "the gap grows"
+    for halvings in range(MOST_HALVINGS):
+        share = 0.5**halvings
+        point, phase = here.point + share * step[:-1], here.phase + share * float(step[-1])
+        try:
+            passage = section.follow(point, phase, 1.5 * here.passage.time)
+        except NoReturn as error:
+            problem = str(error)
+            continue
+        if (
+            _looked_at(point, phase, passage, here.sizes, multiple).residual < 2 * here.residual
+            or here.residual < CLOSED
+        ):
+            return point, phase, passage
+    raise NotClosed(f"Newton's method is stuck where the orbit does not close, by {here.residual:.2g}: {problem}")

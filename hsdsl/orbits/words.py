@@ -1,0 +1,62 @@
+"""A periodic orbit in words, and as the object of `orbit --json`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from hsdsl.execution import Array
+from hsdsl.orbits.orbit import Orbit
+from hsdsl.report.json_form import plain
+from hsdsl.report.words import number, values
+
+
+def as_json(orbit: Orbit) -> dict[str, Any]:
+    """The object of `orbit --json`; a complex number is its real and its imaginary part."""
+    result = {
+        name: getattr(orbit, name)
+        for name in ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
+    }
+    result["multipliers"] = _pairs(orbit.multipliers)
+    if orbit.sides:
+        result["sides"] = {edge: _pairs(found) for edge, found in orbit.sides.items()}
+    return plain(result)
+
+
+def _pairs(found: Array) -> list[dict[str, float]]:
+    return [{"real": float(m.real), "imaginary": float(m.imag), "size": float(np.abs(m))} for m in found]
+
+
+def summary(orbit: Orbit) -> str:
+    """The orbit as lines of text."""
+    return "\n".join(f"{label:12}{text}" for label, text in _facts(orbit))
+
+
+def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
+    run = orbit.execution
+    closing = "" if orbit.laps == 1 else f", closed by {orbit.laps} of them"
+    yield "orbit", f"{run.title or run.model}: right after {orbit.section}{closing}"
+    yield "period", number(orbit.period, 12)
+    if orbit.phase is not None:
+        yield "phase", f"t = {number(orbit.phase, 12)} within the period of the forcing"
+    yield "state", f"mode {orbit.mode}, {values(orbit.state)}"
+    if orbit.drift:
+        yield "drift", f"{values(orbit.drift)} in a period; nothing depends on it"
+    yield "multipliers", shown(orbit.multipliers)
+    for edge, found in orbit.sides.items():
+        yield "", f"{shown(found)} where {edge} goes first"
+    yield "verdict", f"{orbit.verdict}: {'; '.join(orbit.reasons)}"
+
+
+def shown(found: Array) -> str:
+    """Multipliers, a pair of conjugate ones as one."""
+    parts: list[str] = []
+    for m in found:
+        if m.imag == 0:
+            parts.append(number(float(m.real), 12))
+        elif m.imag > 0:
+            size = number(float(np.abs(m)), 12)
+            parts.append(f"{number(float(m.real), 12)} +- {number(float(m.imag), 12)}i (size {size})")
+    return ", ".join(parts) or "none"

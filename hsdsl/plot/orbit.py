@@ -1,0 +1,75 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""A periodic orbit in the plane of two states, and its multipliers beside the unit circle."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution
+from hsdsl.plot.style import FAINT, PALETTE, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+POINTS = 2000
+
+
+def plot_orbit(
+    path: str | os.PathLike[str], run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str
+) -> None:
+    """Draw a run over one period; jumps are dotted."""
+
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(10, 4.6), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_run(left, run, states, period)
+        draw_circle(right, multipliers)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
+        return figure
+
+    save(draw, path)
+
+
+def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) -> None:
+    """Draw the first two states against each other, or one over time."""
+    before: tuple[float, float] | None = None
+    for arc in run.arcs:
+        start, end = float(run.times[arc.first]), min(float(run.times[arc.last]), period)
+        if end < start or not set(states[:2]) <= set(arc.states):
+            before = None
+            continue
+        times = np.linspace(start, end, max(2, int(POINTS * (end - start) / period)))
+        table = run.sample(times[1:-1])
+        columns: list[Array] = []
+        for name in states[:2]:
+            k = arc.states.index(name)
+            last = run.values[arc.last, k] if end == float(run.times[arc.last]) else run.sample([end], "left")[name][0]
+            columns.append(np.concatenate(([run.values[arc.first, k]], table[name], [last])).astype(float))
+        x, y = columns if len(columns) == 2 else (times, columns[0])
+        axis.plot(x, y, color=PALETTE[0])
+        if before is not None:
+            axis.plot([before[0], x[0]], [before[1], y[0]], ":", color=PALETTE[1])
+        before = float(x[-1]), float(y[-1])
+        if end >= period:
+            break
+    axis.set_xlabel(states[0] if len(states) > 1 else "time t", parse_math=False)
+    axis.set_ylabel(states[1] if len(states) > 1 else states[0], parse_math=False)
+
+
+def draw_circle(axis: Axes, multipliers: Array) -> None:
+    """Draw the unit circle and multipliers."""
+    angles = np.linspace(0, 2 * np.pi, 200)
+    axis.plot(np.cos(angles), np.sin(angles), color=FAINT)
+    for inside, colour in ((True, PALETTE[0]), (False, PALETTE[1])):
+        chosen = [complex(m) for m in multipliers.tolist() if (abs(m) < 1) is inside]
+        axis.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
+    axis.set_aspect("equal", "datalim")
+    axis.set_title("Floquet multipliers", fontsize=9)

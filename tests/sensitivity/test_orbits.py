@@ -1,0 +1,183 @@
+"""Periodic orbits and their multipliers, against independent computations."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import hsdsl
+from hsdsl import UsageError
+from hsdsl.cli.verbs import obey
+
+OSCILLATOR = "models/oscillator-with-stop-1.yaml"
+
+
+def close(found: Any, expected: Any, tolerance: float = 1e-9) -> bool:
+    """Whether multipliers agree in any order."""
+    left = list(expected)
+    for m in found:
+        nearest = min(left, key=lambda e: abs(e - m), default=np.inf)
+        if abs(nearest - m) > tolerance:
+            return False
+        left.remove(nearest)
+    return not left
+
+
+def test_oscillator() -> None:
+    """Against the root of a quadratic and exp(A T) S."""
+    orbit = hsdsl.load(OSCILLATOR).orbit("impact")
+    assert orbit.verdict == "stable"
+    assert np.isclose(orbit.period, 2 * np.pi / 2.5, rtol=1e-12)
+    assert np.isclose(orbit.state["v"], -11.68623385549078, rtol=1e-11)
+    assert np.isclose(orbit.phase, 0.06638216533121, rtol=1e-10)
+    flow = expm(np.array([[0, 1], [-6.25, -0.1]]) * orbit.period)
+    jump = np.array([[-0.9, 0], [-9.917213367781442, -0.9]])
+    assert close(orbit.multipliers, np.linalg.eigvals(flow @ jump))
+
+
+def test_oscillator_with_a_period_that_is_given() -> None:
+    model = hsdsl.load(OSCILLATOR)
+    double = model.orbit("impact", laps=2, period="4*pi/2.5")
+    single = model.orbit("impact", period="2*pi/2.5")
+    assert np.isclose(double.period, 2 * single.period, rtol=1e-12)
+    assert close(double.multipliers, single.multipliers**2)
+
+
+WALKER = (0.7344606213364, [-0.202216100148 + 0.543414971353j, -0.202216100148 - 0.543414971353j, 0.131386707191])
+
+
+def test_compass_walker() -> None:
+    """Against a run of forty digits with differences, and a second integrator."""
+    orbit = hsdsl.load("models/compass-walker.yaml").orbit("heel_strike")
+    assert orbit.verdict == "stable"
+    assert np.isclose(orbit.period, WALKER[0], rtol=1e-12)
+    assert np.allclose(
+        [orbit.state[x] for x in ("ns", "st", "wns", "wst")],
+        [-0.3237746179803, 0.2187746179803, -0.3761345935308, -1.0928668105801],
+        rtol=1e-11,
+    )
+    assert close(orbit.multipliers, WALKER[1])
+
+
+BODY = """
+hsdsl: 1
+title: A body on two legs that hop together
+parameters: {k: 200, l: 1, d: 0.5, I: 0.1, g: 9.81}
+let: {left: z - d*sin(th), right: z + d*sin(th)}
+modes:
+  air:
+    flow: {x: u, z: v, th: w, u: 0, v: -g, w: 0}
+    transitions:
+      - {when: left <= l, to: on_left, name: left_down}
+      - {when: right <= l, to: on_right, name: right_down}
+  on_left:
+    flow: {x: u, z: v, th: w, u: 0, v: "k*(l - left) - g", w: "-k*(l - left)*d*cos(th)/I"}
+    transitions: [{when: right <= l, to: ground, name: then_right}]
+  on_right:
+    flow: {x: u, z: v, th: w, u: 0, v: "k*(l - right) - g", w: "k*(l - right)*d*cos(th)/I"}
+    transitions: [{when: left <= l, to: ground, name: then_left}]
+  ground:
+    flow:
+      x: u
+      z: v
+      th: w
+      u: 0
+      v: k*(2*l - left - right) - g
+      w: k*(left - right)*d*cos(th)/I
+    transitions:
+      - {when: left >= l, to: up_left, name: left_up}
+      - {when: right >= l, to: up_right, name: right_up}
+  up_left:
+    flow: {x: u, z: v, th: w, u: 0, v: "k*(l - right) - g", w: "k*(l - right)*d*cos(th)/I"}
+    transitions: [{when: right >= l, to: ascent, name: both_up}]
+  up_right:
+    flow: {x: u, z: v, th: w, u: 0, v: "k*(l - left) - g", w: "-k*(l - left)*d*cos(th)/I"}
+    transitions: [{when: left >= l, to: ascent, name: both_up_too}]
+  ascent:
+    flow: {x: u, z: v, th: w, u: 0, v: -g, w: 0}
+    transitions: [{when: v <= 0, to: air, name: apex}]
+initial: {mode: air, x: 0, z: 1.2, th: 0, u: 1, v: 0, w: 0}
+experiment: {until: 2}
+"""
+
+
+def test_pronk_of_a_hopping_body() -> None:
+    """Both feet meet the ground together; height and speed are kept, pitch turns by a matrix of its own."""
+    model = hsdsl.loads(BODY)
+    orbit = model.orbit("apex")
+    assert list(orbit.drift) == ["x"]
+    assert orbit.drift["x"] == pytest.approx(orbit.period)
+    fall = np.sqrt(2 * 0.2 / 9.81)
+    rate, speed = 20.0, 9.81 * fall  # sqrt(2 k / m), at touchdown
+    stance = (2 * np.pi - 2 * np.arctan2(speed * rate, 9.81)) / rate
+    assert np.isclose(orbit.period, 2 * fall + stance, rtol=1e-10)
+    turn = np.sqrt(2 * 200 * 0.25 / 0.1)
+    flight = np.array([[1, fall], [0, 1]])
+    ground = expm(np.array([[0, 1], [-turn * turn, 0]]) * stance)
+    pitch = np.linalg.eigvals(flight @ ground @ flight)
+    assert close(orbit.multipliers, [1, 1, *pitch], 1e-6)
+
+
+@pytest.mark.slow
+def test_pronking_runner() -> None:
+    """The multipliers of its stride, against differences of runs."""
+    model = hsdsl.load("models/pronking-runner.yaml")
+    orbit = model.orbit("ascent->apex")
+    assert orbit.verdict == "unstable"
+    states, matrix, step = ("z", "th", "vx", "vz", "w"), [], 1e-6
+    for moved in states:
+        ends = []
+        for way in (step, -step):
+            start = orbit.state | {moved: orbit.state[moved] + way}
+            ends.append(model.simulate(initial=start, tolerance=1e-14).final.state)
+        matrix.append([(ends[0][x] - ends[1][x]) / (2 * step) for x in states])
+    values = sorted(np.linalg.eigvals(np.array(matrix).T), key=abs)[1:]
+    assert close(orbit.multipliers, values, 1e-6)
+
+
+BALL = """
+hsdsl: 1
+parameters: {{A: 0.1, w: 5, e: 0.5}}
+modes:
+  fly:
+    flow: {{z: v, v: -1}}
+    transitions:
+      - {{name: hit, when: z <= {floor}, if: "v < 1", to: fly, reset: {{v: -e*v + 1}}}}
+initial: {{mode: fly, z: 1, v: 0}}
+experiment: {{until: 20}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("model", "arguments", "sentence"),
+    [
+        (OSCILLATOR, {"section": "impct"}, "no transition 'impct'"),
+        (OSCILLATOR, {"section": "x"}, "no transition 'x'"),
+        (OSCILLATOR, {"section": "impact", "laps": 0}, "laps"),
+        (OSCILLATOR, {"section": "impact", "until": 0.01}, "does not make the transition impact"),
+        (OSCILLATOR, {"section": "impact", "step": 1}, "no argument 'step'"),
+        ("models/compass-walker.yaml", {"section": "heel_strike", "period": 1}, "does not depend on time"),
+        ("models/bouncing-ball.yaml", {"section": "bounce"}, "no periodic orbit"),
+        (BALL.format(floor="A*sin(w*t) + A*sin(w**2*t)"), {"section": "hit"}, "without a common multiple"),
+        (BALL.format(floor="A*t"), {"section": "hit"}, "outside of sines"),
+    ],
+)
+def test_bad_input(model: str, arguments: dict[str, Any], sentence: str) -> None:
+    loaded = hsdsl.loads(model) if "\n" in model else hsdsl.load(model)
+    with pytest.raises(UsageError, match=sentence):
+        loaded.orbit(**arguments)
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "orbit.svg"
+    assert obey(["orbit", OSCILLATOR, "--section", "impact", "--plot", str(picture), "--json"]) == 0
+    assert picture.stat().st_size > 1000
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "stable"
+    assert found["multipliers"][0]["size"] == pytest.approx(0.7937202404684, rel=1e-9)
+    assert obey(["orbit", OSCILLATOR, "--section", "impct"]) == 2
