@@ -117,6 +117,7 @@ class Differentiator:
             "relaxation": settings.relaxation,
             "scale": dict(settings.scale),
             "max_transitions": settings.max_transitions,
+            "completion": "none",  # derivatives end where the run leaves the theorem
             "parameters": ready.change.parameters | numbers,
             "initial": ready.change.initial,
             "engine": ready.call.get("engine") or "auto",
