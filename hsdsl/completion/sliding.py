@@ -4,8 +4,9 @@
 
 Mode a has an edge to b where r >= 0, b one back where r <= 0, and neither changes a state. Where r grows along the flow
 of a and falls along that of b, a state can follow neither. It stays on the surface and follows s b + (1 - s) a with
-the share s for which r does not change. Off the surface s brings it back, in a time that its own size over its rates
-gives: round-off and errors of steps do not add up.
+the share s for which r does not change. A method keeps a surface that is affine. Off one that is curved s brings the
+state back, in the time that the size of r takes at its rates, and leaving takes it onto the surface: errors of steps do
+not add up.
 """
 
 from __future__ import annotations
@@ -77,11 +78,16 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
     states = [symbol(state) for state in a.states]
     r = out.surface.residual
     outwards, inwards = (cancelled(along(r, states, mode.flow)) for mode in (a, b))
-    share = outwards / (outwards - inwards) + _correction(r, states)
+    slopes = [sp.diff(r, x) for x in states]
+    curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
+    size = sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
+    share = outwards / (outwards - inwards) + (r / sp.sqrt(size) if curved else 0)
     flow = tuple(cancelled(f + share * (g - f)) for f, g in zip(a.flow, b.flow, strict=True))
     stay = {"target_states": a.states, "reset": tuple(states), "reset_texts": a.states, "condition": None}
-    leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **stay)
-    leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **stay)
+    onto = tuple(x - r * slope * x**2 / size if curved else x for slope, x in zip(slopes, states, strict=True))
+    leave = {**stay, "reset": onto, "reset_texts": tuple(map(str, onto))}
+    leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **leave)
+    leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **leave)
     mode = replace(
         a,
         name=name,
@@ -98,15 +104,6 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
     into_b = replace(back, name=f"{b.name}->{name}", priority=back.priority + 1, **enter)
     entries = (replace(into_a, condition=sp.Lt(inwards, 0)), replace(into_b, condition=sp.Gt(outwards, 0)))
     return Sliding(mode, entries)
-
-
-def _correction(r: sp.Expr, states: list[sp.Symbol]) -> sp.Expr:
-    """What brings a state back to a curved surface; a surface that is affine is kept by the methods themselves."""
-    slopes = [sp.diff(r, x) for x in states]
-    if not any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME))):
-        return sp.S.Zero
-    size = sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
-    return r / sp.sqrt(size)
 
 
 def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:

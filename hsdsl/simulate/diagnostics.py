@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
+from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 
 LEFT_OUT = "no requested output and no guard, condition or domain depends on them"
@@ -64,12 +65,18 @@ class Diagnostics:
             self.doubts.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
 
 
-def slides(edge: str, source: str, target: str, t: Number) -> Stop:
+def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> Stop:
     """Transitions without flow between them return to the same state: the run stops at t."""
-    how = (
-        f"{edge} leads back to the same state of mode {source} without end, since the flow presses on its guard"
-        if source == target
-        else f"transitions lead from mode {source} to mode {target} and back to the same state without end, since the "
-        "flow of each leads into the other"
-    )
+    if source.name == target.name:
+        back = f"{edge} leads back to the same state of mode {source.name}"
+        how = f"{back} without end, since the flow presses on its guard"
+    else:
+        how = (
+            f"transitions lead from mode {source.name} to mode {target.name} and back to the same state without end, "
+            "since the flow of each leads into the other; "
+        )
+        if source.slides or target.slides:
+            how += "on an intersection of surfaces no rule gives one flow"
+        else:
+            how += "completion: auto follows the motion on a surface that two modes press on"
     return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")

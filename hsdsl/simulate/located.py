@@ -219,7 +219,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     if isinstance(entered, Stop):
         return entered
     if run.returns(here, crossing, entered):
-        return slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return slides(edge.name, here.mode, entered.mode, entered.t)
     return close_tail(run, entered, crossing.edge)
 
 

@@ -32,7 +32,7 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
     if kind == "replaced":
         return diagnostics.replaced(mode.edges[k].name, count, time, other)
     if kind == "slides":
-        return slides(program.modes[count].edges[k].name, program.modes[count].name, mode.name, time)
+        return slides(program.modes[count].edges[k].name, program.modes[count], mode, time)
     return diagnostics.accumulates(mode.edges[k].name, time, other)
 
 

@@ -169,7 +169,7 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     run.record(here, crossing, resumed, after, event.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
     if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
-        return slides(edge.name, here.mode.name, entered.mode.name, entered.t)
+        return slides(edge.name, here.mode, entered.mode, entered.t)
     return entered
 
 

@@ -1,0 +1,206 @@
+"""Motion along guards and sliding against closed forms and independent computations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import hsdsl
+
+METHODS = ["taylor", "dopri5", "radau"]
+ENGINES = ["python", "c"]
+
+
+def ball(
+    flow: str, reset: str, further: str = "", guard: str = "h <= 0", states: str = "x: 0, h: 1, u: 1, v: 0"
+) -> str:
+    return f"""
+hsdsl: 1
+parameters: {{e: 1/2}}
+modes:
+  fly: {{flow: {{{flow}}}, transitions: [{{name: bounce, when: h <= 0, to: fly, reset: {{{reset}}}}}{further}]}}
+  off: {{flow: {{x: u, h: v, u: 0, v: -9.81}}}}
+initial: {{mode: fly, {states}}}
+experiment: {{until: 4}}
+"""
+
+
+TABLE = ball("x: u, h: v, u: 0, v: -9.81", "v: -e*v", ", {name: edge, when: x >= 1.5, to: off}",
+             states="x: 0, h: 1, u: 0.5, v: 0")  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+def test_ball_rolls_to_the_edge_of_a_table(method: str, engine: str) -> None:
+    run = hsdsl.loads(TABLE).simulate(method=method, engine=engine, tolerance=1e-11)
+    assert run.transitions[0].time == pytest.approx(0.451523640985731, abs=1e-10)
+    assert any("Zeno at t = 1.354570923" in reason for reason in run.verdict.reasons)
+    assert (run.transitions[-1].edge, run.transitions[-1].time) == ("edge", pytest.approx(3, abs=1e-9))
+    assert run.final.state["h"] == pytest.approx(-9.81 / 2, abs=1e-8)
+    assert run.verdict.theorem == "left"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_friction_takes_its_share_of_the_pressing_force(engine: str) -> None:
+    """Impulses mu (1 + e) |v| slow the ball before the Zeno point as mu g does behind it: u = 1 - mu g t throughout."""
+    text = ball("x: u, h: v, u: 0, v: -9.81", "v: -e*v, u: u + 0.1*(1 + e)*v", states="x: 0, h: 0, u: 1, v: 1")
+    run = hsdsl.loads(text).simulate(until=0.9, engine=engine, tolerance=1e-12)
+    contact = 2 / 9.81 * 2  # 1 + 1/2 + 1/4 + ... flights of 2 v/g
+    assert run.final.time > contact
+    expected = 1 - 0.1 * (9.81 * 0.9 - 1 + 0)
+    assert run.final.state["u"] == pytest.approx(expected, abs=1e-8)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+def test_mass_on_a_shaken_table_is_carried_and_thrown(method: str, engine: str) -> None:
+    """In contact until the table's acceleration is -g: A w^2 sin(w t) = g; then a flight from there."""
+    text = """
+hsdsl: 1
+parameters: {A: 0.2, w: 8, e: 0.3}
+modes:
+  a:
+    flow: {h: v, v: -9.81}
+    transitions: [{when: h <= A*sin(w*t), to: a, reset: {v: -e*v + (1 + e)*A*w*cos(w*t)}}]
+initial: {mode: a, h: 0, v: A*w}
+experiment: {until: 0.3}
+"""
+    run = hsdsl.loads(text).simulate(method=method, engine=engine, tolerance=1e-12)
+    free = math.asin(9.81 / (0.2 * 64)) / 8
+    assert run.times[run.arcs[1].first] == pytest.approx(free, abs=1e-10)
+    flown = 0.3 - free
+    height = 0.2 * math.sin(8 * free) + 1.6 * math.cos(8 * free) * flown - 9.81 * flown**2 / 2
+    assert run.final.state["h"] == pytest.approx(height, abs=1e-10)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_two_bodies_stay_together_until_they_are_pulled_apart(engine: str) -> None:
+    """Pressed together by a force that turns at t = 2: both move with the mean acceleration, then part."""
+    text = """
+hsdsl: 1
+parameters: {m: 2, e: 0.4}
+modes:
+  a:
+    flow: {x: v, y: w, v: 2 - t, w: 0}
+    transitions:
+      - {when: x >= y, to: a, reset: {v: (m*v + w - e*(v - w))/(1 + m), w: (m*v + w + m*e*(v - w))/(1 + m)}}
+initial: {mode: a, x: 0, y: 0, v: 0, w: 0}
+experiment: {until: 3}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine, tolerance=1e-12)
+    speed = 2 / 3 * (2 * 2 - 2)  # of both at t = 2
+    place = 2 / 3 * (4 - 8 / 6)
+    assert run.final.state["w"] == pytest.approx(speed, abs=1e-10)
+    assert run.final.state["y"] == pytest.approx(place + speed, abs=1e-10)
+    assert run.final.state["x"] == pytest.approx(place + speed - 1 / 6, abs=1e-10)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+def test_body_on_a_curved_guard_is_a_pendulum(method: str, engine: str) -> None:
+    """Energy and the distance from the centre stay as they are on a circle from inside."""
+    text = """
+hsdsl: 1
+parameters: {e: 1/2}
+modes:
+  a:
+    flow: {x: u, y: v, u: 0, v: -1}
+    transitions:
+      - when: x**2 + y**2 >= 1
+        to: a
+        reset: {u: u - (1 + e)*(x*u + y*v)*x/(x**2 + y**2), v: v - (1 + e)*(x*u + y*v)*y/(x**2 + y**2)}
+initial: {mode: a, x: sin(1), y: -cos(1), u: 0, v: 0}
+experiment: {until: 20}
+"""
+    run = hsdsl.loads(text).simulate(method=method, engine=engine, tolerance=1e-11)
+    x, y, u, v = (run.final.state[name] for name in "xyuv")
+    assert len(run.transitions) == 0
+    assert math.hypot(x, y) == pytest.approx(1, abs=1e-8)
+    assert (u * u + v * v) / 2 + y == pytest.approx(-math.cos(1), abs=1e-8)
+
+
+def sliding(modes: str, initial: str, until: float, **arguments: Any) -> Any:
+    text = (
+        f"hsdsl: 1\nmodes:\n{modes}\ninitial: {{mode: a, {initial}}}\nexperiment: {{until: {until}, completion: auto}}"
+    )
+    return hsdsl.loads(text).simulate(**arguments)
+
+
+FRICTION = """
+  a: {flow: {x: v, v: -x - 1}, transitions: [{when: v <= 0, to: b}]}
+  b: {flow: {x: v, v: -x + 1}, transitions: [{when: v >= 0, to: a}]}"""
+CIRCLE = """
+  a: {flow: {x: x - Q*y, y: y + Q*x}, transitions: [{when: x**2 + y**2 >= 1, to: b}]}
+  b: {flow: {x: -x**2 - 3*y, y: -x*y + 3*x}, transitions: [{when: x**2 + y**2 <= 1, to: a}]}"""
+RELAY = """
+  a: {flow: {x: -3*x + y - 1, y: -3*x + z + 1.2, z: -2*x - 1}, transitions: [{when: x <= 0, to: b}]}
+  b: {flow: {x: -3*x + y + 1, y: -3*x + z - 1.2, z: -2*x + 1}, transitions: [{when: x >= 0, to: a}]}"""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+def test_friction_oscillator_sticks(method: str, engine: str) -> None:
+    run = sliding(FRICTION, "x: 12, v: 6", 30, method=method, engine=engine, tolerance=1e-13)
+    assert run.transitions[-1].time == pytest.approx(22.423556350709, abs=1e-10)
+    assert run.final.state["x"] == pytest.approx(15 - math.sqrt(205), abs=1e-9)
+    assert run.final.mode == "sliding_a_b" and run.verdict.theorem == "left"
+    assert any("sliding between a and b from t = 22.42355635 to t = 30" in reason for reason in run.verdict.reasons)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+def test_sliding_on_a_circle_with_a_tangential_exit(method: str, engine: str) -> None:
+    modes, exit = CIRCLE.replace("Q", "1"), 1.053969730783829
+    run = sliding(modes, "x: 1/2, y: 0", exit + 0.5, method=method, engine=engine, tolerance=1e-12)
+    assert [t.time for t in run.transitions] == pytest.approx([math.log(2), exit], abs=1e-10)
+    assert (run.final.state["x"], run.final.state["y"]) == pytest.approx(
+        (-1.445130245113728, 0.102481186329294), abs=1e-10
+    )
+    start = "x: cos(-1.5)/2, y: sin(-1.5)/2"
+    run = sliding(CIRCLE.replace("Q", "2"), start, 1.5, method=method, engine=engine, tolerance=1e-12)
+    assert [t.time for t in run.transitions] == pytest.approx([math.log(2), 1.335949117872369], abs=1e-10)
+
+
+def test_long_sliding_on_a_curve_does_not_drift() -> None:
+    """Two flows press on the circle from both sides for ever, and turn along it."""
+    modes = """
+  a: {flow: {x: x - 3*y, y: y + 3*x}, transitions: [{when: x**2 + y**2 >= 1, to: b}]}
+  b: {flow: {x: -x - 2*y, y: -y + 2*x}, transitions: [{when: x**2 + y**2 <= 1, to: a}]}"""
+    run = sliding(modes, "x: 1/2, y: 0", 1000, tolerance=1e-6)
+    assert math.hypot(run.final.state["x"], run.final.state["y"]) == pytest.approx(1, abs=1e-6)
+
+
+def test_relay_slides_in_each_half_period() -> None:
+    run = sliding(RELAY, "x: 0.5, y: 0.3, z: 0.2", 9, tolerance=1e-12)
+    times = [0.41637324, 2.77740629, 5.25590496, 5.83345647, 8.80617843]
+    assert [t.time for t in run.transitions] == pytest.approx(times, abs=1e-8)
+
+
+def test_on_a_belt_the_border_case_does_not_stick_again() -> None:
+    """Friction 0.4 on a belt of speed 0.1 from (0, 0.1): sticks for 4, then touches the belt's speed once in 2 pi."""
+    modes = """
+  a: {flow: {x: v, v: -x + 0.4}, transitions: [{when: v >= 0.1, to: b}]}
+  b: {flow: {x: v, v: -x - 0.4}, transitions: [{when: v <= 0.1, to: a}]}"""
+    run = sliding(modes, "x: 0, v: 0.0", 4.5, tolerance=1e-12)
+    assert run.transitions[0].time == pytest.approx(math.asin(0.25), abs=1e-10)
+    assert run.transitions[1].time == pytest.approx(4.12566360134949554, abs=1e-9)
+
+
+def test_sliding_on_an_intersection_is_refused_with_its_reason() -> None:
+    """Four quadrants that all press on the origin: no rule gives one flow there."""
+    modes = "".join(
+        f"\n  {name}: {{flow: {{x: {-sx}, y: {-sy}}}, transitions: ["
+        f"{{when: x {'<=' if sx > 0 else '>='} 0, to: {across}}}, {{when: y {'<=' if sy > 0 else '>='} 0, to: {up}}}]}}"
+        for name, sx, sy, across, up in (("a", 1, 1, "b", "d"), ("b", -1, 1, "a", "c"), ("c", -1, -1, "d", "b"),
+                                         ("d", 1, -1, "c", "a"))
+    )  # fmt: skip
+    run = sliding(modes, "x: 1, y: 2", 5)
+    assert run.stop.reason == "zeno" and "intersection" in run.stop.message
+
+
+def test_without_auto_sliding_stops_and_says_how_to_go_on() -> None:
+    text = f"hsdsl: 1\nmodes:\n{FRICTION}\ninitial: {{mode: a, x: 12, v: 6}}\nexperiment: {{until: 30}}"
+    run = hsdsl.loads(text).simulate()
+    assert run.stop.reason == "zeno" and "sliding" in run.stop.message and "completion: auto" in run.stop.message
