@@ -56,4 +56,5 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     Raises UsageError: a name, value or combination that a run would refuse, too.
     """
     prepared = model.pipeline.prepare({**arguments, "engine": "python"})
-    return Source(model.system, prepared)
+    completed = model.pipeline.sliding if prepared.settings.completion == "auto" else model.pipeline
+    return Source(completed.system, prepared)

@@ -86,6 +86,25 @@ modes: {on: {flow: {x: v, v: -9.81}, transitions: [{when: x <= 0, to: on, reset:
 initial: {mode: on, x: 1, v: 0}
 experiment: {until: 4}
 """
+# sliding has a mode of its own, with its part of outputs and scene; a ball that rolls on has none
+SLIDING = """
+hsdsl: 1
+parameters: {up: 1}
+modes:
+  a: {flow: {x: up, y: 1}, transitions: [{when: x >= 0, to: b}]}
+  b: {flow: {x: -1, y: 2}, transitions: [{when: x <= 0, to: a}]}
+outputs: {sum: x + y}
+scene: [{point: [x, y]}, {circle: [x, t], radius: up}]
+initial: {mode: a, x: -1, y: 0}
+experiment: {until: 3, completion: auto}
+"""
+ROLLING = """
+hsdsl: 1
+parameters: {g: 9.81}
+modes: {on: {flow: {x: 1, h: v, v: -g}, transitions: [{when: h <= 0, to: on, reset: {v: -v/2}}]}}
+initial: {mode: on, x: 0, h: 1, v: 0}
+experiment: {until: 4}
+"""
 REFUSING = """
 hsdsl: 1
 parameters: {a: {value: 1, min: 1/2, max: 2}, b: 1/a}
@@ -200,6 +219,14 @@ class TestInABrowser:
         assert not driver.find_element("css selector", "input[name='w']").is_enabled()
         typed(driver, "gain", 3.0)
         check(driver, model.simulate(parameters={"w": 5, "gain": 3}))
+
+    @pytest.mark.parametrize(("text", "name", "value"), [(SLIDING, "up", 0.75), (ROLLING, "g", 5.0)])
+    def test_motion_beyond_accumulation_is_that_of_a_run(self, driver, text, name, value, tmp_path):
+        model = hsdsl.loads(text)
+        opened(driver, exported(model, tmp_path))
+        check(driver, model.simulate())
+        typed(driver, name, value)
+        check(driver, model.simulate(parameters={name: value}))
 
     def test_overrides_of_the_export_are_where_it_starts(self, driver, tmp_path):
         arguments = {"parameters": {"k": "1+2"}, "initial": {"x": 0.25}, "until": 5}

@@ -35,7 +35,7 @@ function stopped(run) {
     "left": `left_domain: ${ends} leaves it`,
     "stuck": `step_underflow: in mode ${modeOf(mode)} no step from ${time(t)} is short enough`,
     "interrupted": `interrupted at ${time(t)}: a run in a page may take 10 s and 256 MB`,
-    "accumulated": `zeno: transitions accumulate at ${time(t)}, and something else moves on there`,
+    "accumulated": `zeno: transitions accumulate at ${time(t)}, and no motion along its guard goes on there`,
   };
   if (model.reasons[reason] === "stuck" && wall !== undefined) return `left_domain: ${ends} leaves it`;
   return sentences[model.reasons[reason]];
@@ -45,7 +45,7 @@ function noted({kind, mode, surface, number, time: t, other}) {
   const edge = edgeOf(mode, surface);
   return {
     "crowded": `more than 16 transitions within the relaxation, from ${time(t)} on in strips`,
-    "at rest": `at rest on the guard of ${edge} from ${time(t)} to ${time(other)}`,
+    "in contact": `${number ? "at rest on" : "motion along"} the guard of ${edge} from ${time(t)} to ${time(other)}`,
     "replaced": `Zeno at ${time(t)}: the transitions of ${edge} after number ${number} are replaced by their limit`,
     "accumulates": `the transitions of ${edge} accumulate at ${time(t)}`,
     "unsettled": `surface ${surface} of mode ${modeOf(mode)} would not settle on a polynomial at ${time(t)}`,

@@ -79,7 +79,7 @@ static page_refusal set_task(void) {
     if (!run.workspace || flush(t) || grow(t, &t->visited)) return PAGE_NO_MEMORY;
   }
   t->model = &hs_the_model, t->method = &problem_method, t->timeline = &run.timeline;
-  t->interpolation = problem_interpolation;
+  t->interpolation = &problem_interpolation;
   t->mode = problem_mode, t->dimension = PAGE_STARTS, t->x = run.x;
   t->workspace = run.workspace;
   t->flush = flush, t->poll = poll, t->grow = grow;
