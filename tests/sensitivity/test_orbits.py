@@ -53,7 +53,7 @@ WALKER = (0.7344606213364, [-0.202216100148 + 0.543414971353j, -0.202216100148 -
 
 def test_compass_walker() -> None:
     """Against a run of forty digits with differences, and a second integrator."""
-    orbit = hsdsl.load("models/compass-walker.yaml").orbit("heel_strike")
+    orbit = hsdsl.load("examples/orbits/compass-walker.yaml").orbit("heel_strike")
     assert orbit.verdict == "stable"
     assert np.isclose(orbit.period, WALKER[0], rtol=1e-12)
     assert np.allclose(
@@ -161,7 +161,7 @@ experiment: {{until: 20}}
         (OSCILLATOR, {"section": "impact", "laps": 0}, "laps"),
         (OSCILLATOR, {"section": "impact", "until": 0.01}, "does not make the transition impact"),
         (OSCILLATOR, {"section": "impact", "step": 1}, "no argument 'step'"),
-        ("models/compass-walker.yaml", {"section": "heel_strike", "period": 1}, "does not depend on time"),
+        ("examples/orbits/compass-walker.yaml", {"section": "heel_strike", "period": 1}, "does not depend on time"),
         ("models/bouncing-ball.yaml", {"section": "bounce"}, "no periodic orbit"),
         (BALL.format(floor="A*sin(w*t) + A*sin(w**2*t)"), {"section": "hit"}, "without a common multiple"),
         (BALL.format(floor="A*t"), {"section": "hit"}, "outside of sines"),
