@@ -35,12 +35,16 @@ class Contact:
     ``mode`` is the mode with the constrained flow. The first of its edges are those of the mode itself, but the one
     with number ``edge`` releases the state: its surface is the push with which the flow presses on the guard, negative.
     Edges beyond the mode's own are where an `if` may end.
-    ``order`` is the derivative of the guard along the flow that pushes: 1, or 2 where the first one is zero on it.
+    ``push`` is the derivative of the guard along the flow that presses, of this ``order``: 1, or 2 where the first one,
+    ``rate``, is zero on it. ``landing`` is the state that repeated resets take a state near the guard to.
     """
 
     edge: int
     order: int
     mode: Mode
+    rate: sp.Expr
+    push: sp.Expr
+    landing: tuple[sp.Expr, ...]
 
 
 def contact(mode: Mode, k: int) -> Contact | None:
@@ -52,7 +56,7 @@ def contact(mode: Mode, k: int) -> Contact | None:
     constrained = _constrained(states, mode, edge)
     if constrained is None:
         return None
-    flow, at = constrained
+    flow, landing, at = constrained
     push, order = _push(states, mode.flow, edge, at)
     if order is None:
         return None
@@ -60,11 +64,12 @@ def contact(mode: Mode, k: int) -> Contact | None:
                       reset=tuple(states), reset_texts=mode.states)  # fmt: skip
     edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *_ends_of_condition(release, edge.condition))
     held = replace(mode, flow=flow, flow_texts=tuple(map(str, flow)), edges=edges)
-    return Contact(k, order, held)
+    rate = cancelled(along(edge.surface.residual, states, mode.flow))
+    return Contact(k, order, held, rate, push, landing)
 
 
 def _constrained(states: list[sp.Symbol], mode: Mode, edge: Edge):
-    """The flow that stays where a reset keeps the state, and a point there; None where the reset does not fix it."""
+    """The flow that stays where a reset keeps the state, the way there, and a point; None where there is none."""
     changed = [i for i, (x, r) in enumerate(zip(states, edge.reset, strict=True)) if x != r]
     moved = sp.Matrix([edge.reset[i] - states[i] for i in changed])
     if not changed or (at := _fixed_point(states, [edge.surface.residual, *moved], mode.flow)) is None:
@@ -83,7 +88,10 @@ def _constrained(states: list[sp.Symbol], mode: Mode, edge: Edge):
     held = list(mode.flow)
     for i, correction in zip(changed, part * slopes * sp.Matrix([1, *mode.flow]), strict=True):
         held[i] = cancelled(held[i] - correction / size)
-    return tuple(held), at
+    landing = list[sp.Expr](states)
+    for i, correction in zip(changed, part * moved, strict=True):
+        landing[i] = cancelled(landing[i] - correction / size)
+    return tuple(held), tuple(landing), at
 
 
 def _push(states: list[sp.Symbol], flow: Sequence[sp.Expr], edge: Edge, at: Point):

@@ -308,6 +308,21 @@ class Model:
         """The model with a mode for each surface that two modes press on; this one where there is none."""
         return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)
 
+    def completed(self) -> str | None:
+        """The text of the model with modes for motion along guards and for sliding; None where there are none.
+
+        It is an ordinary model, for every engine and export. A transition enters the motion along its guard where the
+        flights that follow it would last less than the parameter ``contact_time``.
+        """
+        from hsdsl.completion.text import completed_text
+        from hsdsl.elaborate import elaborate_files
+
+        files = self.pipeline.files
+        if files is None:
+            raise UsageError("expected a model that was read from text")
+        read = elaborate_files(files)
+        return completed_text(read.text, read.root, read.system)
+
     def only(self, outputs: Sequence[str]) -> Model:
         """Return the model with these states and outputs and those they, or any transition, depend on.
 

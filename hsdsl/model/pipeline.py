@@ -83,6 +83,11 @@ class Pipeline:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _compiled=None, kernels={})
 
+    @property
+    def files(self) -> ModelFiles | None:
+        """The bytes of the model; None of a system made otherwise."""
+        return self._files
+
     @contextmanager
     def _stage(self) -> Generator[None]:
         """Apply the model's limits, and count the time."""

@@ -204,3 +204,46 @@ def test_without_auto_sliding_stops_and_says_how_to_go_on() -> None:
     text = f"hsdsl: 1\nmodes:\n{FRICTION}\ninitial: {{mode: a, x: 12, v: 6}}\nexperiment: {{until: 30}}"
     run = hsdsl.loads(text).simulate()
     assert run.stop.reason == "zeno" and "sliding" in run.stop.message and "completion: auto" in run.stop.message
+
+
+@pytest.mark.parametrize("text", [TABLE, f"hsdsl: 1\nmodes:{FRICTION}\ninitial: {{mode: a, x: 12, v: 6}}\n"
+                                         "experiment: {until: 30}\n"])  # fmt: skip
+def test_completed_text_is_an_ordinary_model_with_the_same_execution(text: str) -> None:
+    model = hsdsl.loads(text)
+    written = model.completed()
+    assert written is not None
+    run = hsdsl.loads(written).simulate(completion="none", tolerance=1e-12)
+    expected = model.simulate(completion="auto", tolerance=1e-12)
+    assert run.stop.reason == "until"
+    for name, value in expected.final.state.items():
+        assert run.final.state[name] == pytest.approx(value, abs=1e-8)
+
+
+def test_completed_text_keeps_comments_and_style(tmp_path: Any) -> None:
+    text = """# mine
+hsdsl: 1
+parameters:
+  g: 9.81  # gravity
+modes:
+  fly:
+    flow: {h: v, v: -g + sin(h)}
+    transitions:
+      - when: h <= 0  # floor
+        to: fly
+        reset: {v: -v/2}
+initial: {mode: fly, h: 1, v: 0}
+experiment: {until: 5}
+"""
+    written = hsdsl.loads(text).completed()
+    assert written is not None and "# gravity" in written and "# floor" in written and written.startswith("# mine\n")
+    assert "contact_time: 1e-6" in written and "  contact_fly:\n" in written
+    assert hsdsl.loads(written).system.modes[1].name == "contact_fly"
+
+
+def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
+    from hsdsl.cli.verbs import obey
+
+    path = tmp_path / "m.yaml"
+    path.write_text("hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n")
+    assert obey(["complete", str(path)]) == 2
+    assert "nothing to complete" in capsys.readouterr().err

@@ -1,0 +1,63 @@
+# pyright: basic
+"""Expressions and inequalities as text of the language, exact: the same mathematics is read back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+from sympy.printing.str import StrPrinter
+
+from hsdsl.functions import FUNCTIONS
+from hsdsl.system import Surface
+
+_NAMES = {function: name for name, (function, *_) in FUNCTIONS.items()}
+_MOST_PLACES = 12
+
+
+class _Printer(StrPrinter):
+    """SymPy's own text with the language's names of functions, and short fractions as decimals."""
+
+    def _print_Function(self, expr: Any) -> str:
+        name = _NAMES.get(expr.func, expr.func.__name__)
+        return f"{name}({', '.join(map(self._print, expr.args))})"
+
+    def _print_Exp1(self, expr: Any) -> str:
+        return "exp(1)"
+
+    def _print_Rational(self, expr: Any) -> str:
+        for places in range(1, _MOST_PLACES):
+            if 10**places % expr.q == 0:
+                whole, part = divmod(abs(expr.p) * 10**places // expr.q, 10**places)
+                return f"{'-' * (expr.p < 0)}{whole}.{part:0{places}d}"
+        return f"{expr.p}/{expr.q}"
+
+    def _print_And(self, expr: Any) -> str:
+        return " and ".join(self._part(a) for a in expr.args)
+
+    def _print_Or(self, expr: Any) -> str:
+        return " or ".join(self._part(a) for a in expr.args)
+
+    def _print_Not(self, expr: Any) -> str:
+        return f"not {self._part(expr.args[0])}"
+
+    def _part(self, expr: Any) -> str:
+        text = self._print(expr)
+        return f"({text})" if isinstance(expr, sp.And | sp.Or | sp.Not) else text
+
+
+def text_of(expr: Any) -> str:
+    """The text of an expression, or of a condition."""
+    return _Printer().doprint(expr)
+
+
+def inequality(surface: Surface) -> str:
+    """The text of a guard."""
+    sign = ">=" if surface.residual == surface.left - surface.right else "<="
+    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"
+
+
+def wall(surface: Surface) -> str:
+    """The text of a wall, whose surface is negative where the inequality holds."""
+    sign = "<=" if surface.residual == surface.left - surface.right else ">="
+    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"

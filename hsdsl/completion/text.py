@@ -1,0 +1,170 @@
+# pyright: basic
+"""The text of a model with the modes of its completions: the file as it is, with further modes and transitions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import sympy as sp
+
+from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.printer import inequality, text_of, wall
+from hsdsl.completion.sliding import slidings
+from hsdsl.expression.scope import symbol
+from hsdsl.source import Mapping, Node, Text, child
+from hsdsl.system import Edge, HybridSystem, Mode
+
+TIME_OF_CONTACT = "1e-6"
+
+
+def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
+    """The text of a model with a mode for each motion along a guard, and for each sliding.
+
+    A transition to the same mode enters the motion along its guard where the flights that follow it would last less
+    than the parameter ``contact_time``. None where nothing can be completed.
+    """
+    contacts = [(mode, found) for mode in system.modes for k in range(len(mode.edges)) if (found := contact(mode, k))]
+    surfaces = slidings(system)
+    if not contacts and not surfaces:
+        return None
+    writer = _Writer(text, root, system)
+    for sliding in surfaces:
+        for entry in sliding.entries:
+            writer.add_transition(entry.source, _transition(entry))
+        writer.add_mode(sliding.mode, sliding.mode.name)
+    for mode, found in contacts:
+        writer.add_contact(mode, found)
+    return writer.result()
+
+
+class _Writer:
+    """Insertions into a text, made from its end to its start."""
+
+    def __init__(self, text: Text, root: Node, system: HybridSystem) -> None:
+        assert isinstance(root, Mapping)
+        self._text, self._root, self._system = text, root, system
+        self._names = {mode.name for mode in system.modes} | {p.name for p in system.parameters}
+        self._insertions: dict[int, list[str]] = {}
+        self._time: str | None = None
+
+    def result(self) -> str:
+        content = self._text.content
+        for index in sorted(self._insertions, reverse=True):
+            content = content[:index] + "".join(self._insertions[index]) + content[index:]
+        return content
+
+    def add_contact(self, mode: Mode, found: Contact) -> None:
+        """Add a motion along a guard, and the transition into it."""
+        edge = mode.edges[found.edge]
+        label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
+        name = self._free(re.sub(r"\W", "_", label))
+        if found.order == 1:
+            soon = sp.Gt(found.push, 0)
+        else:
+            soon = sp.Le(2 * found.rate, symbol(self._contact_time()) * found.push)
+        condition = soon if edge.condition is None else sp.And(edge.condition, soon)
+        landing = edge.reset if found.order == 1 else found.landing
+        entry = replace(edge, name=f"{mode.name}->{name}", target=name, condition=condition, reset=landing)
+        self.add_transition(mode.name, _transition(replace(entry, priority=edge.priority + 1)))
+        edges = list(found.mode.edges)
+        for k in (found.edge, *range(len(mode.edges), len(edges))):
+            edges[k] = replace(edges[k], name=f"{name}->{mode.name}")
+        self.add_mode(replace(found.mode, edges=tuple(edges)), name)
+
+    def _free(self, name: str) -> str:
+        while name in self._names:
+            name += "_"
+        self._names.add(name)
+        return name
+
+    def _contact_time(self) -> str:
+        if self._time is None:
+            self._time = self._free("contact_time")
+            parameters = child(self._root, "parameters")
+            entry = f"{self._time}: {TIME_OF_CONTACT}"
+            if parameters is None or not isinstance(parameters, Mapping) or not parameters.entries:
+                (key, _) = self._root.entries["modes"]
+                self._insert(key.place.start[0], f"parameters: {{{entry}}}\n")
+            else:
+                self._append(parameters, entry, entry)
+        return self._time
+
+    def add_transition(self, mode: str, fields: dict[str, str]) -> None:
+        """Add a transition behind those of a mode."""
+        node = child(child(child(self._root, "modes"), mode), "transitions")
+        assert node is not None
+        text = _flow_style(fields)
+        self._append(node, text, f"- {text}")
+
+    def add_mode(self, mode: Mode, name: str) -> None:
+        """Add a mode behind the others."""
+        node = child(self._root, "modes")
+        assert node is not None
+        block = f"{name}:\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
+        edges = ", ".join(_flow_style(_transition(edge)) for edge in mode.edges)
+        parts = [f"flow: {_flow_style(_flow(mode))}", *_rest(mode, self._system), f"transitions: [{edges}]"]
+        self._append(node, f"{name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
+
+    def _append(self, node: Node, inline: str, block: str) -> None:
+        """Add an entry behind the last one of a mapping or a list, in its style."""
+        start, end = node.place.start[0], node.place.end[0]
+        content = self._text.content
+        if content[start] in "[{":
+            before = "" if content[start + 1 : end - 1].strip() == "" else ", "
+            self._insert(end - 1, before + inline)
+            return
+        column = node.place.start[2]
+        last = len(content[:end].rstrip())
+        line_end = content.find("\n", last)
+        at = len(content) if line_end < 0 else line_end
+        self._insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
+
+    def _insert(self, index: int, text: str) -> None:
+        self._insertions.setdefault(index, []).append(text)
+
+
+def _transition(edge: Edge) -> dict[str, str]:
+    """The fields of a transition; one with the name that it would have anyway gets none."""
+    fields = {} if "->" in edge.name else {"name": edge.name}
+    fields["when"] = inequality(edge.surface)
+    if edge.condition is not None:
+        fields["if"] = text_of(edge.condition)
+    fields["to"] = edge.target
+    changes = {name: text_of(r) for name, r in zip(edge.target_states, edge.reset, strict=True) if r != symbol(name)}
+    if changes:
+        fields["reset"] = _flow_style(changes)
+    if edge.priority:
+        fields["priority"] = str(edge.priority)
+    return fields
+
+
+def _flow(mode: Mode) -> dict[str, str]:
+    return {name: text_of(f) for name, f in zip(mode.states, mode.flow, strict=True)}
+
+
+def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:
+    """Walls and outputs."""
+    if mode.walls:
+        yield f"domain: [{', '.join(map(wall, mode.walls))}]"
+    outputs = {n: text_of(o) for n, o in zip(system.outputs, mode.outputs, strict=True) if o is not None}
+    if outputs:
+        yield f"outputs: {_flow_style(outputs)}"
+
+
+def _mode_lines(mode: Mode, system: HybridSystem) -> Iterator[str]:
+    yield "flow:"
+    yield from (f"  {state}: {text}" for state, text in _flow(mode).items())
+    yield from _rest(mode, system)
+    yield "transitions:"
+    yield from (f"  - {_flow_style(fields)}" for fields in map(_transition, mode.edges))
+
+
+def _flow_style(fields: dict[str, str]) -> str:
+    return "{" + ", ".join(f"{key}: {_quoted(value)}" for key, value in fields.items()) + "}"
+
+
+def _quoted(text: str) -> str:
+    """A value inside brackets: in quotes where a comma or a bracket of its own would end it."""
+    return f"'{text}'" if "," in text and text[0] not in "{[" else text
