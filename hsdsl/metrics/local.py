@@ -19,7 +19,7 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, segments_inside
 from hsdsl.metrics.routes import Crossing, Route, bend, beyond, crossings
-from hsdsl.metrics.search import End, SearchResult
+from hsdsl.metrics.search import End, Query, SearchResult
 from hsdsl.metrics.socp import one_thread
 
 MOST_SEQUENCES = 6
@@ -38,26 +38,17 @@ DEPTH = 0.05  # how deep inside a bent path is held, relative to how far outside
 BENDS = 2  # put into a path whose straight pieces leave their domains, at most so often
 
 
-def search_locally(
-    space: Space,
-    starts: list[End],
-    ends: list[End],
-    relaxation: float,
-    hops: int,
-    limit: float,
-    enough: float,
-    budget: Budget,
-) -> SearchResult:
-    """The best path found between any of ``starts`` and ``ends``; stops where it is as short as ``enough``."""
-    found = SearchResult(upper=limit, lower=0.0)
+def search_locally(query: Query, enough: float) -> SearchResult:
+    """The best path found; stops where it is as short as ``enough``."""
+    found = SearchResult(upper=query.limit, lower=0.0)
     with one_thread():
-        for start in starts:
-            for end in ends:
-                for number, sequence in enumerate(_sequences(space, start, end, hops)):
-                    if found.upper <= enough or (number and budget.spent()):
+        for start in query.starts:
+            for end in query.ends:
+                for number, sequence in enumerate(_sequences(query.space, start, end, query.most)):
+                    if found.upper <= enough or (number and query.budget.spent()):
                         return found
-                    route = Route(space, sequence, (start.mode, start.x[0]), (end.mode, end.x[0]))
-                    _try(route, start.cost + end.cost + relaxation * len(sequence), found, budget)
+                    route = Route(query.space, sequence, (start.mode, start.x[0]), (end.mode, end.x[0]))
+                    _try(route, start.cost + end.cost + query.toll * len(sequence), found, query.budget)
     return found
 
 

@@ -20,7 +20,7 @@ from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.passage_bounds import ROUNDING, Indices, unchanged
 from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.routes import Route
-from hsdsl.metrics.search import End, most_hops, search
+from hsdsl.metrics.search import End, Query
 
 CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
 FIRST = 5  # pairs that are searched from nothing, spread over those asked for
@@ -165,10 +165,8 @@ class _Batch:
         """Search as for a single pair."""
         owner = self.owner
         starts, ends = ([replace(end, x=end.x[k : k + 1])] for end in (self.start, self.end))
-        hops = most_hops(owner.space, self.start.mode, self.end.mode, owner.hops)
-        outer = search(owner.space, starts, ends, owner.toll, hops, np.inf, owner.budget)
-        enough = max(enough, float(self.lower[k]) * (1 + CLOSED))
-        found = search_nonaffine(owner.space, starts, ends, owner.toll, hops, np.inf, outer, owner.budget, enough)
+        query = Query(owner.space, starts, ends, owner.toll, owner.hops, owner.budget)
+        found = search_nonaffine(query, max(enough, float(self.lower[k]) * (1 + CLOSED)))
         self.lower[k] = max(self.lower[k], found.lower * (1 - ROUNDING))
         self.upper[k] = min(self.upper[k], found.upper)
         self.done[k] = True

@@ -21,7 +21,7 @@ from hsdsl.metrics.interval import CERTIFIED, INFINITE, ZERO, Interval, weakest
 from hsdsl.metrics.neighbours import Neighbours
 from hsdsl.metrics.nonaffine import search_nonaffine
 from hsdsl.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of, status_of
-from hsdsl.metrics.search import End, most_hops, search
+from hsdsl.metrics.search import End, Query, search
 
 __all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
 
@@ -52,11 +52,8 @@ def distance(
     if b.mode not in space.fewest(a.mode):
         return PointDistance(INFINITE, (), "certified: no edges connect the modes")
     strip = _along_strip(p, q, a, b, relaxation)
-    most, toll, budget = most_hops(space, a.mode, b.mode, hops), relaxation or 0.0, budget or Budget()
-    found = search(space, starts, ends, toll, most, strip, budget)
-    if not space.affine:
-        found = search_nonaffine(space, starts, ends, toll, most, strip, found, budget)
-    return answer(space, found, most)
+    query = Query(space, starts, ends, relaxation or 0.0, hops, budget or Budget(), strip)
+    return answer(space, search(query) if space.affine else search_nonaffine(query), query.most)
 
 
 def distances(
@@ -84,9 +81,9 @@ def distances(
     if not space.affine:
         found = (neighbours or Neighbours(space, toll, budget, hops)).bound(start, end, enough)
     else:
-        most = most_hops(space, start.mode, end.mode, hops)
-        result = search(space, [start], [end], toll, most, np.inf, budget)
-        found = np.minimum(result.lower, result.cut), result.upper, status_of(result, most)
+        query = Query(space, [start], [end], toll, hops, budget)
+        result = search(query)
+        found = np.minimum(result.lower, result.cut), result.upper, status_of(result, query.most)
     for ends in zip(*(x[found[0] > found[1]] for x in found[:2]), strict=True):
         Interval(*ends)  # which they contradict
     return found

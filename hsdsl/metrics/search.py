@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,37 +61,47 @@ class SearchResult:
     through: Any = None  # the route of a path by local solves, its guard points being ``unknowns``
 
 
-def search(
-    space: Space,
-    starts: list[End],
-    ends: list[End],
-    relaxation: float,
-    hops: int,
-    limit: float,
-    budget: Budget,
-) -> SearchResult:
-    """Search between any of ``starts`` and any of ``ends``; only paths shorter than ``limit`` matter.
+@dataclass(frozen=True, eq=False)
+class Query:
+    """Distances to search for: between any of ``starts`` and any of ``ends``, each passage at the price of a toll.
 
-    Each passage costs the relaxation. Paths with more passages than ``hops`` are only bounded, in ``SearchResult.cut``.
+    Only paths shorter than ``limit`` matter. Paths with more passages than ``most`` are only bounded: by default eight
+    more than the fewest that lead from one mode to the other.
     """
-    count = len(starts[0].x)
-    found = SearchResult(np.full(count, limit), np.full(count, limit), np.full(count, np.inf))
+
+    space: Space
+    starts: list[End]
+    ends: list[End]
+    toll: float
+    hops: int | None
+    budget: Budget
+    limit: float = np.inf
+
+    @cached_property
+    def most(self) -> int:
+        """The cap on passages."""
+        fewest = self.space.fewest(self.starts[0].mode)[self.ends[0].mode]
+        return fewest + HOPS if self.hops is None else self.hops
+
+
+def search(query: Query) -> SearchResult:
+    """Search for N distances where guards, resets and domains are affine, or for bounds from below."""
+    count = len(query.starts[0].x)
+    found = SearchResult(np.full(count, query.limit), np.full(count, query.limit), np.full(count, np.inf))
     with one_thread():
-        for end in ends:
-            for start in starts:
-                _Search(space, start, end, relaxation, hops, found, budget).run()
+        for end in query.ends:
+            for start in query.starts:
+                _Search(query, start, end, found).run()
     return found
 
 
 class _Search:
     """One pair of ends."""
 
-    def __init__(
-        self, space: Space, start: End, end: End, relaxation: float, hops: int, found: SearchResult, budget: Budget
-    ) -> None:
-        self.space, self.start, self.end, self.budget = space, start, end, budget
-        self.hops, self.found = hops, found
-        self.ways = Ways(space, start.mode, start.x, end.mode, end.x, relaxation, budget)
+    def __init__(self, query: Query, start: End, end: End, found: SearchResult) -> None:
+        self.space, self.start, self.end, self.budget = query.space, start, end, query.budget
+        self.hops, self.found = query.most, found
+        self.ways = Ways(query.space, start.mode, start.x, end.mode, end.x, query.toll, query.budget)
         self.fixed = start.cost + end.cost
         self.free = start.bound is None and end.bound is None
         self.pairs = np.arange(len(start.x))
@@ -261,8 +272,3 @@ class _Search:
         if near.any():
             bounds[near] = np.maximum(bounds[near], least(sequence, rows[near], ROUNDS) + self.fixed)
         return bounds
-
-
-def most_hops(space: Space, source: int, target: int, hops: int | None) -> int:
-    """The cap on passages: the one given, or some more than the fewest that lead from one mode to the other."""
-    return space.fewest(source)[target] + HOPS if hops is None else hops
