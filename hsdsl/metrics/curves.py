@@ -16,14 +16,13 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.interval import CERTIFIED, ZERO, Interval
-from hsdsl.metrics.merge import Cells, common_span, merge
+from hsdsl.metrics.merge import Cells, merge
 from hsdsl.metrics.on_space import OnSpace
 from hsdsl.metrics.points import SpaceMetric
 from hsdsl.metrics.supremum import Supremum, supremum
-from hsdsl.metrics.trace import Trace, names_of, trace
+from hsdsl.metrics.trace import names_of, trace
 
 GAP = 1e-6  # of the lower bound, at which refinement stops: so that what is printed is the distance
-ROUNDOFF = 64 * 2.0**-53  # times the largest state: no smaller gap is asked for, beside what rounding leaves in doubt
 RESOLVED = 0.05  # a wider gap is explained in the note
 
 
@@ -99,8 +98,8 @@ def rho(
     if cells.same:
         return no_distance(cells, name)
     on = OnSpace(metric, relaxation is not None)
-    found = supremum(cells, on, gap, rounding_of(cells.a, cells.b), metric.evaluations, metric.budget)
-    return curve_distance(found, cells, a, b, name, gap, metric.budget, metric.status)
+    found = supremum(cells, on, gap, cells.rounding, metric.evaluations, metric.budget)
+    return curve_distance(found, cells, name, gap, metric.budget, metric.status)
 
 
 def _check_depth(cells: Cells, relaxation: float) -> None:
@@ -128,31 +127,22 @@ def merged(a: Execution, b: Execution) -> Cells:
     return cells
 
 
-def rounding_of(*curves: Trace) -> float:
-    """Return how far apart two bounds may be for rounding alone."""
-    largest = max(float(np.max(np.abs(curve.coefficients[:, 0]), initial=0.0)) for curve in curves)
-    return ROUNDOFF * largest + 4 * sum(float(np.max(curve.doubt, initial=0.0)) for curve in curves)
-
-
 def no_distance(cells: Cells, metric: str, status: str = CERTIFIED) -> CurveDistance:
     """Return the distance of a curve from itself."""
-    span = common_span(cells.a, cells.b)
-    return CurveDistance(ZERO.but(status), span[0], metric, span)
+    return CurveDistance(ZERO.but(status), cells.span[0], metric, cells.span)
 
 
 def curve_distance(
     found: Supremum,
     cells: Cells,
-    a: Execution,
-    b: Execution,
     metric: str,
     gap: float,
     budget: Budget,
     status: str = CERTIFIED,
 ) -> CurveDistance:
     """Say what a supremum means."""
-    notes = [span_note(a, b, common_span(cells.a, cells.b))]
-    if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + rounding_of(cells.a, cells.b)):
+    notes = [cells.note]
+    if found.upper > max(found.lower * (1 + max(gap, RESOLVED)), found.lower + cells.rounding):
         if budget.ran_out:
             cause = f"the {budget.seconds:g} seconds it was given were over after {found.evaluations} point distances"
         elif found.complete:
@@ -161,14 +151,4 @@ def curve_distance(
             cause = f"the search stopped after {found.evaluations} point distances"
         notes.append(f"Upper and lower bound differ: {cause}.")
     interval = Interval(found.lower, found.upper, status)
-    return CurveDistance(interval, found.time, metric, common_span(cells.a, cells.b), " ".join(filter(None, notes)))
-
-
-def span_note(a: Execution, b: Execution, span: tuple[float, float]) -> str:
-    """Say so where a run goes on beyond what was compared."""
-    spans = [(float(run.time_span[0]), float(run.time_span[1])) for run in (a, b)]
-    return (
-        ""
-        if all(s == span for s in spans)
-        else f"Compared from t = {span[0]:.10g} to {span[1]:.10g}, which both cover."
-    )
+    return CurveDistance(interval, found.time, metric, cells.span, " ".join(filter(None, notes)))

@@ -21,18 +21,9 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.bernstein import largest_norm, length
 from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.curves import (
-    GAP,
-    ROUNDOFF,
-    CurveDistance,
-    curve_distance,
-    merged,
-    no_distance,
-    rounding_of,
-    span_note,
-)
+from hsdsl.metrics.curves import GAP, CurveDistance, curve_distance, merged, no_distance
 from hsdsl.metrics.interval import SAMPLED, Interval
-from hsdsl.metrics.merge import Cells, Side, common_span
+from hsdsl.metrics.merge import ROUNDOFF, Cells, Side
 from hsdsl.metrics.rounding import UNIT
 from hsdsl.metrics.supremum import supremum
 from hsdsl.metrics.trace import Array, Trace
@@ -68,8 +59,8 @@ def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
     if cells.same:
         return no_distance(cells, "sup")
     budget = Budget()
-    found = supremum(cells, Labelled(), gap, rounding_of(cells.a, cells.b), EVALUATIONS, budget)
-    return curve_distance(found, cells, a, b, "sup", gap, budget)
+    found = supremum(cells, Labelled(), gap, cells.rounding, EVALUATIONS, budget)
+    return curve_distance(found, cells, "sup", gap, budget)
 
 
 def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None) -> CurveDistance:
@@ -90,10 +81,9 @@ def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None
         apart = np.sqrt(np.sum(difference**2, axis=1))
         if len(apart) and apart.max() > largest:
             largest, time = float(apart.max()), float(times[chosen][int(np.argmax(apart))])
-    span = common_span(cells.a, cells.b)
     doubt = float(np.max(first.doubt + second.doubt)) + ROUNDOFF * largest
     interval = Interval(max(0.0, largest - doubt), largest + doubt, SAMPLED)
-    return CurveDistance(interval, time, "rho-hat", span, span_note(a, b, span))
+    return CurveDistance(interval, time, "rho-hat", cells.span, cells.note)
 
 
 def _columns(cells: Cells, coordinates: Sequence[str] | None) -> Array:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.metrics.bernstein import degree_raised, restrict
 from hsdsl.metrics.trace import Array, Trace
+
+ROUNDOFF = 64 * 2.0**-53  # times the largest state: two bounds need not be nearer
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,23 @@ class Cells:
         """Whether both curves are one."""
         return self.a.equals(self.b)
 
+    @cached_property
+    def span(self) -> tuple[float, float]:
+        """The time span that both curves cover."""
+        return common_span(self.a, self.b)
+
+    @property
+    def note(self) -> str:
+        """A sentence where a curve goes on beyond that."""
+        begin, end = self.span
+        whole = all((curve.start[0], curve.end[-1]) == self.span for curve in (self.a, self.b))
+        return "" if whole else f"Compared from t = {begin:.10g} to {end:.10g}, which both cover."
+
+    @cached_property
+    def rounding(self) -> float:
+        """How far apart bounds on the two curves may be for rounding alone."""
+        return rounding_of(self.a, self.b)
+
     def sides(self) -> tuple[Side, Side]:
         """Return both curves on the cells, their polynomials of one degree."""
         degree = max(self.a.coefficients.shape[1], self.b.coefficients.shape[1]) - 1
@@ -106,6 +126,12 @@ class Cells:
         powers = degree_raised(restrict(trace.coefficients[pieces], first, last), degree)
         depth = np.stack([trace.depths(pieces, first), trace.depths(pieces, last)], axis=1)
         return Side(trace, pieces, powers, depth, self.end - self.begin, trace.doubt[pieces])
+
+
+def rounding_of(*curves: Trace) -> float:
+    """Return how far apart two bounds on curves may be for rounding alone."""
+    largest = max(float(np.max(np.abs(curve.coefficients[:, 0]), initial=0.0)) for curve in curves)
+    return ROUNDOFF * largest + 4 * sum(float(np.max(curve.doubt, initial=0.0)) for curve in curves)
 
 
 def common_span(a: Trace, b: Trace) -> tuple[float, float]:

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from hsdsl.execution import Execution
-from hsdsl.metrics.curves import ROUNDOFF, CurveDistance, merged, no_distance, rounding_of, span_note
+from hsdsl.metrics.curves import CurveDistance, merged, no_distance
 from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.labelled_sup import sup_norm
-from hsdsl.metrics.merge import common_span
+from hsdsl.metrics.merge import ROUNDOFF
 from hsdsl.metrics.polyline import Polyline, polylines
 from hsdsl.metrics.trace import Array, Trace
 
@@ -29,16 +29,16 @@ def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> Curve
     that are near enough. It differs from the distance by no more than the way between neighbouring points.
     """
     cells = merged(a, b)
-    span = common_span(cells.a, cells.b)
+    span = cells.span
     if cells.same:
         return no_distance(cells, "skorokhod")
     p, q = polylines((cells.a, cells.b), (span, span), resolution)
-    coupled, doubt = coupling(p, q), rounding_of(cells.a, cells.b) + ROUNDOFF * max(map(abs, span))
+    coupled, doubt = coupling(p, q), cells.rounding + ROUNDOFF * max(map(abs, span))
     same_time = sup_norm(a, b).upper
     upper = min(coupled + (p.reach + q.reach) / 2 + doubt, same_time)
     lower = max(coupled - max(p.reach, q.reach) / 2 - doubt, switches_apart(cells.a, cells.b, span), 0.0)
     note = f"Curves by {len(p)} and {len(q)} points, up to {max(p.reach, q.reach):.2g} apart."
-    notes = " ".join(filter(None, (span_note(a, b, span), note)))
+    notes = " ".join(filter(None, (cells.note, note)))
     return CurveDistance(Interval(lower, upper), None, "skorokhod", span, notes)
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.metrics.curves import ROUNDOFF, CurveDistance, rounding_of
+from hsdsl.metrics.curves import CurveDistance
 from hsdsl.metrics.interval import INFINITE, Interval
+from hsdsl.metrics.merge import ROUNDOFF, rounding_of
 from hsdsl.metrics.polyline import Polyline, polylines
 from hsdsl.metrics.trace import Array, Trace, names_of, trace
 
