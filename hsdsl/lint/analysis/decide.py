@@ -7,9 +7,9 @@ for all its questions, after which only exact reasoning goes on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,7 @@ FEWEST_POINTS = 12  # to believe that something is always zero
 MOST_WORK = 6_000_000  # operations on numbers a question may cost
 WORK_OF_A_MODEL = 400_000_000
 OVERHEAD = 400  # operations that one call of NumPy costs as much as
+T = TypeVar("T")
 
 
 @dataclass
@@ -36,9 +37,13 @@ class Decider:
 
     normal_forms: NormalForms = field(default_factory=NormalForms)
     left: int = WORK_OF_A_MODEL
-    _known: dict[Any, Answer] = field(default_factory=dict)
-    _left: dict[Any, Reduced | None] = field(default_factory=dict)
-    _samples: dict[Any, Array] = field(default_factory=dict)
+    _remembered: dict[Any, Any] = field(default_factory=dict[Any, Any])
+
+    def remembered(self, key: Any, work: Callable[[], T]) -> T:
+        """What was worked out under a key before, for rules that need the same."""
+        if key not in self._remembered:
+            self._remembered[key] = work()
+        return self._remembered[key]
 
     def decide(self, constraints: Sequence[Constraint], ranges: Ranges, prove: bool = False) -> Answer:
         """Answer whether there is a point that satisfies all constraints.
@@ -46,10 +51,8 @@ class Decider:
         Their expressions hold the names of ``ranges`` and exact numbers; answers are remembered for that object. Boxes
         are tried only with ``prove``, when `never` matters as much as `somewhere`.
         """
-        key = (tuple(constraints), id(ranges), prove)
-        if key not in self._known:
-            self._known[key] = self._decide(constraints, ranges, prove)
-        return self._known[key]
+        key = ("decide", tuple(constraints), id(ranges), prove)
+        return self.remembered(key, lambda: self._decide(constraints, ranges, prove))
 
     def _decide(self, constraints: Sequence[Constraint], ranges: Ranges, prove: bool) -> Answer:
         if too_large((c.expr for c in constraints), MOST_PARTS):
@@ -84,10 +87,7 @@ class Decider:
 
     def sample(self, given: Sequence[Constraint], ranges: Ranges) -> Array:
         """Points where constraints hold, as many as are found: array (n, names of ranges)."""
-        key = (tuple(given), id(ranges))
-        if key not in self._samples:
-            self._samples[key] = self._sample(given, ranges)
-        return self._samples[key]
+        return self.remembered(("sample", tuple(given), id(ranges)), lambda: self._sample(given, ranges))
 
     def _sample(self, given: Sequence[Constraint], ranges: Ranges) -> Array:
         reduced = self._reduced(given, ranges)
@@ -95,10 +95,8 @@ class Decider:
         return np.zeros((0, len(ranges))) if search is None else search.points()
 
     def _reduced(self, given: Sequence[Constraint], ranges: Ranges) -> Reduced | None:
-        key = (tuple(given), id(ranges))
-        if key not in self._left:
-            self._left[key] = elimination.reduce(given, self.normal_forms, ranges)
-        return self._left[key]
+        key = ("reduced", tuple(given), id(ranges))
+        return self.remembered(key, lambda: elimination.reduce(given, self.normal_forms, ranges))
 
     def _numerically(self, constraints: Sequence[Constraint], ranges: Ranges, reduced: Reduced, prove: bool) -> Answer:
         solved = _solutions(reduced)

@@ -8,10 +8,10 @@ values of the file; `--set` has no effect.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import sympy as sp
 
@@ -26,7 +26,6 @@ from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
 MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
-T = TypeVar("T")
 _LARGEST = Fraction(10) ** 100  # of values that are looked for: beyond, products overflow
 Clause = tuple[Constraint, ...]
 
@@ -38,10 +37,9 @@ class Dynamics:
         self.system = system
         self.modes = {mode.name: mode for mode in system.modes}
         self.decider = Decider()
+        self.remembered = self.decider.remembered
         self._values = system.parameter_values(lambda value, earlier: replaced(value, earlier, {}))
         self._done: dict[Any, Any] = {}
-        self._ranges: dict[tuple[str, ...], Ranges] = {}
-        self._remembered: dict[Any, Any] = {}
 
     def placed(self, expr: Any) -> Any:
         """An expression with the parameters' values."""
@@ -127,12 +125,6 @@ class Dynamics:
         moves = {symbol(s): self.placed(r) for s, r in zip(edge.target_states, edge.reset, strict=True)}
         return {s: r for s, r in moves.items() if s != r}
 
-    def remembered(self, key: Any, work: Callable[[], T]) -> T:
-        """What was worked out under a key before, for rules that need the same."""
-        if key not in self._remembered:
-            self._remembered[key] = work()
-        return self._remembered[key]
-
     def value(self, expr: Any, point: Mapping[Any, float]) -> float:
         """An expression at a point of all its names; NaN where it has no real value."""
         return at_point(expr, point)
@@ -176,10 +168,8 @@ class Dynamics:
 
     def ranges(self, mode: Mode) -> Ranges:
         """What is known of the values of a mode's states, of the sampled inputs and of time."""
-        if mode.states not in self._ranges:
-            states = {symbol(s): self._of_state(s) for s in mode.states}
-            self._ranges[mode.states] = {**states, **self._common}
-        return self._ranges[mode.states]
+        states = ((symbol(s), self._of_state(s)) for s in mode.states)
+        return self.remembered(("ranges", mode.states), lambda: {**dict(states), **self._common})
 
     def _of_state(self, name: str) -> SearchRange:
         typical = float(self.start.get(name, Fraction(1)))

@@ -90,26 +90,17 @@ class NewtonSearch:
         return good & self._hold(values, np.where(np.isfinite(made_of), made_of, np.inf))
 
     def _hold(self, values: Array, made_of: Array) -> Array:
-        good = np.ones(values.shape[1], dtype=bool)
-        for value, scale, relation in zip(values, made_of, self.relations, strict=True):
-            if relation == "= 0":
-                good &= np.abs(value) <= _TIGHT * np.minimum(scale, 1e6)
-            elif relation == "<= 0":
-                good &= value <= _TIGHT * np.minimum(scale, 1e6)
-            else:
-                good &= value < -_ROOM * scale
-        return good
+        equal, strict = _kinds(self.relations)
+        near = np.where(equal, np.abs(values), values) <= _TIGHT * np.minimum(made_of, 1e6)
+        return np.where(strict, values < -_ROOM * made_of, near).all(axis=0)
 
     def _moved(self, points: Array) -> Array:
         values = self.program.at(points)
         slopes = self._slopes(points, values)
-        goal = np.zeros_like(values)
-        for k, relation in enumerate(self.relations):
-            if relation == "= 0":
-                goal[k] = values[k]
-            else:
-                room = 0.1 * np.abs(slopes[k] * np.maximum(np.abs(points), 1e-1)).sum(axis=-1)
-                goal[k] = np.where(values[k] > (-_ROOM * room if relation == "< 0" else 0.0), values[k] + room, 0.0)
+        equal, strict = _kinds(self.relations)
+        room = 0.1 * np.abs(slopes * np.maximum(np.abs(points), 1e-1)).sum(axis=-1)
+        beyond = values > np.where(strict, -_ROOM * room, 0.0)
+        goal = np.where(equal, values, np.where(beyond, values + room, 0.0))
         active = goal != 0
         matrix = np.where(active[..., None], slopes, 0.0).transpose(1, 0, 2)
         usable: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(goal).all(axis=0)
@@ -164,13 +155,15 @@ def excluded(
 
 def _possible(program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
     bounds = program.over(low, high)
-    possible = np.ones(len(low), dtype=bool)
-    for least, most, relation in zip(bounds.low, bounds.high, relations, strict=True):
-        if relation == "= 0":
-            possible &= (least <= 0) & (most >= 0)
-        else:
-            possible &= (least <= 0) if relation == "<= 0" else (least < 0)
-    return possible
+    equal, strict = _kinds(relations)
+    below: Array = np.where(strict, bounds.low < 0, bounds.low <= 0)
+    return (below & (~equal | (bounds.high >= 0))).all(axis=0)
+
+
+def _kinds(relations: tuple[Relation, ...]) -> tuple[Array, Array]:
+    """Which constraints are equations, and which are strict: columns."""
+    kinds: Any = np.array(relations, dtype=str)[:, None]
+    return kinds == "= 0", kinds == "< 0"
 
 
 def _halved(low: Array, high: Array, widths: Array) -> tuple[Array, Array]:

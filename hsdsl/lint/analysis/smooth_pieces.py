@@ -16,6 +16,7 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, zero
+from hsdsl.lint.dependencies import closure
 
 MOST = 32
 _SIGNS = (functions.sign, sp.sign)
@@ -89,14 +90,8 @@ def pieces(residual: Any, flow: Mapping[Any, Any]) -> list[SmoothPiece] | None:
 
 def influencing(expr: Any, flow: Mapping[Any, Any]) -> dict[Any, Any]:
     """The flows that an expression depends on in the course of time."""
-    found: dict[Any, Any] = {}
-    waiting = [s for s in flow if s in expr.free_symbols]
-    while waiting:
-        state = waiting.pop()
-        if state not in found:
-            found[state] = flow[state]
-            waiting += [s for s in flow if s in flow[state].free_symbols]
-    return {s: found[s] for s in flow if s in found}
+    reached = closure(expr.free_symbols & flow.keys(), lambda s: flow[s].free_symbols & flow.keys())
+    return {s: f for s, f in flow.items() if s in reached}
 
 
 def _innermost(exprs: tuple[Any, ...]) -> Any | None:
