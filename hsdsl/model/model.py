@@ -22,6 +22,7 @@ from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
 
 if TYPE_CHECKING:
+    from hsdsl.fitting.fit import Fit
     from hsdsl.metrics.points import PointDistance, SpacePoint
     from hsdsl.model.differentiate import Differentiator
     from hsdsl.model.estimate import Estimate
@@ -230,6 +231,40 @@ class Model:
         from hsdsl.model.orbits import Orbits
 
         return Orbits(self, section, laps, period, arguments).find()
+
+    def fit(
+        self,
+        data: Any,
+        wrt: str | Sequence[str],
+        *,
+        sigma: Mapping[str, float] | None = None,
+        weights: Mapping[str, float] | None = None,
+        progress: Callable[[int, Mapping[str, float], float], None] | None = None,
+        **arguments: Any,
+    ) -> Fit:
+        """Fit parameters and initial states to measurements, by least squares with exact derivatives.
+
+        Parameters
+        ----------
+        data : path, mapping or DataFrame
+            A CSV file, or columns by name: ``t``, and states and outputs. An empty or NaN cell was not measured.
+        wrt : str or sequence of str
+            What to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The first
+            values are those of the file, or of ``parameters`` and ``initial``.
+        sigma : mapping, optional
+            The standard deviation of each column.
+        weights : mapping, optional
+            Weights of columns instead; left out, one over the largest size of each.
+        progress : callable, optional
+            Called after every run with how many there were, the values, and the weighted sum of squares.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples``, ``precision`` and ``until``.
+
+        Raises UsageError: an unknown name or column, or a run that does not reach the measurements.
+        """
+        from hsdsl.model.fits import fit
+
+        return fit(self, data, wrt, sigma, weights, progress, arguments)
 
     def stream(
         self,

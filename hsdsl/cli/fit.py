@@ -1,0 +1,91 @@
+"""``hsdsl fit``: parameters and initial states from measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from typer import Argument, Exit
+
+from hsdsl.cli.completion import override_names
+from hsdsl.cli.console import print_json, progress, say
+from hsdsl.cli.options import (
+    AllowPath,
+    Engine,
+    Json,
+    Limit,
+    Method,
+    Model,
+    Quiet,
+    answering,
+    check_target,
+    option,
+    split,
+)
+from hsdsl.errors import UsageError
+
+SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
+WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
+SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
+WEIGHT = "The weight of a column; left out, one over its largest size. May be repeated."
+Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with a column t and columns of states and outputs.")]
+
+
+def fit(
+    model: Model,
+    data: Data,
+    wrt: Annotated[str, option("A,B", WRT)],
+    sigma: Annotated[list[str] | None, option("NAME=S", SIGMA, "--sigma")] = None,
+    weight: Annotated[list[str] | None, option("NAME=W", WEIGHT, "--weight")] = None,
+    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    method: Annotated[Method | None, option("M", "An adaptive method, or auto.")] = None,
+    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the scales.")] = None,
+    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    plot: Annotated[Path | None, option("FILE", "Draw measurements and run: .png or .svg.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
+) -> None:
+    """Fit parameters and initial states to measurements."""
+    with answering(json, allow_path, limit):
+        check_target(plot, "--plot", (".png", ".svg"))
+        from hsdsl.fitting.words import as_json, summary
+        from hsdsl.model import load
+
+        parameters, initial, settings = split(overrides)
+        call: dict[str, Any] = {"method": method and str(method), "tolerance": tolerance, "engine": engine}
+        call |= {"parameters": parameters, "initial": initial, "settings": settings}
+        with progress(quiet or json) as show:
+            watch = show and partial(_watch, show)
+            columns = {"sigma": _numbers("--sigma", sigma), "weights": _numbers("--weight", weight)}
+            found = load(model).fit(data, wrt, progress=watch, **columns, **call)
+        if plot is not None:
+            found.plot(plot)
+            say(f"wrote {plot}")
+        if json:
+            print_json(as_json(found))
+        elif not quiet:
+            print(summary(found))
+    if not found.success:
+        raise Exit(3)
+
+
+def _watch(show: Any, runs: int, values: Mapping[str, float], total: float) -> None:
+    listed = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+    show(lambda: f"{runs} runs, sum of squares {total:.4g}, {listed}")
+
+
+def _numbers(name: str, pairs: list[str] | None) -> dict[str, float] | None:
+    found: dict[str, float] = {}
+    for pair in pairs or ():
+        column, equals, value = (part.strip() for part in pair.partition("="))
+        try:
+            found[column] = float(value)
+        except ValueError:
+            equals = ""
+        if not equals or not column:
+            raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", f"for example {name} x=0.1")
+    return found or None

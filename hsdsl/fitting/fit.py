@@ -1,0 +1,60 @@
+"""What a fit found: values with their covariance, what is left over, and where it is not smooth."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution
+from hsdsl.fitting.data import Measurements
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Values of parameters and initial states that measurements agree with best.
+
+    Attributes
+    ----------
+    values : dict
+        By name, as they were given in ``wrt``.
+    covariance : array, shape (n, n)
+        Of the values in their order: from the standard deviations of the measurements where these were given, else from
+        what is left over. Infinite where the measurements do not determine a value.
+    residuals : dict of array
+        What the run is above each measurement, by column; NaN where nothing was measured.
+    deviation : float
+        The root of the weighted mean square of residuals, over the degrees of freedom.
+    success : bool
+        Whether the method came to a minimum; ``message`` says how it ended.
+    at_bound : tuple of str
+        The values that are at a bound of the file.
+    nonsmooth : tuple of str
+        What is not smooth at the values found, so that the covariance may not hold, and what was met on the way.
+    execution : Execution
+        The run with these values.
+    """
+
+    values: dict[str, float]
+    covariance: Array
+    residuals: dict[str, Array]
+    deviation: float
+    success: bool
+    message: str
+    evaluations: int
+    at_bound: tuple[str, ...]
+    nonsmooth: tuple[str, ...]
+    measured: Measurements = field(repr=False)
+    execution: Execution = field(repr=False)
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The standard deviation of each value."""
+        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    def plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw the measurements and the run to a .png or .svg file."""
+        from hsdsl.plot.measured import plot_measured
+
+        plot_measured(path, self.execution, self.measured.times, self.measured.columns)

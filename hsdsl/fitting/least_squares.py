@@ -1,0 +1,205 @@
+"""Least squares over executions by SciPy's trust region method, with the derivatives of the executions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import (  # pyright: ignore[reportMissingTypeStubs]
+    least_squares,  # pyright: ignore[reportUnknownVariableType]
+)
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Array
+from hsdsl.fitting.data import Measurements
+from hsdsl.fitting.fit import Fit
+from hsdsl.sensitivity.result import Sensitivity
+from hsdsl.simulate.stops import show
+
+Evaluate = Callable[[Mapping[str, float], float], Sensitivity]
+Progress = Callable[[int, Mapping[str, float], float], None]
+SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
+PRECISE = 1e-15  # changes of values and of the sum that end a fit
+TOO_FAR = 1e3  # the weighted residual of a run that ends before a measurement
+UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
+MOST_NAMED = 3
+
+
+@dataclass
+class Objective:
+    """Weighted residuals of runs and their derivatives; the last run is kept.
+
+    ``start`` has the values of the names by which runs are changed, ``weights`` a factor for each column.
+    """
+
+    evaluate: Evaluate
+    measured: Measurements
+    weights: Mapping[str, float]
+    start: Mapping[str, float]
+    progress: Progress | None = None
+    evaluations: int = 0
+    bumps: list[str] = field(default_factory=list[str])
+    _last: tuple[bytes, Array, Array, Sensitivity] | None = None
+
+    def residuals(self, x: Array) -> Array:
+        """The residuals of a run with these values, weighted, one behind the other."""
+        return self._at(x)[1]
+
+    def slopes(self, x: Array) -> Array:
+        """Their derivatives, (number of residuals, number of values)."""
+        return self._at(x)[2]
+
+    def run(self, x: Array) -> Sensitivity:
+        """The run."""
+        return self._at(x)[3]
+
+    def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity]:
+        key = np.asarray(x, float).tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, *self._computed(x))
+            self.evaluations += 1
+            if self.progress is not None:
+                self.progress(self.evaluations, self.named(x), float(np.sum(self._last[1] ** 2)))
+        return self._last
+
+    def named(self, x: Array) -> dict[str, float]:
+        """Values by name."""
+        return dict(zip(self.start, np.asarray(x, float).tolist(), strict=True))
+
+    def _computed(self, x: Array) -> tuple[Array, Array, Sensitivity]:
+        times = self.measured.times
+        found = self.evaluate(self.named(x), float(times.max()))
+        if found.breaks:
+            self.bumps += [reason for _, reason in found.breaks if reason not in self.bumps]
+        reached = times <= float(found.execution.times[-1])
+        table = found.as_made().sample(times[reached]) if reached.any() else None
+        residuals: list[Array] = []
+        slopes: list[Array] = []
+        for name, column in self.measured.columns.items():
+            weight, known = self.weights[name], np.isfinite(column)
+            off, moves = np.full(len(times), TOO_FAR), np.zeros((len(times), len(self.start)))
+            if table is not None and name in table.values:
+                there = np.asarray(table.values[name], float)
+                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), TOO_FAR)
+                moves[reached] = np.nan_to_num(weight * np.asarray(table.slopes[name], float), posinf=0, neginf=0)
+            residuals.append(off[known])
+            slopes.append(moves[known])
+        return np.concatenate(residuals), np.concatenate(slopes), found
+
+
+def fitted(
+    objective: Objective, bounds: Mapping[str, tuple[float, float]], sigma: bool, scales: Mapping[str, float]
+) -> Fit:
+    """Fit; ``sigma`` says that weights are inverse standard deviations.
+
+    Raises UsageError: the run with the first values does not reach the measurements.
+    """
+    first = np.array([*objective.start.values()])
+    _check_start(objective, first)
+    results = [_solved(objective, first, bounds, scales)]
+    begun = first
+    for share in SHARES:
+        begun = _beginning(objective, share, begun, bounds, scales)
+    if not np.array_equal(begun, first):
+        results.append(_solved(objective, begun, bounds, scales))
+    return _fit(objective, min(results, key=lambda result: result.cost), bounds, sigma)
+
+
+def _solved(
+    objective: Objective, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Mapping[str, float]
+) -> Any:
+    lower, upper = np.array([*bounds.values()], float).T
+    solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
+    return solve(
+        objective.residuals,
+        np.clip(first, lower, upper),
+        jac=objective.slopes,
+        bounds=(lower, upper),
+        x_scale=np.array([scales[name] for name in objective.start]),
+        ftol=PRECISE,
+        xtol=PRECISE,
+        gtol=PRECISE,
+    )
+
+
+def _beginning(
+    objective: Objective, share: float, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Any
+) -> Array:
+    """Fit the measurements of the first share of the time: less can go wrong there."""
+    measured = objective.measured
+    early = measured.times <= share * float(measured.times.max())
+    part = Measurements(measured.times[early], {name: column[early] for name, column in measured.columns.items()})
+    if part.count <= len(first):
+        return first
+    return np.asarray(_solved(replace(objective, measured=part, bumps=[], _last=None), first, bounds, scales).x)
+
+
+def _check_start(objective: Objective, first: Array) -> None:
+    run = objective.run(first).execution
+    end = float(objective.measured.times.max())
+    if float(run.times[-1]) < end:
+        raise UsageError(
+            f"the run with the first values ends at t = {show(run.times[-1])} ({run.stop.reason}), before the last "
+            f"measurement at t = {show(end)}",
+            "begin with other values by --set NAME=VALUE",
+        )
+
+
+def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, float]], sigma: bool) -> Fit:
+    x = np.asarray(result.x, float)
+    residuals, slopes, found = objective.residuals(x), objective.slopes(x), objective.run(x)
+    free = max(1, len(residuals) - len(x))
+    variance = float(np.sum(residuals**2)) / free
+    covariance = _covariance(slopes) * (1.0 if sigma else variance)
+    values = objective.named(x)
+    at = tuple(name for name, value in values.items() if value in bounds[name])
+    table = found.as_made().sample(objective.measured.times)
+    measured = objective.measured.columns.items()
+    return Fit(
+        values,
+        covariance,
+        {name: np.asarray(table.values[name], float) - column for name, column in measured},
+        variance**0.5,
+        bool(result.success),
+        str(result.message),
+        objective.evaluations,
+        at,
+        (*_close_transitions(found, objective.measured, covariance), *objective.bumps),
+        objective.measured,
+        found.run,
+    )
+
+
+def _covariance(slopes: Array) -> Array:
+    """The inverse of J^T J; infinite in directions that nothing determines."""
+    norms = np.linalg.norm(slopes, axis=0)
+    scaled = slopes / np.where(norms > 0, norms, 1.0)
+    _, sizes, rows = np.linalg.svd(scaled, full_matrices=False)
+    known = sizes > UNKNOWN * sizes.max(initial=0.0)
+    inverse = (rows[known].T / sizes[known] ** 2) @ rows[known]
+    unknown = np.sum(rows[~known] ** 2, axis=0) > UNKNOWN
+    with np.errstate(divide="ignore", invalid="ignore"):
+        covariance = inverse / np.outer(norms, norms)
+    for k in np.flatnonzero(unknown | (norms == 0)):
+        covariance[k, :] = covariance[:, k] = 0.0
+        covariance[k, k] = np.inf
+    return covariance
+
+
+def _close_transitions(found: Sensitivity, measured: Measurements, covariance: Array) -> Sequence[str]:
+    """The transitions that the uncertainty of the values carries over a measurement."""
+    close: list[str] = []
+    spread = np.where(np.isfinite(covariance), covariance, 0.0)
+    for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
+        slope = np.array([moves.time[by] for by in found.wrt], float)
+        reach = 2 * float(max(0.0, slope @ spread @ slope)) ** 0.5
+        near = measured.times[np.abs(measured.times - made.time) <= reach]
+        if len(near):
+            where = f"t = {show(near[0])}" + (f" and {len(near) - 1} more" if len(near) > 1 else "")
+            close.append(
+                f"{made.edge} at t = {show(made.time)} is within its uncertainty of the measurement at {where}"
+            )
+    more = [f"and {len(close) - MOST_NAMED} more transitions so"] if len(close) > MOST_NAMED else []
+    return [*close[:MOST_NAMED], *more]

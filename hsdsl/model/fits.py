@@ -1,0 +1,107 @@
+"""Fits of a model to measurements: what a call means, from names and data to values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.execution import Array
+from hsdsl.fitting.data import Measurements, measurements
+from hsdsl.fitting.fit import Fit
+from hsdsl.fitting.least_squares import Objective, Progress, fitted
+from hsdsl.model.options import check_arguments, overrides_of
+from hsdsl.model.values import initial_state, with_parameters
+from hsdsl.names import did_you_mean
+from hsdsl.sensitivity.names import Target, targets
+from hsdsl.sensitivity.result import Sensitivity
+
+if TYPE_CHECKING:
+    from hsdsl.model.model import Model
+
+REFUSED = ("step", "scheme", "samples", "precision", "until")
+
+
+def fit(
+    model: Model,
+    data: Any,
+    wrt: str | Sequence[str],
+    sigma: Mapping[str, float] | None,
+    weights: Mapping[str, float] | None,
+    progress: Progress | None,
+    arguments: Mapping[str, Any],
+) -> Fit:
+    """Fit a model; see `Model.fit`."""
+    check_arguments(arguments, "a fit", REFUSED)
+    if sigma and weights:
+        raise UsageError("expected sigma or weights, got both", "a weight is one over a standard deviation")
+    measured = measurements(data, model.columns)
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters"))
+    _, states, x = initial_state(values, overrides_of(arguments, "initial"))
+    by = targets(wrt, model.program, states)
+    if measured.count < len(by):
+        raise UsageError(f"{measured.count} measurements cannot determine {len(by)} values")
+    known = dict(zip(model.program.parameters, values.parameters, strict=True))
+    known |= {f"initial.{name}": value for name, value in zip(states, x, strict=True)}
+    start = {t.label: float(known[t.label]) for t in by}
+    bounds = {t.label: _bounds(values, t) for t in by}
+    objective = Objective(
+        _evaluate(model, by, arguments), measured, _weights(measured, sigma, weights), start, progress
+    )
+    scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
+    return fitted(objective, bounds, bool(sigma), scales)
+
+
+def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
+    labels = [t.label for t in by]
+
+    def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
+        call = dict(arguments) | {"until": until}
+        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        for target in by:
+            (initial if target.initial else parameters)[target.name] = given[target.label]
+        return model.sensitivity(labels, **call | {"parameters": parameters, "initial": initial})
+
+    return evaluate
+
+
+def _bounds(values: Any, target: Target) -> tuple[float, float]:
+    """The bounds that the file gives a parameter."""
+    if target.initial:
+        return -np.inf, np.inf
+    i = values.program.parameters.index(target.name)
+    low, high = (
+        float(values.constant(name)[0]) if values.has(name) else limit
+        for name, limit in ((f"minimum_{i}", -np.inf), (f"maximum_{i}", np.inf))
+    )
+    return low, high
+
+
+def _span(bounds: tuple[float, float]) -> float:
+    span = bounds[1] - bounds[0]
+    return span if np.isfinite(span) and span > 0 else 1.0
+
+
+def _weights(
+    measured: Measurements, sigma: Mapping[str, float] | None, weights: Mapping[str, float] | None
+) -> dict[str, float]:
+    """One over the standard deviation, or the weight that is given, or one over the largest size of the column."""
+    for given in (sigma, weights):
+        for name, value in (given or {}).items():
+            if name not in measured.columns:
+                raise UsageError(f"there are no measurements of '{name}'", did_you_mean(name, measured.columns))
+            if not 0 < value < np.inf:
+                raise UsageError(f"expected a positive number for {name}, got {value}")
+    if sigma and (missing := [name for name in measured.columns if name not in sigma]):
+        raise UsageError(f"there is no standard deviation of {', '.join(missing)}", "give one for every column")
+
+    def weight(name: str, column: Array) -> float:
+        if sigma:
+            return 1 / float(sigma[name])
+        size = float(np.nanmax(np.abs(column)))
+        return float((weights or {}).get(name, 1 / size if size > 0 else 1.0))
+
+    return {name: weight(name, column) for name, column in measured.columns.items()}

@@ -1,0 +1,42 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""Measurements and the run that was fitted to them, a panel for each column."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution
+from hsdsl.plot.style import PALETTE, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+POINTS = 2000
+
+
+def plot_measured(path: str | os.PathLike[str], run: Execution, times: Array, columns: Mapping[str, Array]) -> None:
+    """Draw them to a .png or .svg file; jumps are not joined."""
+
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9, 1 + 2.4 * len(columns)), layout="constrained")
+        axes = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
+        cuts = [float(run.times[0]), *(float(made.time) for made in run.transitions), float(run.times[-1])]
+        for axis, (name, column) in zip(axes, columns.items(), strict=True):
+            for start, end in pairwise(cuts):
+                dense = np.linspace(start, end, max(2, int(POINTS * (end - start) / (cuts[-1] or 1))))[:-1]
+                if len(dense):
+                    axis.plot(dense, run.sample(dense)[name].astype(float), color=PALETTE[0])
+            axis.plot(times, column, ".", color=PALETTE[1], markersize=3)
+            axis.set_ylabel(name, parse_math=False)
+        axes[-1].set_xlabel("time t")
+        return figure
+
+    save(draw, path)

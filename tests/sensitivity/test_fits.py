@@ -1,0 +1,159 @@
+"""Fits: parameters found again from runs of a model, with and without noise."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl import UsageError
+from hsdsl.cli.verbs import obey
+
+OSCILLATOR = "models/oscillator-with-stop-1.yaml"
+TRUE = {"c": 0.9, "a": 0.05}
+BALL = """
+hsdsl: 1
+parameters: {e: {value: 0.7, min: 0.1, max: 1}, g: 9.81}
+modes: {fly: {flow: {h: v, v: -g}, transitions: [{name: bounce, when: h <= 0, to: fly, reset: {v: -e*v}}]}}
+outputs: {energy: v**2/2 + g*h}
+initial: {mode: fly, h: 1, v: 0}
+experiment: {until: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def model() -> Any:
+    return hsdsl.load(OSCILLATOR)
+
+
+@pytest.fixture(scope="module")
+def samples(model: Any) -> dict[str, Any]:
+    """200 samples over three impacts."""
+    times = np.linspace(0, 6, 201)[1:]
+    run = model.simulate(until=6, scheme="located", method="taylor", tolerance=1e-14)
+    assert len(run.transitions) == 3
+    table = run.sample(times)
+    return {"t": times, "x": table["x"], "v": table["v"]}
+
+
+@pytest.mark.parametrize("columns", [["x"], ["v"], ["x", "v"]])
+@pytest.mark.parametrize("first", [{"c": 0.8, "a": 0.07}, {"c": 0.5, "a": 0.3}])
+def test_noiseless(model: Any, samples: dict[str, Any], columns: list[str], first: dict[str, float]) -> None:
+    data = {name: samples[name] for name in ("t", *columns)}
+    found = model.fit(data, "c,a", parameters=first)
+    assert found.success
+    for name, value in TRUE.items():
+        assert abs(found.values[name] - value) < 1e-10
+    assert found.deviation < 1e-10
+
+
+def test_a_csv_file_with_gaps(model: Any, samples: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "data.csv"
+    rows = zip(samples["t"], samples["x"], samples["v"], strict=True)
+    lines = [
+        f"{t!r},{x!r},{'' if k % 3 else repr(v)}" for k, (t, x, v) in enumerate(tuple(map(float, r)) for r in rows)
+    ]
+    path.write_text("\n".join(["t,x,v", *lines]) + "\n")
+    found = model.fit(path, ["c", "initial.v"], parameters={"c": 0.8}, initial={"v": 30})
+    assert abs(found.values["c"] - 0.9) < 1e-10
+    assert abs(found.values["initial.v"] - 31.4) < 1e-8
+    assert np.isnan(found.residuals["v"][1])
+
+
+def inside(model: Any, data: dict[str, Any], noise: np.random.Generator, sigma: dict[str, float] | None) -> bool:
+    """Whether the true values are in the region of 95 % of a fit to noisy samples."""
+    noisy = {"t": data["t"], "x": data["x"] + 0.05 * noise.standard_normal(len(data["t"]))}
+    found = model.fit(noisy, "c,a", sigma=sigma, parameters={"c": 0.88, "a": 0.055})
+    off = np.array([found.values[name] - value for name, value in TRUE.items()])
+    return bool(off @ np.linalg.solve(found.covariance, off) < 5.991)
+
+
+def test_noise(model: Any, samples: dict[str, Any]) -> None:
+    noise = np.random.default_rng(4)
+    assert sum(inside(model, samples, noise, {"x": 0.05}) for _ in range(8)) >= 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [None, {"x": 0.05}])
+def test_covariance_holds(model: Any, samples: dict[str, Any], sigma: dict[str, float] | None) -> None:
+    """Of 100 tries 95 are expected inside, and fewer than 89 with a probability below 1 %."""
+    noise = np.random.default_rng(2026)
+    assert sum(inside(model, samples, noise, sigma) for _ in range(100)) >= 89
+
+
+def test_bounds_of_the_file() -> None:
+    model = hsdsl.loads(BALL)
+    times = np.linspace(0, 1.4, 50)
+    energy = np.where(times < np.sqrt(2 / 9.81), 9.81, 9.81 * 1.2)  # it gains energy, which e <= 1 forbids
+    found = model.fit({"t": times, "energy": energy}, "e")
+    assert found.values["e"] == pytest.approx(1)
+    assert found.at_bound in (("e",), ())
+
+
+def test_what_measurements_do_not_determine() -> None:
+    model = hsdsl.loads(BALL)
+    times = np.linspace(0, 0.4, 20)  # before the first bounce
+    found = model.fit({"t": times, "h": 1 - 9.0 * times**2 / 2}, "e,g")
+    assert found.values["g"] == pytest.approx(9.0)
+    assert np.isinf(found.deviations["e"]) and found.deviations["g"] < 1e-6
+
+
+def test_a_measurement_at_a_transition_is_named() -> None:
+    model = hsdsl.loads(BALL)
+    times = np.array([0.1, 0.2, 0.3, np.sqrt(2 / 9.81), 0.6, 0.7])
+    run = model.simulate().sample(times)
+    found = model.fit({"t": times, "h": run["h"] + 0.01 * np.cos(40 * times)}, "e,g")
+    assert any("bounce" in reason for reason in found.nonsmooth)
+
+
+def test_progress(model: Any, samples: dict[str, Any]) -> None:
+    told: list[float] = []
+    model.fit({"t": samples["t"], "x": samples["x"]}, "c", progress=lambda runs, values, total: told.append(total))
+    assert told and told[-1] < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("t,y\n1,2\n", "no state or output 'y'"),
+        ("x,v\n1,2\n", "expected a column t"),
+        ("t,x\n1,a\n", "column x, row 2, got 'a'"),
+        ("t,x\n1\n", "row 2 has 1 cells"),
+        ("t,x\n-1,2\n", "not negative"),
+        ("t,x\n1,\n", "nothing was measured"),
+        ("", "is empty"),
+        ("t,x\n1,2\n", "cannot determine"),
+    ],
+)
+def test_bad_data(text: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text(text)
+    assert obey(["fit", OSCILLATOR, str(path), "--wrt", "c,a"]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_bad_calls(model: Any, samples: dict[str, Any]) -> None:
+    for wrt, call, sentence in (
+        ("C", {}, "no parameter"),
+        ("c", {"sigma": {"v": 1}}, "no measurements of 'v'"),
+        ("c", {"sigma": {"x": 1}, "weights": {"x": 1}}, "got both"),
+        ("c", {"weights": {"x": -1}}, "positive"),
+        ("c", {"until": 3}, "no argument 'until'"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            model.fit({"t": samples["t"], "x": samples["x"]}, wrt, **call)
+
+
+def test_command(samples: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, picture = tmp_path / "data.csv", tmp_path / "fit.png"
+    rows = zip(samples["t"].tolist(), samples["x"].tolist(), strict=True)
+    path.write_text("t,x\n" + "".join(f"{t!r},{x!r}\n" for t, x in rows))
+    words = ["fit", OSCILLATOR, str(path), "--wrt", "c,a", "--set", "c=0.8", "--json", "--plot", str(picture)]
+    assert obey(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["values"]["c"] == pytest.approx(0.9, abs=1e-10)
+    assert picture.stat().st_size > 1000
