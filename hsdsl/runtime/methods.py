@@ -5,12 +5,12 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from ctypes import c_double, c_int
-from fractions import Fraction
 from functools import cache
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.integrators import ButcherTableau, Method
+from hsdsl.integrators.numbers import Row, table_numbers
 from hsdsl.runtime import structures
 from hsdsl.runtime.structures import address
 
@@ -63,40 +63,26 @@ def _collocation() -> Any:
 
 
 def _butcher_table(table: ButcherTableau) -> Any:
-    """Write a tableau: numbers instead of fractions, rows without their zeros."""
-    stages = table.stages - table.last_is_next
-    end: tuple[Fraction, ...] = ()
-    rows = (*table.a[:stages], end, *table.extra)  # the flow at the step's end is between them
-    dense = tuple(zip(*table.dense, strict=True)) if table.dense else ()
+    """Write a tableau."""
+    numbers = table_numbers(table)
     return structures.Method(
         kind=structures.METHOD_KINDS.index(table.kind),
-        stages=stages,
-        extra=len(table.extra),
+        stages=numbers.stages,
+        extra=numbers.extra,
         order=table.order,
         interpolant=structures.INTERPOLANTS.index(table.interpolant),
         degree=table.degree,
-        c=address((c_double * len(rows))(*(_node(table, row) for row in rows))),
-        a=address((structures.Row * len(rows))(*map(_row, rows))),
-        b=_row(table.b),
-        error=_row(_difference(table.b, table.embedded)),
-        coarse=_row(_difference(table.b, table.coarse)),
-        dense=address((structures.Row * max(1, len(dense)))(*map(_row, dense))),
+        c=address((c_double * len(numbers.nodes))(*numbers.nodes)),
+        a=address((structures.Row * len(numbers.a))(*map(_row, numbers.a))),
+        b=_row(numbers.b),
+        error=_row(numbers.error),
+        coarse=_row(numbers.coarse),
+        dense=address((structures.Row * max(1, len(numbers.dense)))(*map(_row, numbers.dense))),
         gain=float(sum(map(abs, table.b))),
     )
 
 
-def _node(table: ButcherTableau, row: Sequence[Fraction]) -> float:
-    node = sum(row, Fraction(0))
-    at_end = abs(node - 1) <= (0 if table.digits is None else Fraction(1, 10**table.digits))
-    return 1.0 if at_end else FLOAT64.constant(node)
-
-
-def _difference(b: Sequence[Fraction], other: Sequence[Fraction] | None) -> Sequence[Fraction]:
-    return () if other is None else [v - w for v, w in zip(b, other, strict=True)]
-
-
-def _row(weights: Sequence[Fraction]) -> Any:
-    terms = [(i, FLOAT64.constant(w)) for i, w in enumerate(weights) if w]
+def _row(terms: Row) -> Any:
     count = max(1, len(terms))
-    stages, numbers = (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms))
-    return structures.Row(len(terms), address(stages), address(numbers))
+    stages, weights = (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms))
+    return structures.Row(len(terms), address(stages), address(weights))
