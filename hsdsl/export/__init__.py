@@ -22,6 +22,7 @@ __all__ = ["TARGETS", "check_folder", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
+    "jax": "a module for JAX, whose simulators vectorise and differentiate",
     "latex": "the model as mathematics, a LaTeX document",
     "mermaid": "the mode graph as a Mermaid diagram",
     "web": "one HTML page that runs the model in a browser",

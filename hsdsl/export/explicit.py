@@ -1,0 +1,29 @@
+"""What a target with tables of explicit methods runs: the table, and the settings it is run with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hsdsl.errors import UsageError
+from hsdsl.export.source import Source
+from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
+
+
+def explicit(source: Source, target: str, scheme: str | None = None) -> tuple[Source, ButcherTableau]:
+    """The source with an explicit method, and its table: where `auto` is Taylor's method, `AUTO` in its place.
+
+    ``scheme`` is the target's own. Raises UsageError: the target cannot keep the scheme or the method.
+    """
+    settings = source.problem.settings
+    method = settings.method
+    if method is None:
+        raise UsageError(f"{target} has no scheme '{settings.scheme}'", "--scheme relaxed or --scheme located")
+    known = ", ".join(INTEGRATORS)
+    if method.implicit:
+        why = "the model is stiff: an explicit one takes many small steps, if you want it"
+        raise UsageError(f"{target} has explicit methods ({known}), not {method.name}", f"{why} with --method {AUTO}")
+    if method.kind != "table" and settings.method_chosen is None:
+        raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {AUTO}")
+    table = method if method.kind == "table" else INTEGRATORS[AUTO]
+    settings = replace(settings, method=table, scheme=scheme or settings.scheme)
+    return replace(source, problem=source.problem.with_settings(settings)), table

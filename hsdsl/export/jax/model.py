@@ -1,0 +1,111 @@
+"""The part of an exported module that a model makes: its routines, tables and settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hsdsl.backends.c.source import width
+from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
+from hsdsl.export.jax.language import function
+from hsdsl.export.jax.values import values_text
+from hsdsl.export.routines import data_names, definitions
+from hsdsl.export.source import Source
+from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators.numbers import table_numbers
+from hsdsl.program import ModeProgram, Program
+
+
+def model_text(source: Source, table: ButcherTableau) -> str:
+    """All of it."""
+    program = source.problem.program
+    fixed = fixed_parameters(program)
+    parts = [
+        "# " + "-" * 70 + "\n# The model\n# " + "-" * 70 + "\n",
+        *_functions(program),
+        *values_text(source),
+        timeline_text(source),
+        _tables(program),
+        _method(table),
+        _experiment(source, table, fixed),
+    ]
+    return "\n\n".join(parts)
+
+
+def _functions(program: Program) -> Iterable[str]:
+    data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
+    for j, mode in enumerate(program.modes):
+        for name, definition in definitions(mode.routines).items():
+            spread = ", s" if name.startswith("spread") else ""
+            yield function(f"mode_{j}_{name}", definition, data, f"p, t, x{spread}")
+
+
+def _tables(program: Program) -> str:
+    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in program.modes))
+    wide = max(1, width(program))
+    states = program.all_states
+    lines = [f"SIZES = {wide}, {surfaces}, {len(program.outputs)}", f"STATES = {_strings(states)}"]
+    modes, edges = list[str](), list[str]()
+    for j, mode in enumerate(program.modes):
+        modes.append(_mode(j, mode, states, len(edges)))
+        for k, edge in enumerate(mode.edges):
+            target = tuple(map(states.index, edge.target_states))
+            edges.append(
+                f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
+                f"SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}),"
+            )
+    lines += ["MODES = (", *modes, ")", "EDGES = (", *edges, ")"]
+    return "\n".join(lines) + "\n"
+
+
+def _mode(j: int, mode: ModeProgram, states: tuple[str, ...], first: int) -> str:
+    surfaces = range(len(mode.edges) + len(mode.walls))
+    conditions = [[name for name in mode.routines.names if name.startswith(f"condition_{k}_")] for k in
+                  range(len(mode.edges))]  # fmt: skip
+    listed = [_names(j, [f"{kind}_{k}" for k in surfaces]) for kind in ("gradient", "rate")]
+    parts = "".join(f"{_names(j, names)}, " for names in conditions)
+    edges = tuple(range(first, first + len(mode.edges)))
+    return (
+        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {edges}, SIZES,\n"
+        f"            mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
+        f"            ({parts}), mode_{j}_outputs),"
+    )
+
+
+def _names(j: int, names: Iterable[str]) -> str:
+    return f"({''.join(f'mode_{j}_{name}, ' for name in names).rstrip()})"
+
+
+def _strings(texts: Iterable[str]) -> str:
+    return f"({''.join(f'{text!a}, ' for text in texts).rstrip()})"
+
+
+def _method(table: ButcherTableau) -> str:
+    numbers = table_numbers(table)
+    fields = {
+        "name": ascii(table.name), "order": table.order, "stages": numbers.stages, "extra": numbers.extra,
+        "interpolant": ascii(table.interpolant), "nodes": numbers.nodes, "a": numbers.a, "b": numbers.b,
+        "error": numbers.error, "coarse": numbers.coarse, "dense": numbers.dense,
+    }  # fmt: skip
+    return "METHOD = Method(\n" + "".join(f"    {name}={value},\n" for name, value in fields.items()) + ")\n"
+
+
+def _experiment(source: Source, table: ButcherTableau, fixed: dict[str, str]) -> str:
+    problem, program, settings = source.problem, source.problem.program, source.problem.settings
+    largest = 0.1 * settings.until
+    step = largest / 100 if settings.step is None else settings.step
+    scale = tuple(float(settings.scale.get(name, 0.0)) for name in program.all_states) or (0.0,)
+    fields = {
+        "scheme": ascii(settings.scheme), "step": step, "tolerance": settings.tolerance,
+        "relaxation": settings.relaxation, "until": settings.until, "max_transitions": settings.max_transitions,
+        "order": table.error_order, "scale": scale,
+    }  # fmt: skip
+    lines = [
+        f"MODEL = Model(MODES, EDGES, STATES, SIZES[0], {_strings(program.outputs)}, METHOD, timeline)",
+        "CONFIG = Config(", *(f"    {name}={value}," for name, value in fields.items()), ")",
+        f"FIXED = {{{', '.join(f'{name!a}: {why!a}' for name, why in fixed.items())}}}",
+        f"EXPERIMENT = Experiment(MODEL, CONFIG, {_strings(program.parameters)}, FIXED, parameter_values, "
+        f"initial_state, {problem.mode})",
+        "parameters, initial, simulate = EXPERIMENT.parameters, EXPERIMENT.initial, EXPERIMENT.simulate",
+        "", 'if __name__ == "__main__":', "    EXPERIMENT.show()", "",
+    ]  # fmt: skip
+    return "\n".join(lines)

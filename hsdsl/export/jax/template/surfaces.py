@@ -1,0 +1,98 @@
+# pyright: basic
+"""Surfaces along a step, and which of several crossings goes."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from .functions import INF
+from .lane import TIE
+from .steps import at
+
+SCAN = 8  # parts in which a step is searched
+UNIT = 2.0**-53
+
+
+def along(bound, mode, t, h, x, piece, shares):
+    """Values of all surfaces at some shares of a step (rows)."""
+    return jax.vmap(lambda s: bound.surfaces(mode, t + s * h, at(x, piece, s)))(shares)
+
+
+def each_at(bound, mode, t, h, x, piece, shares):
+    """The value of each surface at a share of its own."""
+    return jnp.diagonal(along(bound, mode, t, h, x, piece, shares))
+
+
+def ties(config, t):
+    """Times closer than this are the same instant."""
+    return TIE * jnp.maximum(config.until, jnp.abs(t))
+
+
+def standing(model, bound, lane, t, x, since):
+    """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true."""
+    mode = lane.mode
+    r = bound.surfaces(mode, t, x)
+    rate = jnp.where(lane.resting < 0, bound.rates(mode, t, x), bound.gradients(mode, t, x)[:, 0])
+    noise = bound.noise(mode, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
+    near = jnp.abs(r) <= jnp.maximum(noise, rate * since)
+    own = model.of(model.is_edge, mode) & (jnp.arange(model.M) != lane.resting)
+    return near & (rate > 0) & bound.conditions(mode, t, x) & own
+
+
+def choose(model, config, bound, lane, found, times, states):
+    """Choose which crossing goes: the number of the first one, that of the edge, and whether others are tied.
+
+    The earliest goes; of tied ones, and of those whose guard its point is on, the highest priority, then the first.
+    """
+    first = jnp.argmin(jnp.where(found, times, INF))
+    since = ties(config, times[first])
+    tied = found & (times - times[first] <= since)
+    tied = tied | standing(model, bound, lane, times[first], states[first], since)
+    priority = model.of(model.priority, lane.mode)
+    edge = jnp.argmax(jnp.where(tied, priority, jnp.iinfo(jnp.int32).min))
+    return first, edge, tied.sum() > 1
+
+
+def closed(value, low, high, small, wanted):
+    """Close brackets (share, value) with a value <= 0 below and > 0 above, where ``wanted``: shares of the roots.
+
+    By the Illinois variant of regula falsi, until a value is below ``small`` or a bracket a few units wide.
+    """
+    (a, fa), (b, fb) = low, high
+    zero = jnp.zeros(small.shape, jnp.int32)
+
+    def is_open(state):
+        a, b, fa, fb, *_, turn = state
+        return wanted & ~((-fa <= small) | (b - a <= 4 * UNIT) | (fb <= small)) & (turn < 200)
+
+    def close(state):
+        a, b, fa, fb, wa, wb, side, turn = state
+        going = is_open(state)
+        s = a - wa * (b - a) / jnp.where(wb == wa, 1.0, wb - wa)
+        s = jnp.where((a < s) & (s < b), s, (a + b) / 2)
+        f = value(s)
+        low, high = going & (f <= 0), going & ~(f <= 0)
+        wb = jnp.where(low & (side < 0), wb / 2, jnp.where(high, f, wb))
+        wa = jnp.where(high & (side > 0), wa / 2, jnp.where(low, f, wa))
+        a, fa, b, fb = jnp.where(low, s, a), jnp.where(low, f, fa), jnp.where(high, s, b), jnp.where(high, f, fb)
+        return a, b, fa, fb, wa, wb, jnp.where(low, -1, jnp.where(high, 1, side)), turn + 1
+
+    state = a, b, fa, fb, fa, fb, zero, zero
+    a, b, fa, fb, *_ = lax.while_loop(lambda s: is_open(s).any(), close, state)
+    return jnp.where((-fa <= small) | (b - a <= 4 * UNIT) | ~(fb <= small), a, b)
+
+
+def last_up_crossing(value, small, wanted):
+    """For each function the last share where it rises through zero, being positive at 1; not-a-number if it never does.
+
+    ``value`` takes a share for each function.
+    """
+    count = small.shape[0]
+    ends = jax.vmap(lambda s: value(jnp.full(count, s)))(jnp.arange(SCAN + 1) / SCAN)
+    below = ends[:-1] <= 0
+    last = SCAN - 1 - jnp.argmax(below[::-1], axis=0)
+    rises, column = below.any(axis=0) & wanted, jnp.arange(count)
+    low, high = (last / SCAN, ends[last, column]), ((last + 1) / SCAN, ends[last + 1, column])
+    return jnp.where(rises, closed(value, low, high, small, rises), jnp.nan)
