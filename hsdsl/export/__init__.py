@@ -25,6 +25,7 @@ TARGETS = {
     "jax": "a module for JAX, whose simulators vectorise and differentiate",
     "latex": "the model as mathematics, a LaTeX document",
     "mermaid": "the mode graph as a Mermaid diagram",
+    "rust": "a crate for Rust without its standard library",
     "web": "one HTML page that runs the model in a browser",
 }
 

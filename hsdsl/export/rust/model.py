@@ -1,0 +1,179 @@
+"""The generated module of a crate: sizes, routines, tables, inputs and settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hsdsl.backends.c.source import width
+from hsdsl.export.routines import data_names, definitions, parameters_in
+from hsdsl.export.rust.language import array, function, literal, numbers, string
+from hsdsl.export.source import Source
+from hsdsl.integrators import ButcherTableau
+from hsdsl.integrators.numbers import Row, table_numbers
+from hsdsl.program import ModeProgram, Program
+from hsdsl.simulate.control import LARGEST_SHARE
+
+_HEAD = """\
+#![allow(unused_imports, unused_mut, unused_parens, unused_variables, clippy::all)]
+
+use crate::kernel::{Edge, Interpolant, Method, Mode, Routine, Segment, Settings};
+use crate::math::*;
+"""
+
+
+def model_text(source: Source, table: ButcherTableau) -> str:
+    """The text of ``model.rs``."""
+    program = source.problem.program
+    heading = "".join(f"// {line}\n" for line in source.heading)
+    parts = [heading + _HEAD, _sizes(program, table), *_functions(program), _modes(program), _method(table)]
+    return "\n".join([*parts, _segments(source), _values(source), _settings(source)])
+
+
+def _sizes(program: Program, table: ButcherTableau) -> str:
+    found = table_numbers(table)
+    sizes = {
+        "W": (width(program), "states of the largest mode"),
+        "M": (max(len(mode.edges) + len(mode.walls) for mode in program.modes), "surfaces of the mode with most"),
+        "E": (max(len(mode.edges) for mode in program.modes), "edges of the mode with most"),
+        "P": (len(program.parameters), "parameters"),
+        "D": (3 * len(program.inputs) + len(program.switches), "numbers of a segment of inputs"),
+        "STATES": (len(program.all_states), "states of all modes"),
+        "OUTPUTS": (len(program.outputs), "outputs"),
+        "STAGES": (found.stages + 1 + found.extra, "stages of a step"),
+        "DEGREE": (max(3, table.degree), "of the interpolants of steps"),
+    }
+    return "".join(f"/// {why}\npub const {name}: usize = {size};\n" for name, (size, why) in sizes.items())
+
+
+def _functions(program: Program) -> Iterable[str]:
+    data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
+    for j, mode in enumerate(program.modes):
+        for name, definition in definitions(mode.routines).items():
+            yield function(f"mode_{j}_{name}", definition, data)
+
+
+def _modes(program: Program) -> str:
+    rows = "".join(_mode(j, mode, program.all_states) for j, mode in enumerate(program.modes))
+    lists = {"PARAMETERS": program.parameters, "STATE_NAMES": program.all_states, "OUTPUT_NAMES": program.outputs}
+    texts = [f"pub static {name}: &[&str] = &{array(map(string, texts))};\n" for name, texts in lists.items()]
+    return f"pub static MODES: [Mode; {len(program.modes)}] = [\n{rows}];\n" + "".join(texts)
+
+
+def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
+    surfaces = range(len(mode.edges) + len(mode.walls))
+    edges = "".join(_edge(j, k, mode) for k in range(len(mode.edges)))
+    plain = ("flow", "surfaces", "magnitudes", "outputs")
+    flow, values, magnitudes, outputs = (f"mode_{j}_{name}" for name in plain)
+    gradients, rates = (array(f"mode_{j}_{kind}_{k}" for k in surfaces) for kind in ("gradient", "rate"))
+    places = array(str(states.index(name)) for name in mode.states)
+    return (
+        f"    Mode {{\n        name: {string(mode.name)},\n        dimension: {len(mode.states)},\n"
+        f"        edges: &[{edges}],\n        surfaces: {len(surfaces)},\n        is_final: {_truth(mode.final)},\n"
+        f"        flow: {flow},\n        values: {values},\n        magnitudes: {magnitudes},\n"
+        f"        outputs: {outputs},\n        gradients: &{gradients},\n        rates: &{rates},\n"
+        f"        jumps: {_truth(mode.jumps)},\n        states: &{places},\n    }},\n"
+    )
+
+
+def _edge(j: int, k: int, mode: ModeProgram) -> str:
+    edge = mode.edges[k]
+    parts = array(f"mode_{j}_{name}" for name in mode.routines.names if name.startswith(f"condition_{k}_"))
+    return (
+        f"Edge {{\n            name: {string(edge.name)},\n            target: {edge.target},\n"
+        f"            dimension: {len(edge.target_states)},\n            conditional: {_truth(edge.conditional)},\n"
+        f"            priority: {edge.priority},\n            condition: &{parts},\n"
+        f"            reset: mode_{j}_reset_{k},\n            spread: mode_{j}_spread_{k},\n        }}, "
+    )
+
+
+def _truth(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _method(table: ButcherTableau) -> str:
+    found = table_numbers(table)
+    lists = {"a": found.a, "dense": found.dense}
+    rows = {name: f"&{_row(getattr(found, name))}" for name in ("b", "error", "coarse")}
+    rows |= {name: f"&{array(f'&{_row(row)}' for row in each)}" for name, each in lists.items()}
+    fields = {
+        "stages": str(found.stages), "extra": str(found.extra), "order": str(table.error_order),
+        "interpolant": f"Interpolant::{table.interpolant.title()}", "nodes": f"&{numbers(found.nodes)}", **rows,
+    }  # fmt: skip
+    lines = "".join(f"    {name}: {value},\n" for name, value in fields.items())
+    return f"/// {table.name}\npub static METHOD: Method = Method {{\n{lines}}};\n"
+
+
+def _row(row: Row) -> str:
+    return array(f"({stage}, {literal(weight)})" for stage, weight in row)
+
+
+def _segments(source: Source) -> str:
+    segments, count = source.problem.timeline.segments, len(source.problem.program.parameters)
+    rows = "".join(
+        f"    Segment {{ start: {literal(s.start)}, end: {literal(s.end)}, jump: {_truth(s.jump)}, "
+        f"data: {numbers(s.data[count:])} }},\n"
+        for s in segments
+    )
+    return f"pub static SEGMENTS: [Segment; {len(segments)}] = [\n{rows}];\n"
+
+
+def fixed_parameters(program: Program) -> list[str]:
+    """Parameters that the segments of inputs depend on: the segments are those of the export."""
+    routines = definitions(program.constants)
+    sampled = [routines[f"input_{i}"] for i, given in enumerate(program.inputs) if given.times is None]
+    found = parameters_in(*definitions(program.switching).values(), *sampled)
+    for i in range(len(program.parameters) - 1, -1, -1):
+        if i in found:
+            found |= parameters_in(routines[f"parameter_{i}"])
+    return [program.parameters[i] for i in sorted(found)]
+
+
+def _values(source: Source) -> str:
+    """Functions for parameters, those that follow others, and the initial state."""
+    problem, program = source.problem, source.problem.program
+    count = len(program.parameters)
+    routines, constant = definitions(program.constants), problem.kernel.constant
+    data = {f"p{i}": f"p[{i}]" for i in range(count)}
+    given = problem.timeline.segments[0].data[:count]
+    texts, follow = list[str](), list[str]()
+    for i, value in enumerate(given):
+        name = f"parameter_{i}"
+        if parameters_in(routines[name]) and constant(name, given)[0] == value:
+            texts.append(function(name, routines[name], data))
+            follow.append(f"    let mut value = [0.0];\n    {name}(p, 0.0, &[], &mut value);\n    p[{i}] = value[0];\n")
+    x = [literal(float(value)) for value in problem.x]
+    start = ""
+    file = problem.mode == program.initial_mode and problem.states == program.initial_states
+    if file and parameters_in(routines["initial"]):
+        texts.append(function("initial_values", routines["initial"], data))
+        start = f"    let mut found = [0.0; {len(x)}];\n    initial_values(p, 0.0, &[], &mut found);\n"
+        known = constant("initial", given)
+        x = [f"found[{i}]" if a == b else n for i, (a, b, n) in enumerate(zip(known, problem.x, x, strict=True))]
+    x += ["0.0"] * (width(program) - len(x))
+    return (
+        "".join(texts)
+        + "/// The values of the parameters.\n"
+        + f"pub fn parameters() -> [f64; P] {{\n    {numbers(given)}\n}}\n"
+        + "/// Compute the parameters that depend on others again.\n"
+        + f"pub fn follow(p: &mut [f64; P]) {{\n{''.join(follow)}}}\n"
+        + "/// The initial state.\n"
+        + f"pub fn initial(p: &[f64; P]) -> [f64; W] {{\n{start}    {array(x)}\n}}\n"
+        + f"/// The number of the initial mode.\npub const START: usize = {problem.mode};\n"
+    )
+
+
+def _settings(source: Source) -> str:
+    program, settings = source.problem.program, source.problem.settings
+    largest = settings.step if settings.step is not None else settings.until * LARGEST_SHARE
+    step = settings.step if settings.step is not None else largest / 100
+    scales = numbers(float(settings.scale.get(name, 0.0)) for name in program.all_states)
+    fields = {
+        "step": literal(float(step)), "tolerance": literal(float(settings.tolerance or 0.0)),
+        "largest": literal(float(largest)), "relaxation": literal(float(settings.relaxation)),
+        "until": literal(float(settings.until)), "max_transitions": str(settings.max_transitions),
+    }  # fmt: skip
+    lines = "".join(f"    {name}: {value},\n" for name, value in fields.items())
+    return (
+        f"pub const SETTINGS: Settings = Settings {{\n{lines}}};\n"
+        f"/// Sizes of states, 0 where none is known.\npub const SCALES: [f64; STATES] = {scales};\n"
+    )

@@ -1,0 +1,106 @@
+"""Crates for Rust: their own test passes, and every digit of every transition is that of a run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import pytest
+
+import hsdsl
+from hsdsl.cli.verbs import obey
+from hsdsl.export import files_of, source_of, write
+
+ROOT = Path(__file__).parents[2]
+MODELS = ROOT / "models"
+CASES = ROOT / "tests" / "conformance" / "cases"
+needs_cargo = [pytest.mark.tools, pytest.mark.skipif(which("cargo") is None, reason="there is no cargo")]
+SETTINGS: list[tuple[str, dict[str, Any]]] = [
+    *((path.stem, {}) for path in sorted(MODELS.glob("*.yaml")) if path.stem != "stiff-switch"),
+    ("stiff-switch", {"method": "dopri5", "until": 0.001}),
+    ("pronking-runner", {"method": "rk4", "step": 1e-3}),
+    ("thermostat", {"method": "dop853", "tolerance": 1e-7}),
+]
+MEANING = [path.stem for path in sorted(CASES.glob("*.yaml")) if not path.stem.endswith(".expect")]
+HOSTILE = """
+hsdsl: 1
+title: "*/ \\" \\\\ } é"
+parameters: {T: 1/2, b: 2*T}
+inputs: {u: {times: [0, T, 2], values: [0, 1, b], hold: zero}}
+modes:
+  fn: {flow: {x: 1 + u}, transitions: [{name: "a\\" \\\\ {}", when: x >= b, to: fn, reset: {x: 0}}]}
+initial: {mode: fn, x: b/8}
+experiment: {until: 4}
+"""
+
+
+def hostile(path: Path) -> Path:
+    path.write_text(HOSTILE, encoding="utf-8")
+    return path
+
+
+def cargo(crate: Path, *words: str) -> str:
+    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings"}
+    made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr
+    return made.stdout
+
+
+def assert_same(model: Any, crate: Path, **settings: Any) -> None:
+    write(files_of(source_of(model, settings), "rust"), crate)
+    lines = [line.split(" ") for line in cargo(crate, "run", "-q", "--example", "transitions").splitlines()]
+    run = model.simulate(**{**settings, **chosen(model, settings), "scheme": "relaxed"})
+    assert len(lines) == len(run.transitions) + 1
+    for (_, time, resumed, *_), made in zip(lines, run.transitions, strict=False):
+        assert float(time) == made.time
+        assert resumed == "NaN" if made.resumed is None else float(resumed) == made.resumed
+    assert lines[-1][0] == "".join(word.title() for word in run.stop.reason.split("_"))
+    assert float(lines[-1][1]) == run.stop.time
+
+
+def chosen(model: Any, settings: Any) -> dict[str, str]:
+    """The method in the place of Taylor's, which `auto` may be."""
+    method = source_of(model, settings).problem.settings.method
+    assert method is not None
+    return {"method": "dopri5"} if method.kind == "taylor" else {}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"), [pytest.param(*s, marks=needs_cargo, id=f"{s[0]}-{i}") for i, s in enumerate(SETTINGS)]
+)
+def test_the_crates_own_test(name: str, settings: Any, tmp_path: Path) -> None:
+    model = hsdsl.load(MODELS / f"{name}.yaml")
+    assert_same(model, tmp_path, **settings)
+    assert "1 passed" in cargo(tmp_path, "test", "-q")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", ({"method": "rk4", "step": 0.017, "relaxation": 3e-4}, {"method": "dopri5"}))
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_cargo) for name in MEANING])
+def test_the_meaning(name: str, settings: Any, tmp_path: Path) -> None:
+    assert_same(hsdsl.load(CASES / f"{name}.yaml"), tmp_path, **settings)
+
+
+@pytest.mark.tools
+@pytest.mark.skipif(which("cargo") is None, reason="there is no cargo")
+def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
+    crate = tmp_path / "crate"
+    assert_same(hsdsl.load(hostile(tmp_path / "core.yaml")), crate, method="rk4", step=1e-2)
+    assert 'name = "core_"' in (crate / "Cargo.toml").read_text()
+
+
+def test_generated_text() -> None:
+    files = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "rust")
+    lines = files["src/model.rs"].decode().splitlines(keepends=True)
+    golden = Path(__file__).parent / "golden" / "thermostat.rust.txt"
+    assert "".join(line for line in lines if not line.startswith("// ")) == golden.read_text()
+
+
+def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert obey(["export", str(MODELS / "stiff-switch.yaml"), "--to", "rust", "--out", str(out)]) == 2
+    assert "--method dopri5" in capsys.readouterr().err
+    assert not out.exists()
