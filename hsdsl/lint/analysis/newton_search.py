@@ -92,7 +92,8 @@ class NewtonSearch:
     def _hold(self, values: Array, made_of: Array) -> Array:
         equal, strict = _kinds(self.relations)
         near = np.where(equal, np.abs(values), values) <= _TIGHT * np.minimum(made_of, 1e6)
-        return np.where(strict, values < -_ROOM * made_of, near).all(axis=0)
+        good: Any = np.where(strict, values < -_ROOM * made_of, near)
+        return good.all(axis=0)
 
     def _moved(self, points: Array) -> Array:
         values = self.program.at(points)
@@ -156,8 +157,8 @@ def excluded(
 def _possible(program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
     bounds = program.over(low, high)
     equal, strict = _kinds(relations)
-    below: Array = np.where(strict, bounds.low < 0, bounds.low <= 0)
-    return (below & (~equal | (bounds.high >= 0))).all(axis=0)
+    possible: Any = np.where(strict, bounds.low < 0, bounds.low <= 0) & (~equal | (bounds.high >= 0))
+    return possible.all(axis=0)
 
 
 def _kinds(relations: tuple[Relation, ...]) -> tuple[Array, Array]:
