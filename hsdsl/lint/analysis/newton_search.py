@@ -157,8 +157,9 @@ def excluded(
 def _possible(program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
     bounds = program.over(low, high)
     equal, strict = _kinds(relations)
-    possible: Any = np.where(strict, bounds.low < 0, bounds.low <= 0) & (~equal | (bounds.high >= 0))
-    return possible.all(axis=0)
+    below, above = np.asarray(bounds.low), np.asarray(bounds.high)
+    possible = np.where(strict, below < 0, below <= 0) & (~equal | (above >= 0))
+    return np.logical_and.reduce(possible)
 
 
 def _kinds(relations: tuple[Relation, ...]) -> tuple[Array, Array]:
