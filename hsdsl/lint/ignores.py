@@ -11,7 +11,7 @@ from hsdsl.errors import Diagnostic, Span
 from hsdsl.lint.rules import RULES
 from hsdsl.lint.subject import Subject
 from hsdsl.names import shown
-from hsdsl.source import Mapping, Node, Scalar, Text
+from hsdsl.source import Node, Scalar, Text, children
 
 UNUSED, UNKNOWN = "HS490", "HS491"
 _LISTED = "codes are HS and three digits; every finding has its own"
@@ -87,18 +87,11 @@ def _begins_comment(line: str, column: int) -> bool:
 
 def _scalars(root: Node) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Beginnings and ends, in order, of all scalars that contain the sign of a comment."""
-    found: set[tuple[tuple[int, int], tuple[int, int]]] = set()
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, Scalar):
-            if "#" in node.value:
-                found.add((node.place.start[1:], node.place.end[1:]))
-        elif isinstance(node, Mapping):
-            waiting.extend(value for _, value in node)
-        else:
-            waiting.extend(node.items)
-    return sorted(found)
+    nodes = [root]
+    for node in nodes:
+        nodes += children(node)
+    texts = (node for node in nodes if isinstance(node, Scalar) and "#" in node.value)
+    return sorted({(node.place.start[1:], node.place.end[1:]) for node in texts})
 
 
 def _inside(scalars: list[tuple[tuple[int, int], tuple[int, int]]], line: int, column: int) -> bool:

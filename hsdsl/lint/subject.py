@@ -19,7 +19,7 @@ from hsdsl.lint.dependencies import Definition, Influence, closure, influence, u
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
 from hsdsl.lint.source_expressions import SourceExpression, written
 from hsdsl.lint.units.model import Units
-from hsdsl.source import Key, Mapping, Node, Scalar, Sequence
+from hsdsl.source import Key, Node, Scalar, descend
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 
@@ -43,6 +43,13 @@ class ModePart:
     edges: tuple[EdgePart, ...]
 
 
+def _edges(mode: Mode, key: str, document: schema.ModeDocument) -> tuple[EdgePart, ...]:
+    pairs = zip(mode.edges, document.transitions, strict=True)
+    return tuple(
+        EdgePart(edge, written, i, ("modes", str(key), "transitions", i)) for i, (edge, written) in enumerate(pairs)
+    )
+
+
 class Subject:
     """A model to look at: its mathematics, its keys and scalars with their places, and the nodes of the file.
 
@@ -59,13 +66,8 @@ class Subject:
     @cached_property
     def modes(self) -> tuple[ModePart, ...]:
         """Every mode, in file order."""
-        found: list[ModePart] = []
-        for mode, (key, document) in zip(self.system.modes, self.document.modes.items(), strict=True):
-            pairs = zip(mode.edges, document.transitions, strict=True)
-            path = ("modes", str(key), "transitions")
-            edges = tuple(EdgePart(edge, written, i, (*path, i)) for i, (edge, written) in enumerate(pairs))
-            found.append(ModePart(mode, document, key, edges))
-        return tuple(found)
+        pairs = zip(self.system.modes, self.document.modes.items(), strict=True)
+        return tuple(ModePart(mode, document, key, _edges(mode, key, document)) for mode, (key, document) in pairs)
 
     @property
     def edges(self) -> Iterator[tuple[ModePart, EdgePart]]:
@@ -175,12 +177,4 @@ class Subject:
 
     def node(self, *path: str | int) -> Node | None:
         """The node that keys and indices lead to, such as ``node("modes", "free", "transitions", 0)``."""
-        node: Node | None = self.root
-        for step in path:
-            if isinstance(node, Mapping) and step in node.entries:
-                node = node.entries[str(step)][1]
-            elif isinstance(node, Sequence) and isinstance(step, int) and step < len(node.items):
-                node = node.items[step]
-            else:
-                return None
-        return node
+        return descend(self.root, path)

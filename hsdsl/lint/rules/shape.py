@@ -12,7 +12,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.lint.edits import without_entry
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import EdgePart, Subject
-from hsdsl.source import Mapping, Node, Scalar
+from hsdsl.source import Mapping, Node, Scalar, children, is_empty
 
 _SECTIONS = ("parameters", "inputs", "let", "outputs", "units", "reference")
 _SECTIONS_OF_A_MODE = ("let", "domain", "outputs", "transitions")
@@ -116,15 +116,9 @@ def empty_section(subject: Subject) -> Iterator[Finding]:
 
 def _empty(mapping: Node | None, keys: tuple[str, ...]) -> Iterator[Finding]:
     for key, value in mapping if isinstance(mapping, Mapping) else ():
-        if key in keys and _has_nothing(value):
+        if key in keys and (is_empty(value) or not (isinstance(value, Scalar) or any(children(value)))):
             fix = without_entry(mapping, str(key))
             yield Finding(key.place.span, f"`{key}` is empty", "leave it out", fix=fix)
-
-
-def _has_nothing(value: Node) -> bool:
-    if isinstance(value, Scalar):
-        return value.kind == "null"
-    return not (value.entries if isinstance(value, Mapping) else value.items)
 
 
 def idle_priority(subject: Subject) -> Iterator[Finding]:
