@@ -49,7 +49,7 @@ function frame(canvas, across, up, {title = "", bottom = true, left = 58} = {}) 
   context.lineWidth = 1;
   context.textAlign = "right";
   context.textBaseline = "middle";
-  for (const [value, text] of ticks(up, Math.max(3, (box.bottom - box.top) / 34))) {
+  for (const [value, text] of ticks(up, Math.max(4, (box.bottom - box.top) / 34))) {
     context.beginPath(); context.moveTo(box.left, y(value)); context.lineTo(box.right, y(value)); context.stroke();
     context.fillText(text, box.left - 5, y(value));
   }

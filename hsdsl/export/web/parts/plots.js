@@ -99,7 +99,8 @@ function buildPlots(redraw, point) {
     panels.set(name, canvas);
   }
   const names = ["t", ...model.columns];
-  for (const [select, chosen] of [[$("across"), names[1] ?? "t"], [$("up"), names[2] ?? names[1] ?? "t"]]) {
+  const [first = "t", second] = model.columns;
+  for (const [select, chosen] of [[$("across"), second ? first : "t"], [$("up"), second ?? first]]) {
     select.append(...names.map((name) => element("option", {value: name, textContent: name, selected: name === chosen})));
     select.addEventListener("change", redraw);
   }
