@@ -113,7 +113,7 @@ def numbers(driver: Any) -> dict[str, Any]:
       const by = (list, x) => Object.fromEntries(list.map((name, k) => [name, x[k]]));
       const last = run.times.length - 1;
       return JSON.stringify({
-        stop: model.reasons[run.reason], time: run.time, end: run.times[last], parameters: run.parameters,
+        time: run.time, end: run.times[last], parameters: run.parameters,
         final: Object.fromEntries(model.columns.map((name, k) => [name, run.columns[k][last]])),
         transitions: run.transitions.map((made) => ({time: made.time, edge: edgeOf(made.mode, made.edge),
           resumed: made.resumed, before: by(names(made.mode), made.before),

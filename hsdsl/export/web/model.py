@@ -47,6 +47,7 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
         "layouts": {name: _layout(getattr(structures, name.upper())) for name in ("arc", "transition", "note")},
         "reasons": structures.REASONS,
         "notices": structures.NOTICES,
+        "failures": structures.FAILURES,
         "verdict": {"theorem": run.verdict.theorem, "reasons": [visible(text) for text in run.verdict.reasons]},
         "exported": visible(words.stop(run)),
     }

@@ -18,26 +18,30 @@ function refusal({refusal: why, at}) {
 }
 
 function stopped(run) {
-  const {reason, mode, edge, surface, time: t, most} = run, wall = model.modes[mode].walls[surface - model.modes[mode].edges.length];
+  const {reason, failure, mode, edge, surface, time: t, most} = run, wall = model.modes[mode].walls[surface - model.modes[mode].edges.length];
   const ends = `the domain of mode ${modeOf(mode)} ends at ${wall}: at ${time(t)} the state`;
   const nothing = `in mode ${modeOf(mode)} an expression has no finite value at ${time(t)}`;
+  const stuck = {
+    "wall": `left_domain: ${ends} leaves it`,
+    "not finite": `not_finite: ${nothing} or soon after`,
+    "other": `step_underflow: in mode ${modeOf(mode)} no step from ${time(t)} is short enough; hsdsl run says more`,
+  };
   const sentences = {
     "until": `until: reached ${time(t)}`,
     "until in strip": `until: reached ${time(t)} inside the strip of ${edgeOf(mode, edge)}, mode unchanged`,
     "until on guard": `until: reached ${time(t)} on the guard of ${edgeOf(mode, edge)}, mode unchanged`,
     "final": `final: entered final mode ${modeOf(mode)} at ${time(t)}`,
     "zeno": `zeno: at ${time(t)} transitions return to the same state in mode ${modeOf(mode)} without end`,
-    "limit": `transition_limit: made ${most} transitions by ${time(t)}; a page makes no more than 20,000`,
+    "limit": `transition_limit: made ${most} transitions by ${time(t)}${most === 20000 ? "; a page makes no more" : ""}`,
     "reset not finite": `not_finite: the reset of ${edgeOf(mode, edge)} has no finite value at ${time(t)}`,
     "here not finite": `not_finite: ${nothing}`,
     "step not finite": `not_finite: ${nothing}`,
     "entered outside": `left_domain: ${ends} was entered outside it`,
     "left": `left_domain: ${ends} leaves it`,
-    "stuck": `step_underflow: in mode ${modeOf(mode)} no step from ${time(t)} is short enough`,
+    "stuck": stuck[model.failures[failure]] ?? stuck.other,
     "interrupted": `interrupted at ${time(t)}: a run in a page may take 10 s and 256 MB`,
     "accumulated": `zeno: transitions accumulate at ${time(t)}, and no motion along its guard goes on there`,
   };
-  if (model.reasons[reason] === "stuck" && wall !== undefined) return `left_domain: ${ends} leaves it`;
   return sentences[model.reasons[reason]];
 }
 
