@@ -6,7 +6,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -70,8 +70,7 @@ def _columns(given: Any) -> tuple[str, dict[str, Sequence[Any]]]:
     if isinstance(given, (str, Path)):
         return str(given), _read(Path(given))
     if hasattr(given, "columns") or isinstance(given, Mapping):
-        listed: Any = getattr(given, "columns", given)  # pyright: ignore[reportUnknownArgumentType]
-        names: list[Any] = list(listed)
+        names = cast("Sequence[Any]", getattr(given, "columns", given))  # pyright: ignore[reportUnknownArgumentType]
         return "data", {str(name): list(given[name]) for name in names}
     raise UsageError(f"data: expected a CSV file, a mapping or a DataFrame, got {type(given).__name__}")
 

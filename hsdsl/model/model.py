@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hsdsl.model.differentiate import Differentiator
     from hsdsl.model.estimate import Estimate
     from hsdsl.model.stream import Streamed
+    from hsdsl.orbits.branch import Branch
     from hsdsl.orbits.orbit import Orbit
     from hsdsl.sensitivity.result import Sensitivity
     from hsdsl.system import HybridSystem
@@ -231,6 +232,35 @@ class Model:
         from hsdsl.model.orbits import Orbits
 
         return Orbits(self, section, laps, period, arguments).find()
+
+    def continuation(
+        self,
+        section: str,
+        parameter: str,
+        start: Any,
+        end: Any,
+        *,
+        laps: int = 1,
+        period: Any = None,
+        **arguments: Any,
+    ) -> Branch:
+        """Follow a periodic orbit in a parameter, around folds, with its bifurcations located.
+
+        It begins at the parameter's own value where that is in the range, else at ``start``, and goes both ways.
+
+        Parameters
+        ----------
+        section, laps, period, **arguments
+            As for :meth:`orbit`.
+        parameter : str
+        start, end : number or str
+            The range of the parameter.
+
+        Raises UsageError: as :meth:`orbit`; or no such parameter.
+        """
+        from hsdsl.model.orbits import Orbits
+
+        return Orbits(self, section, laps, period, arguments).continued(parameter, start, end)
 
     def fit(
         self,

@@ -16,8 +16,10 @@ from hsdsl.model.pipeline import Pipeline
 from hsdsl.model.settings import whole
 from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean
+from hsdsl.orbits.branch import Branch
+from hsdsl.orbits.continuation import Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
-from hsdsl.orbits.section import NoReturn, Section
+from hsdsl.orbits.section import NoReturn, Return, Section
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.sensitivity.result import Sensitivity
 
@@ -160,6 +162,40 @@ class Orbits:
         if found.passage.time < SHRUNK * guess.time:
             raise NotClosed("passages become ever shorter, so the execution ends in a point")
         return self.judge(found, parameters, forcing)
+
+    def continued(self, parameter: str, start: Any, end: Any) -> Branch:
+        """Follow the orbit of the model's run in a parameter; see `Model.continuation`."""
+        if parameter not in self.model.program.parameters:
+            raise UsageError(
+                f"the model has no parameter '{parameter}'", did_you_mean(parameter, self.model.program.parameters)
+            )
+        values = with_parameters(self.model.pipeline.values(FLOAT64), self._parameters)
+        low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))
+        if not low != high:
+            raise UsageError(f"expected a range of {parameter}, got {low:g} to {high:g}")
+        own = float(values.parameters[self.model.program.parameters.index(parameter)])
+        value = own if min(low, high) <= own <= max(low, high) else low
+        self._parameters = self._parameters | {parameter: value}
+        self.arguments["parameters"] = self._parameters
+        first = self.find()
+        multiple = None if first.phase is None else round(first.period / (self.forcing(self._parameters) or 1.0))
+
+        def passage(point: Array, phase: float, at: float) -> tuple[Return, float | None, float]:
+            parameters = self._parameters | {parameter: at}
+            found = self.section(parameters).follow(point, phase, 1.5 * first.period, parameter)
+            if multiple is None:
+                return found, None, 0.0
+            step = 1e-6 * abs(high - low)
+            around = [multiple * (self.forcing(parameters | {parameter: at + way}) or 0.0) for way in (-step, 0, step)]
+            return found, around[1], (around[2] - around[0]) / (2 * step)
+
+        follower = Follower(passage, first.closed, value, (low, high))
+        parts = [branch(follower, way) for way in (-1.0, 1.0)]
+        points = [*reversed(parts[0][0]), *parts[1][0][1:]]
+        bifurcations = [*reversed(parts[0][1]), *parts[1][1]]
+        names = self._entered()[1]
+        ends = tuple(why for *_, why in parts)
+        return Branch(self.edge, parameter, names, tuple(points), tuple(bifurcations), ends, first)
 
     def judge(self, found: Closed, parameters: Mapping[str, Any], forcing: float | None) -> Orbit:
         """Say what is known of an orbit."""

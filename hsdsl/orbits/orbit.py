@@ -62,6 +62,19 @@ class Orbit:
         """The run over one period, with derivatives as further states."""
         return self.sensitivity.execution
 
+    def as_json(self) -> dict[str, Any]:
+        """The object of `orbit --json`."""
+        from hsdsl.orbits.words import as_json
+
+        return as_json(self)
+
+    @property
+    def summary(self) -> str:
+        """The orbit as lines of text."""
+        from hsdsl.orbits.words import summary
+
+        return summary(self)
+
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the orbit and its multipliers to a .png or .svg file."""
         from hsdsl.orbits.words import shown

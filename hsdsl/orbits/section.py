@@ -71,6 +71,8 @@ class Section:
             horizon *= LONGER
             found = self.run(start, phase, horizon, wrt)
         stop = found.execution.stop
+        if found.breaks:
+            raise NoReturn(found.breaks[0][1])
         raise NoReturn(f"a run from there does not come back to {self.edge}: it stops ({stop.reason}): {stop.message}")
 
     def _return(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Return:

@@ -1,0 +1,266 @@
+"""A branch of periodic orbits over a parameter, followed by its arc length, with its bifurcations.
+
+With u the point, the phase and the parameter, each relative to its size, an orbit solves G(u) = 0, one equation fewer
+than unknowns. From an orbit a step goes along the tangent, and Newton's method with the derivatives of the return map
+comes back to the branch across it (H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems,
+1977). So a branch is followed around a fold.
+
+======== ===========================================================================================================
+fold     the parameter turns back: a multiplier passes 1
+flip     a multiplier passes -1: an orbit of twice the period begins or ends
+torus    a pair of complex multipliers passes the unit circle
+grazing  a transition of the orbit begins or ends, or its rate becomes zero; the branch ends where it is not smooth
+======== ===========================================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+
+from hsdsl.execution import Array
+from hsdsl.orbits.section import NoReturn, Return
+from hsdsl.orbits.shooting import CLOSED, Closed, gap
+from hsdsl.simulate.verdict.run_view import RunView
+
+Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
+MOST_POINTS, MOST_CORRECTIONS = 400, 8
+FIRST, LEAST, LARGEST = 0.02, 1e-7, 0.05  # steps relative to the sizes of states and to the range of the parameter
+CLOSE = 1e-6  # a share of the parameter's range: bifurcations of one kind that are closer are one
+PRECISE = 1e-12
+KINDS = ("fold", "flip", "torus", "grazing")
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An orbit of the branch: its unknowns, the last passage, and the tangent of the branch there."""
+
+    unknowns: Array
+    passage: Return
+    tangent: Array
+
+
+@dataclass(frozen=True)
+class Point:
+    """An orbit of a branch: the parameter, state, period and multipliers, and how many of these leave the circle."""
+
+    parameter: float
+    state: Array
+    phase: float
+    period: float
+    multipliers: Array
+
+    @property
+    def unstable(self) -> int:
+        """How many multipliers are above one in size."""
+        return int(np.sum(np.abs(self.multipliers) > 1 + CLOSED))
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A place of a branch where orbits change: one of :data:`KINDS`, the parameter, and the state there."""
+
+    kind: str
+    parameter: float
+    state: Array
+
+
+class Follower:
+    """The branch through an orbit; ``passage`` makes the return map at a point, a phase and a parameter.
+
+    It gives the passage, the time that an orbit of a forced system takes, and the derivative of that.
+    """
+
+    def __init__(self, passage: Passage, first: Closed, value: float, range_: tuple[float, float]) -> None:
+        self.passage, self.range = passage, range_
+        n = len(first.point)
+        _, self.multiple, _ = passage(first.point, first.phase, value)
+        self.forced = self.multiple is not None
+        self.kept = [k for k in range(n + self.forced) if k not in first.drifting] + [n + 1]
+        self.rows = [k for k in range(n + self.forced) if k not in first.drifting]
+        self.scale = np.concatenate([first.sizes, [self.multiple or 1.0], [abs(range_[1] - range_[0])]])
+        self.start = np.concatenate([first.point, [first.phase, value]])
+
+    def equations(self, unknowns: Array) -> tuple[Array, Array, Return]:
+        """What an orbit lacks and its derivatives, relative to the sizes, and the passage."""
+        n = len(unknowns) - 2
+        passage, multiple, slope = self.passage(unknowns[:n], float(unknowns[n]), float(unknowns[n + 1]))
+        matrix = passage.slopes.copy()
+        matrix[:n, :n] -= np.eye(n)
+        if self.forced:
+            matrix[n, n + 1] -= slope
+        missing = gap(passage, unknowns[:n], multiple) / self.scale[: n + 1]
+        scaled = matrix * self.scale / self.scale[: n + 1, None]
+        return missing[self.rows], scaled[np.ix_(self.rows, self.kept)], passage
+
+    def solution(self, unknowns: Array, along: Array) -> Solution:
+        """Correct unknowns across a direction, and find the tangent that leads on in it.
+
+        Raises NoReturn: there is no orbit near.
+        """
+        aim = unknowns.copy()
+        for _ in range(MOST_CORRECTIONS):
+            missing, matrix, passage = self.equations(unknowns)
+            off = ((unknowns - aim) / self.scale)[self.kept]
+            rows = np.vstack([matrix, along])
+            step = -np.linalg.lstsq(rows, np.append(missing, along @ off), rcond=PRECISE)[0]
+            if float(np.max(np.abs(missing), initial=0.0)) < CLOSED / 10:
+                break
+            unknowns = unknowns.copy()
+            unknowns[self.kept] += step * self.scale[self.kept]
+            if float(np.max(np.abs(step))) > 1:
+                raise NoReturn("the correction goes far away")
+        else:
+            raise NoReturn("the orbit does not close")
+        tangent = np.linalg.svd(matrix)[2][-1]
+        return Solution(unknowns, passage, tangent if tangent @ along >= 0 else -tangent)
+
+    def first(self, way: float) -> Solution:
+        """The first solution, with the tangent along which the parameter grows or falls."""
+        along = np.zeros(len(self.kept))
+        along[-1] = way
+        return self.solution(self.start, along)
+
+    def step(self, here: Solution, length: float) -> Solution:
+        """The solution a step further."""
+        ahead = here.unknowns.copy()
+        ahead[self.kept] += length * here.tangent * self.scale[self.kept]
+        return self.solution(ahead, here.tangent)
+
+    def point(self, here: Solution) -> Point:
+        """What is reported of a solution."""
+        n = len(here.unknowns) - 2
+        return Point(
+            float(here.unknowns[-1]),
+            here.unknowns[:n],
+            float(here.unknowns[n]),
+            here.passage.time,
+            self.multipliers(here),
+        )
+
+    def multipliers(self, here: Solution) -> Array:
+        """The multipliers of a solution, the largest first."""
+        n = len(here.unknowns) - 2
+        matrix = here.passage.slopes[:, : n + 1].copy()
+        matrix[n, n] += self.forced
+        values = np.linalg.eigvals(matrix[np.ix_(self.rows, self.rows)])
+        return values[np.argsort(-np.abs(values), kind="stable")][:-1]
+
+    def tests(self, here: Solution) -> dict[str, float]:
+        """Numbers that change their sign at bifurcations."""
+        found = self.multipliers(here)
+        pairs = [m for m in found.tolist() if m.imag > 0]
+        return {
+            "fold": float(here.tangent[-1]),
+            "flip": float(np.prod(found + 1).real),
+            "torus": float(np.prod([abs(m) - 1 for m in pairs])) if pairs else 1.0,
+        }
+
+
+def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcation], str]:
+    """Follow a branch in one way until the parameter leaves its range: its points, bifurcations, and why it ends."""
+    low, high = sorted(follower.range)
+    here = previous = follower.first(way)
+    points, found, length = [follower.point(here)], list[Bifurcation](), FIRST
+    while len(points) < MOST_POINTS:
+        try:
+            ahead = follower.step(here, length)
+            same = sequence(ahead) == sequence(here)
+        except NoReturn as problem:
+            ahead, same, why = None, False, str(problem)
+        else:
+            why = "the orbit makes other transitions from there on"
+        if ahead is None or not same or _turns(here, ahead):
+            length /= 2
+            if length >= LEAST:
+                continue
+            if ahead is None or not same:
+                found.append(_grazing(previous, here))
+                return points, found, why
+        assert ahead is not None
+        found += _between(follower, here, ahead, length)
+        previous, here, length = here, ahead, min(LARGEST, 1.3 * length)
+        points.append(follower.point(here))
+        if not low <= points[-1].parameter <= high:
+            points[-1] = _at_the_end(follower, points[-2], points[-1], min(max(points[-1].parameter, low), high))
+            return points, [b for b in found if low <= b.parameter <= high], "the parameter is at the end of its range"
+        if (
+            len(points) > 8
+            and np.allclose(points[-1].state, points[0].state, rtol=1e-6)
+            and (abs(points[-1].parameter - points[0].parameter) < CLOSE * (high - low))
+        ):
+            return points, found, "the branch is closed"
+    return points, found, f"{MOST_POINTS} orbits were found"
+
+
+def sequence(here: Solution) -> list[str]:
+    """The transitions of a period."""
+    tie = 1e-9 * here.passage.time
+    return [made.edge for made in here.passage.execution.transitions if made.time <= here.passage.time + tie]
+
+
+def _turns(here: Solution, ahead: Solution) -> bool:
+    """Whether the branch turns so much in a step that something may be missed."""
+    return float(here.tangent @ ahead.tangent) < 0.9
+
+
+def _between(follower: Follower, here: Solution, ahead: Solution, length: float) -> list[Bifurcation]:
+    """The bifurcations between two solutions, located along the step."""
+    before, after, found = follower.tests(here), follower.tests(ahead), list[Bifurcation]()
+    for kind in before:
+        if before[kind] * after[kind] >= 0:
+            continue
+        if kind == "torus" and len(_pairs(follower, here)) != len(_pairs(follower, ahead)):
+            continue  # a pair became real on the way
+
+        def value(s: float, kind: str = kind) -> float:
+            return follower.tests(follower.step(here, s))[kind]
+
+        try:
+            solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
+            there = follower.step(here, solve(value, 0.0, length, xtol=PRECISE * length, rtol=1e-12))
+        except (NoReturn, ValueError):
+            there = ahead
+        found.append(Bifurcation(kind, float(there.unknowns[-1]), there.unknowns[:-2]))
+    return found
+
+
+def _pairs(follower: Follower, here: Solution) -> list[complex]:
+    return [m for m in follower.multipliers(here).tolist() if m.imag > 0]
+
+
+def _grazing(previous: Solution, here: Solution) -> Bifurcation:
+    """Where the branch stops being smooth: where a rate becomes zero, or as near as it was followed."""
+    before, last = _rates(previous), _rates(here)
+    there = here.unknowns
+    if len(before) == len(last) and len(last):
+        shares = [b / a if a else 1.0 for a, b in zip(before, last, strict=True)]
+        k = int(np.argmin(np.abs(shares)))
+        if abs(shares[k]) < 1 - CLOSE:
+            there = here.unknowns + shares[k] / (1 - shares[k]) * (here.unknowns - previous.unknowns)
+    return Bifurcation("grazing", float(there[-1]), there[:-2])
+
+
+def _rates(here: Solution) -> list[float]:
+    """The rates at which the transitions of a period cross their guards."""
+    found = here.passage.sensitivity
+    run = RunView(found.setting.augmented, found.execution)
+    made = run.transitions[: len(sequence(here))]
+    return [float(place.rate(k)) for place, k in map(run.before, made)]
+
+
+def _at_the_end(follower: Follower, before: Point, last: Point, value: float) -> Point:
+    """The last point, brought back to the end of the parameter's range along the chord."""
+    share = (value - before.parameter) / (last.parameter - before.parameter)
+    start = np.concatenate([before.state + share * (last.state - before.state), [0.0, value]])
+    start[-2] = before.phase + share * (last.phase - before.phase)
+    along = np.zeros(len(follower.kept))
+    along[-1] = 1.0
+    try:
+        return follower.point(follower.solution(start, along))
+    except NoReturn:
+        return replace(last, parameter=value)

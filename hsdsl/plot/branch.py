@@ -1,0 +1,52 @@
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""A branch of periodic orbits over a parameter: stable orbits solid, others dashed, bifurcations marked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+from typing import TYPE_CHECKING
+
+from hsdsl.plot.style import PALETTE, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MARKERS = {"fold": "o", "flip": "D", "torus": "s", "grazing": "X"}
+
+
+def plot_branch(
+    path: str | os.PathLike[str],
+    parameter: str,
+    state: str,
+    points: Sequence[tuple[float, float, bool]],
+    marks: Sequence[tuple[str, float, float]],
+    title: str,
+) -> None:
+    """Draw points (parameter, state, stable) in their order, and marks (kind, parameter, state)."""
+
+    def draw() -> Figure:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8, 5), layout="constrained")
+        axis = figure.subplots()
+        pieces = [(a, b) for a, b in pairwise(points)]
+        for stable, part in groupby(pieces, key=lambda piece: piece[0][2] and piece[1][2]):
+            along = list(part)
+            line = [along[0][0], *(b for _, b in along)]
+            style, colour = ("-", PALETTE[5]) if stable else ("--", PALETTE[6])
+            axis.plot([p[0] for p in line], [p[1] for p in line], style, color=colour)
+        for kind, marker in MARKERS.items():
+            found = [(p, x) for name, p, x in marks if name == kind]
+            if found:
+                axis.plot([p for p, _ in found], [x for _, x in found], marker, color=PALETTE[1], label=kind)
+        if marks:
+            axis.legend(frameon=False)
+        axis.set_xlabel(parameter, parse_math=False)
+        axis.set_ylabel(f"{state} after the section", parse_math=False)
+        axis.set_title(title, loc="left", fontsize=10, parse_math=False)
+        return figure
+
+    save(draw, path)

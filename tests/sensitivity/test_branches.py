@@ -1,0 +1,86 @@
+"""Branches of periodic orbits: folds, flips and grazing of an impact oscillator, where closed forms are known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import hsdsl
+from hsdsl import UsageError
+from hsdsl.cli.verbs import obey
+
+OSCILLATOR = """
+hsdsl: 1
+title: An impact oscillator
+parameters: {{a: 0.05, c: 0.8, w: 1, s: 1, F: {F}, W: {W}}}
+modes:
+  free:
+    flow: {{x: v, v: F*cos(W*t) - 2*a*v - w**2*x}}
+    transitions: [{{when: x >= s, to: free, name: impact, reset: {{v: -c*v}}}}]
+initial: {{mode: free, x: 0.9, v: -0.4}}
+experiment: {{until: 400}}
+"""
+
+
+def kinds(branch: Any) -> dict[str, float]:
+    """The parameter of each kind of bifurcation."""
+    return {found.kind: found.parameter for found in branch.bifurcations}
+
+
+def test_flip_and_grazing() -> None:
+    branch = hsdsl.loads(OSCILLATOR.format(F=0.6, W=0.8)).continuation("impact", "F", 0.3, 0.7)
+    found = kinds(branch)
+    assert found.keys() == {"flip", "grazing"}
+    assert found["flip"] == pytest.approx(0.5182098665978726, rel=1e-11)
+    assert found["grazing"] == pytest.approx(np.hypot(1 - 0.64, 2 * 0.05 * 0.8), rel=1e-8)
+    assert all((point.unstable == 0) == (point.parameter > found["flip"]) for point in branch.points)
+
+
+def test_fold_and_grazing() -> None:
+    """Orbits are the roots of a quadratic in the impact velocity v: F**2 = A**2 ((s + p v)**2 + (q v/W)**2)."""
+    forcing = np.sqrt(1.99)
+    branch = hsdsl.loads(OSCILLATOR.format(F=1.3, W="sqrt(1.99)")).continuation("impact", "F", 0.05, 1.5)
+    flow = expm(np.array([[0, 1], [-1, -0.1]]) * 2 * np.pi / forcing)
+    p, q = np.linalg.solve(flow - np.eye(2), flow @ [0, 1] + [0, 1 / 0.8])
+    size = np.hypot(1 - 1.99, 0.1 * forcing)
+    square = p * p + (q / forcing) ** 2
+    lowest = size * np.sqrt(1 - p * p / square)
+    found = kinds(branch)
+    assert found.keys() == {"fold", "grazing"}
+    assert found["fold"] == pytest.approx(lowest, rel=1e-9)
+    assert found["grazing"] == pytest.approx(1, rel=1e-7)
+    for point in branch.points:
+        v = point.state[1]
+        assert point.parameter == pytest.approx(size * np.hypot(1 + p * v, q * v / forcing), rel=1e-9)
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, picture = tmp_path / "model.yaml", tmp_path / "branch.png"
+    model.write_text(OSCILLATOR.format(F=0.6, W=0.8))
+    words = ["orbit", str(model), "--section", "impact", "--continue", "F=0.55:0.65", "--json", "--plot", str(picture)]
+    assert obey(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["bifurcations"] == []
+    assert [found["points"][0]["parameter"], found["points"][-1]["parameter"]] == pytest.approx([0.55, 0.65])
+    assert picture.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [("F", "expected PARAM=A:B"), ("G=0:1", "no parameter 'G'"), ("F=1:1", "a range of F"), ("F=0.5:u", "")],
+)
+def test_bad_ranges(text: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "model.yaml"
+    model.write_text(OSCILLATOR.format(F=0.6, W=0.8))
+    assert obey(["orbit", str(model), "--section", "impact", "--continue", text]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_bad_call() -> None:
+    with pytest.raises(UsageError, match="no transition"):
+        hsdsl.loads(OSCILLATOR.format(F=0.6, W=0.8)).continuation("hit", "F", 0, 1)
