@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from html.parser import HTMLParser
 from pathlib import Path
@@ -28,6 +29,7 @@ from hsdsl.errors import UsageError
 from hsdsl.export import files_of, source_of
 from hsdsl.export.web import numbers as page_numbers
 from hsdsl.export.web import wasm
+from hsdsl.export.web.model import model_of
 from hsdsl.model import Model
 from hsdsl.report import as_json
 
@@ -384,6 +386,19 @@ def test_a_scheme_that_has_no_c_is_refused():
     source = source_of(hsdsl.loads(STAND), {"scheme": "paoli-schatzman", "step": 1e-3})
     with pytest.raises(UsageError, match="paoli-schatzman"):
         files_of(source, "web")
+
+
+def test_numbers_and_data_of_a_page_are_as_they_were():
+    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
+    model = hsdsl.load(MODELS / "thermostat.yaml")
+    source = source_of(model, {})
+    data = model_of(source, source, model.simulate())
+    del data["about"]  # it names the version
+    found = page_numbers.page_numbers(source.problem) + json.dumps(data, indent=1) + "\n"
+    golden = Path(__file__).parent / "golden" / "thermostat.web.txt"
+    if os.environ.get("HSDSL_WRITE_GOLDEN"):
+        golden.write_text(found)
+    assert found == golden.read_text()
 
 
 def test_fixed_parameters_are_those_that_curved_switches_and_tolerances_depend_on():
