@@ -35,11 +35,17 @@ class Parameter:
     about: str | None = None
 
 
+def switch_parameter(name: str) -> Parameter:
+    """A parameter that is 1: what it multiplies is on."""
+    return Parameter(name, sp.Integer(1), "1")
+
+
 @dataclass(frozen=True)
 class SampledInput:
     """An input given by samples; before the first and after the last it keeps that sample's value.
 
     ``times`` and ``values`` are either exact numbers or expressions of parameters (never mixed with states or t).
+    ``given`` is the expression of time of an input that may be driven from outside, see `elaborate.drivable`.
     """
 
     name: str
@@ -47,6 +53,7 @@ class SampledInput:
     times: tuple[Fraction | sp.Expr, ...]
     values: tuple[Fraction | sp.Expr, ...]
     unit: str | None = None
+    given: sp.Expr | None = None
 
     def __post_init__(self) -> None:
         if len(self.times) != len(self.values) or not self.times:

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from hsdsl import limits
 from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units, substituted_definitions
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
-from hsdsl.elaborate.inputs import define_inputs
+from hsdsl.elaborate.inputs import define_inputs, switch_name
 from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
@@ -25,9 +25,9 @@ from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
 from hsdsl.schema import ModelDocument, read
 from hsdsl.source import Node, Text, compose, decode
-from hsdsl.system import HybridSystem
+from hsdsl.system import HybridSystem, switch_parameter
 
-__all__ = ["Elaboration", "elaborate", "elaborate_files", "parameter_expression"]
+__all__ = ["Elaboration", "drivable", "elaborate", "elaborate_files", "parameter_expression"]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,23 @@ def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> Hyb
     return elaborate_files(ModelFiles.read(path, text=text)).system
 
 
-def elaborate_files(files: ModelFiles) -> Elaboration:
+def drivable(files: ModelFiles) -> HybridSystem:
+    """The system with each input u that is an expression of time as u_given * expression + u.
+
+    Where the parameter ``u given`` is 1 and the sampled input u is 0, which are their values, it is the same system;
+    where the parameter is 0, u can be driven from outside.
+
+    Raises
+    ------
+    ModelError
+        The model has errors; all of them are carried, in source order.
+    """
+    system = elaborate_files(files, drivable=True).system
+    switches = (switch_parameter(switch_name(i.name)) for i in system.inputs if i.given is not None)
+    return replace(system, parameters=(*system.parameters, *switches))
+
+
+def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration:
     """The hybrid system of a model's bytes: (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7.
 
     Raises
@@ -72,7 +88,7 @@ def elaborate_files(files: ModelFiles) -> Elaboration:
         findings = Findings(files.path)
         text = decode(files.path, files.text)
         root = compose(text, findings)
-        symbols = SymbolTable(read(root, findings), ExpressionResolver(findings), files)
+        symbols = SymbolTable(read(root, findings), ExpressionResolver(findings), files, drivable=drivable)
         try:
             with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
                 system = _system(symbols)

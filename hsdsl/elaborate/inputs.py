@@ -39,7 +39,11 @@ def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
     inputs: list[SampledInput] = []
     for name, entry in symbols.document.inputs.items():
         if isinstance(entry, Scalar):
-            symbols.values[name] = symbols.number(entry, timed)
+            value = symbols.values[name] = symbols.number(entry, timed)
+            if symbols.drivable and value is not None:
+                unit = symbols.text(symbols.document.units.get(name))
+                inputs.append(SampledInput(str(name), "zero", (Fraction(0),), (Fraction(0),), unit, value.expr))
+                symbols.values[name] = Value(value.expr * symbol(switch_name(name)) + symbol(name))
             continue
         symbols.values[name] = Value(symbol(name))
         in_file = isinstance(entry, InputFile)
@@ -48,6 +52,11 @@ def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
             unit = symbols.text(symbols.document.units.get(name))
             inputs.append(SampledInput(str(name), entry.hold, samples[0], samples[1], unit))
     return tuple(inputs)
+
+
+def switch_name(name: str) -> str:
+    """The parameter that turns the expression of a drivable input off; no file can have a name with a blank."""
+    return f"{name} given"
 
 
 def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) -> Any:

@@ -27,7 +27,7 @@ class SymbolTable:
     those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
     a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
     reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
-    that were used.
+    that were used. ``drivable`` says that inputs of time stay inputs.
     """
 
     document: ModelDocument
@@ -39,6 +39,7 @@ class SymbolTable:
     undeclared: frozenset[str] = frozenset()
     scopes: dict[str, Scope] = field(default_factory=dict)
     data: dict[str, bytes] = field(default_factory=dict)
+    drivable: bool = False
 
     def __post_init__(self) -> None:
         document = self.document

@@ -22,6 +22,8 @@ __all__ = ["TARGETS", "check_folder", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
+    "fmi2": "a functional mock-up unit of FMI 2.0, for model exchange and co-simulation",
+    "fmi3": "a functional mock-up unit of FMI 3.0, for model exchange and co-simulation",
     "jax": "a module for JAX, whose simulators vectorise and differentiate",
     "latex": "the model as mathematics, a LaTeX document",
     "mermaid": "the mode graph as a Mermaid diagram",

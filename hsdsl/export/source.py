@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,13 @@ class Source:
     """What a target reads.
 
     ``system`` has the symbolic expressions; ``problem`` has the program, the values of all parameters, the settings
-    and the initial state, overrides applied.
+    and the initial state, overrides applied; ``model`` and ``arguments`` are what it was made of.
     """
 
     system: HybridSystem
     problem: Problem
+    model: Model
+    arguments: Mapping[str, Any]
 
     @property
     def name(self) -> str:
@@ -56,5 +58,17 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     Raises UsageError: a name, value or combination that a run would refuse, too.
     """
     prepared = model.pipeline.prepare({**arguments, "engine": "python"})
+<<<<<<< HEAD
     completed = model.pipeline.sliding if prepared.settings.completion == "auto" else model.pipeline
     return Source(completed.system, prepared)
+=======
+    return Source(model.system, prepared, model, arguments)
+
+
+def drivable(source: Source) -> Source:
+    """The same source with inputs of time that can be driven from outside; see `hsdsl.elaborate.drivable`."""
+    pipeline = source.model.pipeline.drivable()
+    problem = pipeline.prepare({**source.arguments, "engine": "python"})
+    own = pipeline if problem.program is pipeline.program else pipeline.sliding
+    return replace(source, system=own.system, problem=problem)
+>>>>>>> d2b1671 (Export functional mock-up units of FMI 2.0 and 3.0)

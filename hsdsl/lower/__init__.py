@@ -32,12 +32,14 @@ _NAN = symbol("nan")
 class Names:
     """The numbered symbols for the file's names in generated code.
 
-    ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs and switches.
+    ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs and switches;
+    ``inputs`` has the value of each sampled input at the start of its segment, whose slope by the input is 1.
     """
 
     parameters: tuple[sp.Symbol, ...]
     data: tuple[sp.Symbol, ...]
     shared: dict[sp.Symbol, sp.Expr]
+    inputs: tuple[sp.Symbol, ...] = ()
 
 
 def lower(system: HybridSystem) -> lowered.Program:
@@ -56,7 +58,7 @@ def lower(system: HybridSystem) -> lowered.Program:
 
 def _lower(system: HybridSystem) -> lowered.Program:
     system, switches = with_switches(system)
-    names = _number(system, switches.symbols)
+    names = number(system, switches.symbols)
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
     modes, contacts = _modes(system, names, indices)
@@ -87,12 +89,12 @@ def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
     modes: list[lowered.ModeProgram] = []
     contacts: list[lowered.ModeProgram] = []
     for mode in system.modes:
-        program = _Mode(mode, names).program(indices)
+        program = LoweredMode(mode, names).program(indices)
         edges = list(program.edges)
         for k in range(len(edges)):
             if (held := contact(mode, k)) is not None:
                 edges[k] = replace(edges[k], contact=len(system.modes) + len(contacts))
-                contacts.append(_contact(held, len(edges), _Mode(held.mode, names).program(indices)))
+                contacts.append(_contact(held, len(edges), LoweredMode(held.mode, names).program(indices)))
         modes.append(replace(program, edges=tuple(edges)))
     return tuple(modes), tuple(contacts)
 
@@ -105,25 +107,27 @@ def _contact(held: Contact, edges: int, program: lowered.ModeProgram) -> lowered
 
 def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
     """Lower expressions of parameters (what overrides are made of): each a routine of all parameters."""
-    names = _number(system)
+    names = number(system)
     with deep_stack():
         return print_routines(
             [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
         )
 
 
-def _number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
+def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
+    """The numbered symbols for the names of a system."""
     parameters = tuple(symbol(f"p{i}") for i in range(len(system.parameters)))
     shared: dict[sp.Symbol, sp.Expr] = dict(zip(system.parameter_symbols, parameters, strict=True))
-    data = list(parameters)
+    data, starts = list(parameters), list[sp.Symbol]()
     for i, sampled in enumerate(system.inputs):
         start, slope, since = (symbol(f"{letter}{i}") for letter in "abc")
         shared[symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
         data += [start, slope, since]
+        starts.append(start)
     numbers = tuple(symbol(f"k{i}") for i in range(len(switches)))
     shared.update(zip(switches, numbers, strict=True))
     data += numbers
-    return Names(parameters, tuple(data), shared)
+    return Names(parameters, tuple(data), shared, tuple(starts))
 
 
 def _sampled(given: SampledInput) -> lowered.SampledInput:
@@ -161,7 +165,7 @@ def _constants(system: HybridSystem, names: Names):
         yield define("sample_count", experiment.samples)
 
 
-class _Mode:
+class LoweredMode:
     """A mode over numbered symbols."""
 
     def __init__(self, mode: Mode, names: Names) -> None:

@@ -92,7 +92,7 @@ _BRANCHES: dict[type, Callable[..., sp.Expr]] = {
 
 def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     """Write a system's expressions with switches, and return these."""
-    inputs = {symbol(i.name): i.hold for i in system.inputs}
+    inputs = {symbol(i.name): i.hold for i in system.inputs if i.given is None}  # others may be driven from outside
     moving = frozenset({TIME, *(name for name, hold in inputs.items() if hold == "linear")})
     switches = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
     modes = tuple(_mode(mode, switches.out_of) for mode in system.modes)

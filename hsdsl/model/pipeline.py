@@ -204,6 +204,17 @@ class Pipeline:
         with applied(None if self._files is None else self._files.limits):
             return make_timeline(self.program, values.kernel, parameters, until)
 
+    def drivable(self) -> Pipeline:
+        """The pipeline of the same model with inputs that can be driven from outside."""
+        from hsdsl.elaborate import drivable
+        from hsdsl.elaborate.slicing import only
+
+        assert self._files is not None
+        system = drivable(self._files)
+        for names in self._part:
+            system = only(system, names)
+        return Pipeline(system)
+
     def only(self, names: tuple[str, ...]) -> Pipeline:
         """The pipeline of these states and outputs with what they need; this one where that is the whole model."""
         began = time.perf_counter()

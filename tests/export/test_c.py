@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import platform
 import subprocess
+import sys
 from pathlib import Path
 from shutil import which
 from typing import Any
@@ -12,6 +14,8 @@ from export.c_builds import COMPILERS, built, exported, output
 
 import hsdsl
 from hsdsl.cli.verbs import obey
+from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
+from hsdsl.export.c.sources import COMPILED
 from hsdsl.report import as_json
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -141,3 +145,75 @@ def test_a_scheme_without_a_c_loop_is_refused(tmp_path: Path, capsys: pytest.Cap
     assert obey(["export", ball, "--to", "c", "--scheme", "paoli-schatzman", "--out", str(out)]) == 2
     assert "paoli-schatzman" in capsys.readouterr().err
     assert not out.exists()
+
+
+STACK = """
+#define _XOPEN_SOURCE 700
+#include <stdio.h>
+#include <string.h>
+#include <ucontext.h>
+#include "instance.h"
+static hs_instance instance;
+static unsigned char stack[1 << 20];
+static ucontext_t back, there;
+static void go(void) {
+  hs_open(&instance);
+  hs_run_instance(&instance);
+}
+int main(void) {
+  size_t i = 0;
+  memset(stack, 0xA5, sizeof stack);
+  getcontext(&there);
+  there.uc_stack.ss_sp = stack;
+  there.uc_stack.ss_size = sizeof stack;
+  there.uc_link = &back;
+  makecontext(&there, go, 0);
+  swapcontext(&back, &there);
+  while (stack[i] == 0xA5) i++;
+  printf("[%lu, %lu]\\n", (unsigned long)(sizeof stack - i), (unsigned long)sizeof instance);
+  return 0;
+}
+"""
+RELAXED = {"scheme": "relaxed", "method": "rk4", "step": 1e-3, "relaxation": 1e-5}
+BUILDS = [
+    (scheme, single, small) for scheme in ("relaxed", "located") for single in (False, True) for small in (False, True)
+]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux" or platform.machine() != "x86_64" or "gcc" not in COMPILERS, reason="gcc")
+@pytest.mark.parametrize(("scheme", "single", "small"), BUILDS)
+def test_sizes_are_at_most_those_of_the_readme(scheme: str, single: bool, small: bool, tmp_path: Path) -> None:
+    model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+    folder = exported(model, tmp_path, **(RELAXED if scheme == "relaxed" else {}))
+    options = [*(("-DHS_FLOAT32",) if single else ()), *(SMALL if small else ()), "-Os"]
+    command = ["gcc", "-std=c99", *options, "-ffp-contract=off", "-ffunction-sections", "-fdata-sections"]
+    command += ["-Wl,--gc-sections", "-I.", "-Iruntime", *COMPILED, "-lm"]
+    (folder / "stack.c").write_text(STACK)
+    for main in ("main", "stack"):
+        subprocess.run([*command, f"{main}.c", "-o", main], cwd=folder, check=True)
+    stated = (SMALL_MEASURED if small else MEASURED)[scheme][single]
+    sizes = subprocess.run(["size", str(folder / "main")], capture_output=True, text=True, check=True).stdout
+    code, data, _ = map(int, sizes.splitlines()[1].split()[:3])
+    stack, static = output(folder / "stack")
+    measured = {"code": code + data, "static": static, "stack": stack}
+    print(measured)
+    assert all(0.6 * getattr(stated, name) < value <= getattr(stated, name) for name, value in measured.items()), (
+        measured
+    )
+
+
+@pytest.mark.slow
+def test_a_run_in_stretches_makes_the_same_transitions(tmp_path: Path) -> None:
+    model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+    folder = exported(model, tmp_path)
+    text = (folder / "main.c").read_text()
+    stretches = """
+  hs_begin_instance(&instance, 0.0);
+  for (int i = 1; i <= 120; i++) hs_advance(&instance, 0.1 * i, 0, 0);
+"""
+    assert "  hs_run_instance(&instance);\n" in text
+    (folder / "stretches.c").write_text(text.replace("  hs_run_instance(&instance);\n", stretches))
+    found = output(built(folder, next(iter(COMPILERS.values())), main="stretches.c"))
+    run = model.simulate()
+    assert [t["time"] for t in found["transitions"]] == pytest.approx([t.time for t in run.transitions], abs=1e-9)

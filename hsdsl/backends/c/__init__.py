@@ -1,5 +1,12 @@
 """C99 from a program: `source` writes the whole text, `printer` one routine of it."""
 
-from hsdsl.backends.c.source import constant_bodies, lines, model_source, switching_bodies, width
+from hsdsl.backends.c.source import (
+    constant_bodies,
+    lines,
+    model_source,
+    routine_functions,
+    switching_bodies,
+    width,
+)
 
-__all__ = ["constant_bodies", "lines", "model_source", "switching_bodies", "width"]
+__all__ = ["constant_bodies", "lines", "model_source", "routine_functions", "switching_bodies", "width"]

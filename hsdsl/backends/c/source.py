@@ -109,6 +109,18 @@ def _bodies(routines: Routines, names: dict[str, str]) -> dict[str, str]:
     return found
 
 
+def routine_functions(routines: Routines, program: Program, prefix: str) -> str:
+    """Further routines over a program's data as functions of C, each named by a prefix and its own name."""
+    writer = _Writer(program)
+    found: list[str] = []
+    for name, text in _DEFINITION.findall(routines.source):
+        definition = ast.parse(dedent(f"    def routine{text}")).body[0]
+        assert isinstance(definition, ast.FunctionDef)
+        body = function_body(definition, writer.data | _arguments(definition))
+        found.append(_FUNCTION.format(name=f"{prefix}{name}", body=body))
+    return "".join(found)
+
+
 class _Writer:
     def __init__(self, program: Program) -> None:
         self.data = data_names(program)

@@ -57,9 +57,10 @@ int problem_start(const hs_real *p, hs_real *x);
 """
 
 
-def header(source: Source) -> str:
+def header(source: Source, tunable: bool = False) -> str:
     """The text of ``problem.h``."""
-    return comment(source.heading) + _HEADER.format(sizes=_sizes(source.problem))
+    sizes = ("#define PROBLEM_TUNABLE\n" if tunable else "") + _sizes(source.problem)
+    return comment(source.heading) + _HEADER.format(sizes=sizes)
 
 
 def _sizes(problem: Problem) -> str:

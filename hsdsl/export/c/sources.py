@@ -19,8 +19,11 @@ COMPILED = ("model.c", "problem.c", "instance.c", "runtime/hs.c")  # with -I. -I
 EXACT_FLAGS = tuple(flag for flag in FLAGS if flag.startswith(("-ffp-", "-fno-math-", "-fno-builtin-")))
 
 
-def c_sources(source: Source) -> dict[str, bytes]:
+def c_sources(source: Source, tunable: bool = False) -> dict[str, bytes]:
     """The files by their paths: ``model.c`` and ``problem.[ch]`` generated, ``instance.[ch]`` and ``runtime/``.
+
+    With ``tunable`` parameters and initial values can be changed, and take memory for that.
+
 
     Raises UsageError: the runtime has no such scheme.
     """
@@ -29,7 +32,7 @@ def c_sources(source: Source) -> dict[str, bytes]:
         raise UsageError(f"the C runtime has no scheme {settings.scheme}", "choose --scheme located or relaxed")
     files = {
         "model.c": comment(source.heading) + model_source(source.problem.program),
-        "problem.h": header(source),
+        "problem.h": header(source, tunable),
         "problem.c": numbers(source),
     }
     runtime = {f"runtime/{path.name}": path.read_bytes() for path in sorted(RUNTIME.glob("*.[ch]"))}

@@ -47,9 +47,8 @@ def with_scene(source: Source) -> Source:
     system = replace(system, modes=modes, outputs=outputs)
     given = source.problem
     program = lower(system)
-    return Source(
-        system, Problem(program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x)
-    )
+    problem = Problem(program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x)
+    return replace(source, system=system, problem=problem)
 
 
 def _exported(source: Source) -> Execution:

@@ -10,6 +10,7 @@
 
 enum { RAISED = -1 };
 enum { GOES_ON = -1 }; /* instead of a reason to stop */
+enum { PAUSED = -5 }; /* instead of a reason to stop, of a run that goes on later */
 enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, else GOES_ON or a reason to stop */
 enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or a reason to stop */
 
@@ -120,6 +121,7 @@ static int judge(hs_run *run, const hs_real *values, hs_found *found);
 
 /* input_segments.c */
 static int64_t segment_at(const hs_timeline *timeline, hs_time t);
+static hs_time segment_end(const hs_run *run);
 static const hs_real *segment_data(const hs_run *run, int64_t segment);
 
 /* recorder.c */
@@ -129,6 +131,9 @@ static void strip(hs_run *run, int rows, hs_time (*row)[2], const hs_real *q);
 static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, const hs_real *after, int entry);
 static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_time time, hs_time other);
 static void doubt(hs_run *run, int k, hs_time time);
+
+/* hs.c */
+static hs_run open_run(hs_task *task);
 
 /* run.c */
 static hs_reason stopped(hs_run *run, hs_reason reason, hs_time t);
@@ -157,7 +162,9 @@ static int standing_on(hs_run *run);
 static int interrupted(hs_run *run);
 static int in_strip(hs_run *run, hs_reason reason, hs_time t);
 static int go_on(hs_run *run);
-static void relaxed(hs_run *run, int outcome);
+static int continued(hs_run *run, int jumped);
+static int pauses(const hs_run *run);
+static int relaxed(hs_run *run, int outcome);
 
 /* root_isolation.c */
 static void fill_binomials(hs_real *row, int most);
@@ -205,6 +212,6 @@ static int close_tail(hs_run *run, int k);
 static int touched(hs_run *run, int k, hs_crossing *crossing);
 
 /* located.c */
-static void located(hs_run *run, int outcome);
+static int located(hs_run *run, int outcome);
 
 #endif

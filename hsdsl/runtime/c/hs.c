@@ -195,7 +195,8 @@ int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme s
   return store.used;
 }
 
-void hs_simulate(hs_task *task) {
+/* A run of a task in its workspace, before it enters its first mode. */
+static hs_run open_run(hs_task *task) {
   hs_store store = {task->workspace, 0};
   hs_run run = make_run(task->model, task->method, (hs_scheme)task->settings.scheme, &store);
   hs_chunk *const chunk = &task->chunk;
@@ -203,20 +204,28 @@ void hs_simulate(hs_task *task) {
   task->now = 0.0;
   task->made = 0;
   run.task = task;
+  run.pause = INFINITY;
   run.epsilon = task->settings.relaxation;
   run.until = task->settings.until;
   run.control.h = task->settings.step;
   run.control.tolerance = task->settings.tolerance;
   run.control.largest = task->settings.largest;
-  run.control.least = hs_max(task->settings.tolerance, sqrt(HS_UNIT)) * task->settings.largest;
+  run.control.least = hs_max(task->settings.tolerance, sqrt((hs_real)HS_UNIT)) * task->settings.largest;
   run.control.order = task->method->order;
   run.control.failed_at = NAN;
   run.control.implicit = task->method->kind == HS_RADAU;
   run.steps_to_poll = run.poll_steps = 64;
+#if !defined(HS_NO_CLOCK)
   run.polled = clock();
+#endif
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
+  return run;
+}
+
+void hs_simulate(hs_task *task) {
+  hs_run run = open_run(task);
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
   if (task->settings.scheme == HS_LOCATED)
     located(&run, entered);
@@ -224,6 +233,7 @@ void hs_simulate(hs_task *task) {
     relaxed(&run, entered);
 }
 
+#include "pause.c"
 #if !defined(HS_FLOAT32)
 #include "ensemble.c"
 #endif

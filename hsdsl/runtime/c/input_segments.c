@@ -15,6 +15,14 @@ static int64_t segment_at(const hs_timeline *timeline, hs_time t) {
   return low > 0 ? low - 1 : 0;
 }
 
+/* Where the segment that the run is in ends, at the latest where it pauses; the last one lasts until then. */
+static hs_time segment_end(const hs_run *run) {
+  const hs_timeline *timeline = run->task->timeline;
+  const int64_t segment = run->here.segment;
+  const int open = segment == timeline->segments - 1 && hs_finite(run->pause);
+  return open ? run->pause : earlier(timeline->end[segment], run->pause);
+}
+
 static const hs_real *segment_data(const hs_run *run, int64_t segment) {
   return run->task->timeline->data + segment * run->model->data;
 }

@@ -250,7 +250,7 @@ static int along_guard(hs_run *run, int k, hs_time limit) {
 
 /* Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go. */
 static int located_flow(hs_run *run) {
-  const hs_time limit = run->task->timeline->end[run->here.segment], from = run->here.t;
+  const hs_time limit = segment_end(run), from = run->here.t;
   const int k = contact_at(run), n = run->here.dimension;
   if (k < 0) return follow(run, limit);
   copy(run->began, run->x, n);
@@ -319,6 +319,7 @@ static int jump(hs_run *run) {
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
+  if (t >= run->pause) return PAUSED;
   if (t < run->until) return go_on(run);
   const int held = contact_at(run), count = standing_on(run);
   if (count) {
@@ -329,16 +330,18 @@ static int located_at_boundary(hs_run *run) {
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);
 }
 
-/* Follow the execution until it stops. */
-static void located(hs_run *run, int outcome) {
+/* Follow the execution until it stops or pauses. */
+static int located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
     if (interrupted(run))
       outcome = stopped(run, HS_INTERRUPTED, run->here.t);
     else
-      outcome = run->here.t < run->task->timeline->end[run->here.segment] ? located_flow(run) : AT_BOUNDARY;
+      outcome = run->here.t < segment_end(run) ? located_flow(run) : AT_BOUNDARY;
     if (outcome == LANDED)
       outcome = jump(run);
     else if (outcome == AT_BOUNDARY)
       outcome = located_at_boundary(run);
+    if (outcome == GOES_ON && pauses(run)) return PAUSED;
   }
+  return outcome;
 }

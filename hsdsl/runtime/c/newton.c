@@ -48,7 +48,7 @@ HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h) {
   hs_convergence *const convergence = &run->radau.convergence;
   const hs_real tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
   const hs_real enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
-  hs_real left = pow(hs_max(convergence->left, HS_UNIT), 1.0 * 4 / 5), before = 0.0;
+  hs_real left = pow(hs_max(convergence->left, HS_UNIT), (hs_real)4 / 5), before = 0.0;
   const int late = followers(run, n);
   for (int count = 1;; count++) {
     const int rated = count > 1 + late;

@@ -2,7 +2,9 @@
 
 #include "functions.h"
 
+#if !defined(HS_NO_CLOCK)
 #define POLL_EVERY (CLOCKS_PER_SEC / 50)
+#endif
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
 HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
@@ -72,6 +74,13 @@ static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   return stopped(run, HS_STUCK, run->here.t);
 }
 
+#if defined(HS_NO_CLOCK)
+/* Ask the caller every so many steps whether to go on. */
+static void poll(hs_run *run) {
+  run->steps_to_poll = run->poll_steps;
+  if (run->task->poll(run->task)) run->interrupted = 1;
+}
+#else
 /* Ask the caller now and then whether to go on, of a short run never; a clock costs more than a step, so how many steps
    lie between is learnt. */
 static void poll(hs_run *run) {
@@ -84,6 +93,7 @@ static void poll(hs_run *run) {
   run->polled = now;
   if (run->task->poll(run->task)) run->interrupted = 1;
 }
+#endif
 
 /* Whether to stop: polls the caller now and then. */
 static int interrupted(hs_run *run) {
@@ -97,7 +107,7 @@ static int flow(hs_run *run) {
   hs_control *control = &run->control;
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const int n = here->dimension;
-  const hs_time limit = run->task->timeline->end[here->segment];
+  const hs_time limit = segment_end(run);
   run->stall.reached = NAN;
   run->stall.idle = run->stall.creeping = run->chatter = 0;
   forget_steps(run);
@@ -200,12 +210,11 @@ static int through_strip(hs_run *run) {
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 
-/* Enter the next segment of the inputs: anew where one of them jumps. */
-static int go_on(hs_run *run) {
+/* Go on in the segment of the inputs that time is in: anew where one of them has jumped. */
+static int continued(hs_run *run, int jumped) {
   const hs_time t = run->here.t;
   const hs_mode_state before = run->here;
-  const int64_t segment = segment_at(run->task->timeline, t);
-  if (run->task->timeline->jump[segment]) {
+  if (jumped) {
     if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
     return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
   }
@@ -214,9 +223,16 @@ static int go_on(hs_run *run) {
   return GOES_ON;
 }
 
+/* Enter the next segment of the inputs. */
+static int go_on(hs_run *run) {
+  const hs_timeline *timeline = run->task->timeline;
+  return continued(run, timeline->jump[segment_at(timeline, run->here.t)]);
+}
+
 /* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
 static int at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
+  if (t >= run->pause) return PAUSED;
   if (t < run->until) return go_on(run);
   const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
@@ -228,13 +244,18 @@ static int at_boundary(hs_run *run) {
   return in_strip(run, HS_UNTIL_ON_GUARD, t);
 }
 
-/* Follow the relaxed execution until it stops. */
-static void relaxed(hs_run *run, int outcome) {
+/* Whether a run pauses that is to pause behind its next transition. */
+static int pauses(const hs_run *run) { return run->after_jump && run->jump > run->jumps_before; }
+
+/* Follow the relaxed execution until it stops or pauses. */
+static int relaxed(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
     outcome = run->interrupted ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : flow(run);
     if (outcome == LANDED)
       outcome = through_strip(run);
     else if (outcome == AT_BOUNDARY)
       outcome = at_boundary(run);
+    if (outcome == GOES_ON && pauses(run)) return PAUSED;
   }
+  return outcome;
 }

@@ -3,7 +3,9 @@
 #ifndef HS_RUN_H
 #define HS_RUN_H
 
+#if !defined(HS_NO_CLOCK) /* given where there is none */
 #include <time.h>
+#endif
 
 #include "hs_math.h"
 #include "hs_simulate.h"
@@ -192,7 +194,9 @@ typedef struct {
   int64_t row, jump;   /* counted from the start of the run */
   int interrupted, full;
   long steps_to_poll, poll_steps;
+#if !defined(HS_NO_CLOCK)
   clock_t polled;
+#endif
   /* of the located scheme */
   hs_span span, before;
   int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
@@ -208,7 +212,29 @@ typedef struct {
   hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
   hs_made made[FREE];
+  hs_time pause; /* see pause.c: when to pause, and whether to do so behind a transition */
+  int after_jump;
+  int64_t jumps_before;
 } hs_run;
+
+/* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are
+   HS_PAUSE_NUMBERS and HS_PAUSE_INTEGERS of the others (workspace.h). `ended` says that it does not go on: see the
+   task's stop. Its time is behind the pause where it waits in a strip. */
+typedef struct {
+  int ended, mode, dimension, standing, emerging, noted_crowded, cascade_mode;
+  long cascade_length, cascade_room;
+  int64_t placed, jump, row;
+  hs_time time, entered_at;
+  hs_control control;
+  hs_made made[FREE];
+  hs_real *numbers, *data;
+  int32_t *integers;
+} hs_pause;
+
+/* Enter the task's mode at an instant and pause; then go on until an instant or, `after_jump`, the next transition. Where
+   inputs or parameters have `changed` since, the mode is entered anew. */
+HS_EXPORT void hs_begin(hs_task *task, hs_pause *pause, hs_time start);
+HS_EXPORT void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int changed, int after_jump);
 
 /* The earlier of two instants, the first where they are one. */
 static inline hs_time earlier(hs_time a, hs_time b) { return b < a ? b : a; }

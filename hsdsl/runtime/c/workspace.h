@@ -34,4 +34,8 @@
 #define HS_LOCATED_SPACE(w, m, modes, lines, stages, extra, order, degree) \
   HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, lines, stages, extra, degree, HS_MOST_DEGREE(order, degree))
 
+/* Memory of a paused run. */
+#define HS_PAUSE_NUMBERS(w, modes, states) (5 * (w) + (states) + (modes))
+#define HS_PAUSE_INTEGERS(m, modes) (2 * (m) + (modes)*HS_LARGER(m, 1) + (modes))
+
 #endif

@@ -110,7 +110,7 @@ static int close_tail(hs_run *run, int k) {
     return GOES_ON;
   const hs_real left = flight * ratio / (1 - ratio);
   const hs_time end = here->t + left;
-  if (left > run->epsilon || end > run->task->timeline->end[here->segment]) return GOES_ON;
+  if (left > run->epsilon || end > segment_end(run)) return GOES_ON;
   hs_real *const q = run->z;
   if (limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
   if (here->table->edge[k].contact < 0 || !run->task->settings.contacts) {

@@ -112,6 +112,9 @@ void hs_open(hs_instance *instance) {
   task->stop.x = instance->stop_x;
   task->stop.slope = instance->stop_slope;
   task->stop.scales = instance->stop_scales;
+  instance->pause.numbers = instance->pause_numbers;
+  instance->pause.data = instance->pause_data;
+  instance->pause.integers = instance->pause_integers;
 }
 
 #if defined(PROBLEM_TUNABLE)
@@ -138,6 +141,27 @@ void hs_run_instance(hs_instance *instance) {
   instance->rows = instance->jumps = 0;
   hs_simulate(task);
   flush(task);
+}
+
+static int handed_over(hs_instance *instance) {
+  flush(&instance->task);
+  return instance->pause.ended;
+}
+
+int hs_begin_instance(hs_instance *instance, hs_time start) {
+  instance->rows = instance->jumps = 0;
+  hs_begin(&instance->task, &instance->pause, start);
+  return handed_over(instance);
+}
+
+int hs_advance(hs_instance *instance, hs_time until, int changed, int after_jump) {
+  if (!instance->pause.ended) hs_go_on(&instance->task, &instance->pause, until, changed, after_jump);
+  return handed_over(instance);
+}
+
+const hs_real *hs_state(const hs_instance *instance, int *dimension) {
+  *dimension = instance->pause.dimension;
+  return instance->pause_numbers;
 }
 
 const char *hs_stop_word(const hs_stop *stop) {

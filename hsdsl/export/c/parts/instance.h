@@ -67,6 +67,10 @@ struct hs_instance {
   int32_t visited_mode[PROBLEM_VISITED];
   hs_real visited[PROBLEM_VISITED * PROBLEM_WIDTH + 1];
   int64_t slot[2 * PROBLEM_VISITED];
+  hs_pause pause;
+  hs_real pause_numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
+  hs_real pause_data[PROBLEM_DATA + 1];
+  int32_t pause_integers[HS_PAUSE_INTEGERS(PROBLEM_SURFACES, PROBLEM_MODES)];
 };
 
 /* Make an instance ready: the problem as the model's file has it. */
@@ -83,6 +87,16 @@ int hs_start(hs_instance *instance);
 
 /* Run to the end; everything that is written goes to the sink. */
 void hs_run_instance(hs_instance *instance);
+
+/* Run in stretches: begin at `start`, then go on until an instant or, `after_jump`, the next transition; a mode is entered
+   anew where inputs or parameters have `changed`. Not 0 where the run has ended. `instance->pause` has where it is: its
+   time is later than `until` where it waits in a strip. The end of the experiment does not end it. */
+int hs_begin_instance(hs_instance *instance, hs_time start);
+int hs_advance(hs_instance *instance, hs_time until, int changed, int after_jump);
+
+/* The state of a run in stretches, and how many numbers it has: those of its mode, or those that a final mode without a
+   flow was entered with. */
+const hs_real *hs_state(const hs_instance *instance, int *dimension);
 
 /* A word for why the run ended. */
 const char *hs_stop_word(const hs_stop *stop);

@@ -1,0 +1,307 @@
+/* Variables and values of a unit; states and their copies; stretches of a run. */
+
+#include "fmu.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "hs_math.h"
+#include "events.h"
+
+/* Whether a step ends behind its first transition. */
+static int pauses(const fmu *unit) { return unit->event_mode_used && unit->early_return_allowed; }
+
+/* Keep what is shown until the caller handles the event, or while the state waits in a strip. */
+static void before_transition(fmu *unit, const hs_transition_written *written) {
+  const hs_mode *mode = &hs_the_model.mode[written->made->mode];
+  memcpy(unit->now.before, unit->now.state, sizeof unit->now.before);
+  for (int s = 0; s < mode->dimension; s++) unit->now.before[mode->state[s]] = written->before[s];
+  unit->now.before_mode = written->made->mode;
+}
+
+static int take_transition(void *context, const hs_transition_written *written) {
+  fmu *unit = context;
+  if (written->after && !(pauses(unit) && unit->now.jumps > unit->jumps_before)) before_transition(unit, written);
+  if (written->after) fmu_enter(unit, written->made->mode, written->made->edge, written->after);
+  unit->now.jumps++;
+  return 0;
+}
+
+fmu *fmu_new(int co_simulation) {
+  fmu *unit = calloc(1, sizeof *unit);
+  if (!unit) return 0;
+  unit->co_simulation = co_simulation;
+  fmu_reset(unit);
+  return unit;
+}
+
+void fmu_free(fmu *unit) { free(unit); }
+
+void fmu_reset(fmu *unit) {
+  const hs_sink sink = {unit, 0, take_transition};
+  const hs_mode *mode = &hs_the_model.mode[problem_mode];
+  memset(&unit->now, 0, sizeof unit->now);
+  hs_open(&unit->run);
+  unit->run.sink = sink;
+  unit->now.mode = problem_mode;
+  unit->now.resting = -1;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.parameters[i] = unit->run.parameters[i];
+  for (int s = 0; s < mode->dimension; s++) unit->now.state[mode->state[s]] = problem_x[s];
+  for (int i = 0; i < FMU_INPUTS; i++) unit->now.input[i] = fmu_input_start[i];
+  unit->now.tuned = 1;
+  unit->bound = 0;
+}
+
+/* Put parameters and the inputs that were set where routines and the run read them; not 0 where one has no value. */
+static int put_in_place(fmu *unit) {
+  double *const data = unit->run.data;
+  memcpy(data, problem_timeline.data, PROBLEM_SEGMENTS * PROBLEM_DATA * sizeof *data);
+  for (int i = 0; i < FMU_INPUTS; i++)
+    if (fmu_input[i].given >= 0) unit->now.parameters[fmu_input[i].given] = unit->now.input_set[i] ? 0.0 : 1.0;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->run.parameters[i] = unit->now.parameters[i];
+  if (hs_tune(&unit->run)) return 1;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.parameters[i] = unit->run.parameters[i];
+  for (int i = 0; i < FMU_INPUTS; i++) {
+    if (!unit->now.input_set[i]) continue;
+    for (int64_t k = 0; k < PROBLEM_SEGMENTS; k++) {
+      double *const line = data + k * PROBLEM_DATA + PROBLEM_PARAMETERS + 3 * fmu_input[i].samples;
+      line[0] = unit->now.input[i], line[1] = line[2] = 0.0;
+    }
+  }
+  unit->now.tuned = 0;
+  unit->bound = 0;
+  return 0;
+}
+
+/* Bind routines to the segment of the inputs that was entered last. */
+const double *fmu_bind(fmu *unit) {
+  if (unit->now.tuned && put_in_place(unit)) return 0;
+  if (!unit->bound) memcpy(unit->p, unit->run.data + unit->now.segment * PROBLEM_DATA, PROBLEM_DATA * sizeof(double));
+  unit->bound = 1;
+  return unit->p;
+}
+
+/* The states of a mode, of those of all modes. */
+void fmu_local(const fmu *unit, double *x) {
+  const hs_mode *mode = &hs_the_model.mode[unit->now.mode];
+  for (int s = 0; s < mode->dimension; s++) x[s] = unit->now.state[mode->state[s]];
+}
+
+static double interpolated_input(fmu *unit, int i) {
+  const double *p = fmu_bind(unit);
+  if (!p) return NAN;
+  if (fmu_input[i].given >= 0) return unit->now.input_set[i] ? unit->now.input[i] : fmu_given(i, p, unit->now.time);
+  const double *line = p + PROBLEM_PARAMETERS + 3 * fmu_input[i].samples;
+  return line[0] + line[1] * (unit->now.time - line[2]);
+}
+
+static fmu_status output(fmu *unit, int index, double *value) {
+  double x[PROBLEM_WIDTH + 1], out[PROBLEM_OUTPUTS + 1];
+  fmu_data *const now = &unit->now;
+  const int mode = now->mode;
+  const double *p = fmu_bind(unit);
+  if (!p) return FMU_NO_VALUE;
+  if (now->shows_before) now->mode = now->before_mode;
+  const double *const states = now->shows_before ? now->before : now->state;
+  const hs_mode *table = &hs_the_model.mode[now->mode];
+  for (int s = 0; s < table->dimension; s++) x[s] = states[table->state[s]];
+  now->mode = mode;
+  *value = table->outputs(p, now->time, x, out) ? NAN : out[index];
+  return FMU_OK;
+}
+
+fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
+  const fmu_data *now = &unit->now;
+  double slopes[PROBLEM_STATES + 1], indicators[PROBLEM_SURFACES + 1];
+  if (reference >= FMU_VARIABLES) return FMU_ERROR;
+  const fmu_variable *variable = &fmu_variables[reference];
+  switch (variable->kind) {
+    case FMU_TIME: *value = now->time; return FMU_OK;
+    case FMU_STATE: *value = (now->shows_before ? now->before : now->state)[variable->index]; return FMU_OK;
+    case FMU_PARAMETER:
+      if (!fmu_bind(unit)) return FMU_NO_VALUE;
+      *value = now->parameters[variable->index];
+      return FMU_OK;
+    case FMU_INPUT: *value = interpolated_input(unit, variable->index); return FMU_OK;
+    case FMU_OUTPUT: return output(unit, variable->index, value);
+    case FMU_DERIVATIVE:
+      if (fmu_get_derivatives(unit, slopes)) return FMU_NO_VALUE;
+      *value = slopes[variable->index];
+      return FMU_OK;
+    case FMU_INDICATOR:
+      if (fmu_get_indicators(unit, indicators)) return FMU_NO_VALUE;
+      *value = indicators[variable->index];
+      return FMU_OK;
+    default: return FMU_ERROR;
+  }
+}
+
+fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
+  fmu_data *now = &unit->now;
+  if (reference >= FMU_VARIABLES) return FMU_ERROR;
+  const fmu_variable *variable = &fmu_variables[reference];
+  switch (variable->kind) {
+    case FMU_TIME: now->time = value; return FMU_OK;
+    case FMU_STATE:
+      now->state[variable->index] = value;
+      now->state_set[variable->index] = 1;
+      return FMU_OK;
+    case FMU_PARAMETER:
+      if (problem_derived[variable->index] || (now->started && problem_structural[variable->index])) return FMU_ERROR;
+      if (problem_structural[variable->index] && value != problem_timeline.data[variable->index]) return FMU_ERROR;
+      now->changed |= now->parameters[variable->index] != value;
+      now->parameters[variable->index] = value;
+      now->tuned = 1;
+      return FMU_OK;
+    case FMU_INPUT:
+      if (fmu_input[variable->index].fixed) return FMU_ERROR;
+      now->changed |= !now->input_set[variable->index] || now->input[variable->index] != value;
+      now->input[variable->index] = value;
+      now->input_set[variable->index] = now->tuned = 1;
+      return FMU_OK;
+    default: return FMU_ERROR;
+  }
+}
+
+int fmu_mode(const fmu *unit) { return unit->now.shows_before ? unit->now.before_mode : unit->now.mode; }
+
+void fmu_set_time(fmu *unit, double time) { unit->now.time = time; }
+
+void fmu_set_states(fmu *unit, const double *x) { memcpy(unit->now.state, x, PROBLEM_STATES * sizeof *x); }
+
+void fmu_get_states(const fmu *unit, double *x) { memcpy(x, unit->now.state, PROBLEM_STATES * sizeof *x); }
+
+void fmu_get_nominals(const fmu *unit, double *x) {
+  (void)unit;
+  memcpy(x, fmu_nominal, PROBLEM_STATES * sizeof *x);
+}
+
+fmu_status fmu_get_derivatives(fmu *unit, double *slopes) {
+  double x[PROBLEM_WIDTH + 1], out[PROBLEM_WIDTH + 1];
+  const hs_mode *mode = fmu_table(unit);
+  const double *p = fmu_bind(unit);
+  for (int i = 0; i < PROBLEM_STATES; i++) slopes[i] = 0.0;
+  if (!p) return FMU_NO_VALUE;
+  if (unit->now.ended || !mode->dimension) return FMU_OK;
+  fmu_local(unit, x);
+  if (mode->flow(p, unit->now.time, x, out)) return FMU_NO_VALUE;
+  for (int s = 0; s < mode->dimension; s++) {
+    if (!hs_finite(out[s])) return FMU_NO_VALUE;
+    slopes[mode->state[s]] = out[s];
+  }
+  return FMU_OK;
+}
+
+/* Bring the run's state to that of the unit. */
+static void follow_run(fmu *unit) {
+  int dimension;
+  const double *x = hs_state(&unit->run, &dimension);
+  const hs_pause *pause = &unit->run.pause;
+  const hs_mode *mode = &hs_the_model.mode[pause->mode];
+  unit->now.mode = pause->mode;
+  for (int s = 0; s < mode->dimension && s < dimension; s++) unit->now.state[mode->state[s]] = x[s];
+  unit->now.segment = fmu_segment_at(unit->now.time);
+  unit->bound = 0;
+}
+
+/* Whether a run has ended other than in a final mode; it is said why. */
+static int has_failed(fmu *unit) {
+  if (!unit->now.ended || unit->run.task.stop.reason == HS_FINAL) return 0;
+  unit->complaint = hs_stop_word(&unit->run.task.stop);
+  return 1;
+}
+
+static fmu_status started(fmu *unit) {
+  fmu_data *now = &unit->now;
+  const hs_mode *mode = &hs_the_model.mode[problem_mode];
+  for (int s = 0; s < problem_dimension && s < mode->dimension; s++) unit->run.x[s] = now->state[mode->state[s]];
+  now->ended = hs_begin_instance(&unit->run, now->time);
+  follow_run(unit);
+  return has_failed(unit) ? FMU_ERROR : FMU_OK;
+}
+
+fmu_status fmu_initialize(fmu *unit) {
+  fmu_data *now = &unit->now;
+  const hs_mode *mode = &hs_the_model.mode[problem_mode];
+  int jumped;
+  double next;
+  if (!fmu_bind(unit)) return FMU_ERROR;
+  if (hs_start(&unit->run)) return FMU_ERROR;
+  for (int s = 0; s < mode->dimension; s++)
+    if (!now->state_set[mode->state[s]]) now->state[mode->state[s]] = unit->run.x[s];
+  now->segment = fmu_segment_at(now->time);
+  unit->bound = 0;
+  now->started = 1;
+  if (unit->co_simulation) return started(unit);
+  now->changed = 1; /* what the initial state is beyond fires at once */
+  return fmu_update(unit, &jumped, &next);
+}
+
+fmu_status fmu_step(fmu *unit, double until, double *reached, int *event) {
+  fmu_data *now = &unit->now;
+  *event = 0;
+  *reached = until;
+  if (!fmu_bind(unit)) return FMU_ERROR;
+  if (now->ended) {
+    now->time = until;
+    return FMU_OK;
+  }
+  const int64_t jumps = unit->jumps_before = now->jumps;
+  const int changed = now->changed;
+  now->changed = now->shows_before = 0;
+  now->ended = hs_advance(&unit->run, until, changed, pauses(unit));
+  const double time = unit->run.pause.time;
+  if (now->ended) *reached = unit->run.task.stop.time < until ? unit->run.task.stop.time : until;
+  if (pauses(unit) && now->jumps > jumps && time < until) *reached = time;
+  *event = now->jumps > jumps;
+  now->time = *reached;
+  follow_run(unit);
+  now->shows_before = time > until || (*event && pauses(unit));
+  has_failed(unit);
+  return FMU_OK;
+}
+
+size_t fmu_size(void) { return sizeof(fmu_data); }
+
+void fmu_save(const fmu *unit, void *bytes) {
+  fmu_data *data = bytes;
+  memcpy(data, &unit->now, sizeof *data);
+  data->pause = unit->run.pause;
+  data->pause.numbers = data->pause.data = 0;
+  data->pause.integers = 0;
+  memcpy(data->numbers, unit->run.pause_numbers, sizeof unit->run.pause_numbers);
+  memcpy(data->data, unit->run.pause_data, sizeof unit->run.pause_data);
+  memcpy(data->integers, unit->run.pause_integers, sizeof unit->run.pause_integers);
+}
+
+int fmu_restore(fmu *unit, const void *bytes) {
+  hs_pause *const pause = &unit->run.pause;
+  memcpy(&unit->now, bytes, sizeof unit->now);
+  *pause = unit->now.pause;
+  pause->numbers = unit->run.pause_numbers;
+  pause->data = unit->run.pause_data;
+  pause->integers = unit->run.pause_integers;
+  memcpy(unit->run.pause_numbers, unit->now.numbers, sizeof unit->run.pause_numbers);
+  memcpy(unit->run.pause_data, unit->now.data, sizeof unit->run.pause_data);
+  memcpy(unit->run.pause_integers, unit->now.integers, sizeof unit->run.pause_integers);
+  unit->now.tuned = 1;
+  unit->bound = 0;
+  return 0;
+}
+
+fmu_status fmu_slope(fmu *unit, unsigned unknown, unsigned known, double *slope) {
+  double x[PROBLEM_WIDTH + 1], values[FMU_SLOPES + 1];
+  const fmu_slope_table *table = &fmu_slopes[fmu_table(unit) - hs_the_model.mode];
+  if (unknown >= FMU_VARIABLES || known >= FMU_VARIABLES) return FMU_ERROR;
+  const fmu_variable *row = &fmu_variables[unknown], *column = &fmu_variables[known];
+  const double *p = fmu_bind(unit);
+  *slope = row->kind == column->kind && row->index == column->index;
+  if (row->kind != FMU_DERIVATIVE && row->kind != FMU_OUTPUT) return FMU_OK;
+  if (!p) return FMU_NO_VALUE;
+  fmu_local(unit, x);
+  if (unit->now.ended) return FMU_OK;
+  if (table->values(p, unit->now.time, x, values)) return FMU_NO_VALUE;
+  for (int i = 0; i < table->count; i++)
+    if (table->row[i] == unknown && table->column[i] == known) *slope = values[i];
+  return FMU_OK;
+}

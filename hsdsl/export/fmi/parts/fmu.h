@@ -1,0 +1,78 @@
+/* The exported model as both versions of FMI see it: variables by reference, events, and stretches of a run. */
+
+#ifndef FMU_H
+#define FMU_H
+
+#include "instance.h"
+#include "variables.h"
+
+typedef enum { FMU_OK, FMU_NO_VALUE, FMU_ERROR } fmu_status;
+
+/* All of a unit that changes, as plain data: copied, it is the unit's state. States are those of all modes, by name; one
+   that the present mode does not have keeps its value. */
+typedef struct {
+  double time, stop_time;
+  int started, ended; /* `ended`: the run is over, by a final mode or otherwise */
+  int mode, resting;  /* the edge along whose guard the state moves, or -1 */
+  int32_t segment;
+  double state[PROBLEM_STATES + 1], scale[PROBLEM_STATES + 1];
+  int state_set[PROBLEM_STATES + 1];
+  int outside[PROBLEM_SURFACES + 1]; /* whether the state was beyond a surface that did not fire, at the last event */
+  double margin[PROBLEM_SURFACES + 1];
+  double parameters[PROBLEM_PARAMETERS + 1];
+  double input[FMU_INPUTS + 1];
+  int input_set[FMU_INPUTS + 1];
+  int changed, tuned; /* inputs or parameters since the last event, and parameters since they were put in place */
+  /* of co-simulation: what is shown in place of the state while it waits in a strip, or before an event is handled */
+  int shows_before, before_mode;
+  double before[PROBLEM_STATES + 1];
+  int64_t jumps;
+  hs_pause pause;
+  double numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
+  double data[PROBLEM_DATA + 1];
+  int32_t integers[HS_PAUSE_INTEGERS(PROBLEM_SURFACES, PROBLEM_MODES)];
+} fmu_data;
+
+typedef struct {
+  fmu_data now;
+  int co_simulation, event_mode_used, early_return_allowed;
+  double p[PROBLEM_DATA + 1]; /* what routines are bound to, at `bound` */
+  int bound;
+  int64_t jumps_before;
+  hs_instance run;
+  const char *complaint;
+} fmu;
+
+fmu *fmu_new(int co_simulation);
+void fmu_free(fmu *unit);
+void fmu_reset(fmu *unit);
+
+fmu_status fmu_get(fmu *unit, unsigned reference, double *value);
+fmu_status fmu_set(fmu *unit, unsigned reference, double value);
+int fmu_mode(const fmu *unit);
+
+void fmu_set_time(fmu *unit, double time);
+void fmu_set_states(fmu *unit, const double *x);
+void fmu_get_states(const fmu *unit, double *x);
+void fmu_get_nominals(const fmu *unit, double *x);
+fmu_status fmu_get_derivatives(fmu *unit, double *slopes);
+fmu_status fmu_get_indicators(fmu *unit, double *z);
+
+/* Derive what depends on parameters; then enter the initial mode. */
+fmu_status fmu_initialize(fmu *unit);
+
+/* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
+fmu_status fmu_update(fmu *unit, int *jumped, double *next);
+
+/* Go on until a time, or behind the first transition where the caller handles events; `reached` is how far. */
+fmu_status fmu_step(fmu *unit, double until, double *reached, int *event);
+
+/* The slope of one variable by another, both by their references. */
+fmu_status fmu_slope(fmu *unit, unsigned unknown, unsigned known, double *slope);
+
+/* The state of a unit as bytes. */
+size_t fmu_size(void);
+void fmu_save(const fmu *unit, void *bytes);
+int fmu_restore(fmu *unit, const void *bytes);
+
+#endif

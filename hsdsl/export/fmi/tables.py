@@ -1,0 +1,112 @@
+"""The variables of a unit as tables of C, with their derivatives; for `parts/fmu.c`."""
+
+from __future__ import annotations
+
+from hsdsl.backends.c import routine_functions
+from hsdsl.backends.c.printer import literal
+from hsdsl.export.c.text import array, comment, string
+from hsdsl.export.fmi.variables import Unit, nominals, switched
+from hsdsl.lower.slopes import lower_given
+
+_HEADER = """
+#ifndef VARIABLES_H
+#define VARIABLES_H
+
+#include "hs.h"
+
+enum {{ FMU_TIME, FMU_STATE, FMU_DERIVATIVE, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT, FMU_MODE, FMU_INDICATOR }};
+
+#define FMU_VARIABLES {variables}
+#define FMU_INPUTS {inputs}
+#define FMU_SLOPES {slopes}
+#define FMU_TOKEN {token}
+
+/* A variable by its reference: its kind, and its place among those of the kind. */
+typedef struct {{
+  int kind, index;
+}} fmu_variable;
+
+/* An input: its place among sampled ones, the parameter that turns its expression off (-1: samples), and whether it
+   stays as given. */
+typedef struct {{
+  int samples, given, fixed;
+}} fmu_input_place;
+
+/* The slopes of a mode that are not zero everywhere, by references of unknown and known. */
+typedef struct {{
+  hs_routine *values;
+  int count;
+  const unsigned *row, *column;
+}} fmu_slope_table;
+
+extern const fmu_variable fmu_variables[];
+extern const fmu_input_place fmu_input[];
+extern const double fmu_input_start[], fmu_nominal[];
+extern const fmu_slope_table fmu_slopes[];
+
+/* The value of the expression of an input. */
+double fmu_given(int input, const double *p, double t);
+
+#endif
+"""
+_GIVEN = """
+double fmu_given(int input, const double *p, double t) {{
+  double out[1] = {{NAN}};
+  (void)input, (void)p, (void)t;
+{calls}
+  return out[0];
+}}
+"""
+
+
+def header(unit: Unit, token: str) -> str:
+    """The text of ``variables.h``."""
+    return comment(unit.source.heading) + _HEADER.format(
+        variables=len(unit.variables),
+        inputs=len(unit.source.system.inputs),
+        slopes=max(len(slopes.places) for slopes in unit.slopes),
+        token=string(token),
+    )
+
+
+def numbers(unit: Unit) -> str:
+    """The text of ``variables.c``."""
+    system, problem = unit.source.system, unit.problem
+    off = switched(unit.source)
+    inputs = [variable for variable in unit.variables if variable.kind == "input"]
+    variables = (f"{{FMU_{variable.kind.upper()}, {variable.index}}}" for variable in unit.variables)
+    places = (f"{{{i}, {off.get(given.name, -1)}, {int(inputs[i].fixed)}}}" for i, given in enumerate(system.inputs))
+    parts = [
+        comment(unit.source.heading),
+        '\n#include "variables.h"\n\n#include "hs_math.h"\n\n',
+        array("const fmu_variable", "fmu_variables", variables),
+        array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0}"]),
+        array("const double", "fmu_input_start", (literal(variable.start or 0.0) for variable in inputs)),
+        array("const double", "fmu_nominal", map(literal, nominals(problem))),
+        _slopes(unit),
+        _given(unit),
+    ]
+    return "".join(parts)
+
+
+def _slopes(unit: Unit) -> str:
+    program = unit.problem.program
+    derivatives, outputs = unit.references("derivative"), unit.references("output")
+    states, inputs = unit.references("state"), unit.references("input")
+    parts, rows = list[str](), list[str]()
+    for k, (mode, slopes) in enumerate(zip(program.flows, unit.slopes, strict=True)):
+        own = [program.all_states.index(name) for name in mode.states]
+        row = [*(derivatives[i] for i in own), *outputs]
+        column = [*(states[i] for i in own), *inputs]
+        parts.append(routine_functions(slopes.routines, program, f"mode_{k}_"))
+        parts.append(array("static const unsigned", f"row_{k}", (str(row[i]) for i, _ in slopes.places)))
+        parts.append(array("static const unsigned", f"column_{k}", (str(column[i]) for _, i in slopes.places)))
+        rows.append(f"{{mode_{k}_slopes, {len(slopes.places)}, row_{k}, column_{k}}}")
+    return "".join(parts) + array("const fmu_slope_table", "fmu_slopes", rows)
+
+
+def _given(unit: Unit) -> str:
+    routines = lower_given(unit.source.system)
+    calls = (f"  if (input == {name.removeprefix('given_')}) {name}(p, t, 0, out);" for name in routines.names)
+    functions = routine_functions(routines, unit.problem.program, "")
+    return functions + _GIVEN.format(calls="\n".join(calls))

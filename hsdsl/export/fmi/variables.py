@@ -1,0 +1,171 @@
+"""The variables of a unit: time, states, derivatives, parameters, inputs, outputs and the mode, by their references."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.backends.text import compile_routines
+from hsdsl.elaborate.inputs import switch_name
+from hsdsl.export.c.tuning import derived, structural
+from hsdsl.export.source import Source, drivable
+from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
+from hsdsl.simulate import Problem
+
+Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
+_FIRST = re.compile(r"\ba(\d+)\b")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable; ``index`` is its place among those of its kind, its reference that among all.
+
+    ``start`` is None where there is none, ``fixed`` says that it stays as exported (an input: that it cannot be set).
+    """
+
+    kind: Kind
+    index: int
+    name: str
+    unit: str | None = None
+    start: float | None = None
+    about: str | None = None
+    fixed: bool = False
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    discrete: bool = False
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A source whose inputs can be driven, with its variables in the order of their references."""
+
+    source: Source
+
+    @property
+    def problem(self) -> Problem:
+        """The problem, as exported."""
+        return self.source.problem
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """All variables; a name that is taken gets underscores."""
+        found: list[Variable] = []
+        taken: set[str] = set()
+        for variable in (*_time(), *_states(self.source), *_parameters(self.source), *self._others()):
+            name = variable.name
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            found.append(replace(variable, name=name))
+        return tuple(found)
+
+    def _others(self) -> tuple[Variable, ...]:
+        system, units = self.source.system, self.source.system.units
+        outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
+        surfaces = max(len(mode.edges) + len(mode.walls) for mode in self.problem.program.flows)
+        indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
+        listed = "; ".join(f"{k} {mode.name}" for k, mode in enumerate(system.modes))
+        return (*_inputs(self.source), *outputs, Variable("mode", 0, "mode", about=f"the mode: {listed}"), *indicators)
+
+    def references(self, *kinds: Kind) -> list[int]:
+        """The references of the variables of some kinds."""
+        return [i for i, variable in enumerate(self.variables) if variable.kind in kinds]
+
+    @cached_property
+    def slopes(self) -> tuple[Slopes, ...]:
+        """Derivatives of flows and outputs in each mode."""
+        return lower_slopes(self.source.system)
+
+
+def unit_of(source: Source) -> Unit:
+    """The unit of a source."""
+    return Unit(drivable(source))
+
+
+def _time() -> tuple[Variable, ...]:
+    return (Variable("time", 0, "time"),)
+
+
+def _states(source: Source) -> tuple[Variable, ...]:
+    problem, units = source.problem, source.system.units
+    start = dict(zip(problem.states, problem.x, strict=True))
+    names = problem.program.all_states
+    scale = nominals(problem)
+    states = (
+        Variable("state", i, name, units.get(name), float(start.get(name, 0.0)), nominal=scale[i])
+        for i, name in enumerate(names)
+    )
+    return (*states, *(Variable("derivative", i, f"der({name})", units.get(name)) for i, name in enumerate(names)))
+
+
+def nominals(problem: Problem) -> list[float]:
+    """A size for each state: as given, else that of its initial value, else 1."""
+    start = dict(zip(problem.states, problem.x, strict=True))
+    given = problem.settings.scale
+    return [float(given.get(name) or abs(start.get(name, 0.0)) or 1.0) for name in problem.program.all_states]
+
+
+def switched(source: Source) -> dict[str, int]:
+    """For each input that is an expression of time the parameter that turns the expression off."""
+    names = source.problem.program.parameters
+    return {
+        given.name: names.index(switch_name(given.name)) for given in source.system.inputs if given.given is not None
+    }
+
+
+def _parameters(source: Source) -> list[Variable]:
+    problem = source.problem
+    own, fixed, hidden = derived(problem), structural(problem), set(switched(source).values())
+    values = problem.timeline.segments[0].data
+    found: list[Variable] = []
+    for i, parameter in enumerate(source.system.parameters):
+        if i in hidden:
+            continue
+        start = None if parameter.name in own else float(values[i])
+        least, most = (_bound(source, f"{kind}_{i}") for kind in ("minimum", "maximum"))
+        found.append(
+            Variable(
+                "parameter",
+                i,
+                parameter.name,
+                parameter.unit,
+                start,
+                parameter.about,
+                fixed=parameter.name in fixed,
+                minimum=least,
+                maximum=most,
+            )
+        )
+    return found
+
+
+def _bound(source: Source, name: str) -> float | None:
+    program, data = source.problem.program, source.problem.timeline.segments[0].data
+    if name not in program.constants.names:
+        return None
+    return float(source.problem.kernel.constant(name, data[: len(program.parameters)])[0])
+
+
+def _inputs(source: Source) -> list[Variable]:
+    """Inputs; one that decides when switches of time change stays as given."""
+    problem = source.problem
+    deciding = {int(i) for i in _FIRST.findall(problem.program.switching.source.partition("\n")[2])}
+    count, data = len(problem.program.parameters), problem.timeline.segments[0].data
+    found: list[Variable] = []
+    for i, given in enumerate(source.system.inputs):
+        start, slope, since = data[count + 3 * i : count + 3 * i + 3]
+        first = given_start(source, i) if given.given is not None else start + slope * (0.0 - since)
+        held = given.given is None and given.hold == "zero"
+        found.append(Variable("input", i, given.name, given.unit, float(first), fixed=i in deciding, discrete=held))
+    return found
+
+
+def given_start(source: Source, index: int) -> float:
+    """The value that the expression of an input has at t = 0."""
+    routines = lower_given(source.system)
+    bound = compile_routines(routines, FLOAT64, "inputs")(*source.problem.timeline.segments[0].data)
+    return bound[routines.names.index(f"given_{index}")](0.0)[0]

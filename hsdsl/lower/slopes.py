@@ -1,0 +1,61 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
+"""Derivatives of flows and outputs by states and inputs, which exports offer and no simulation needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hsdsl.completion import contact
+from hsdsl.expression.stack import deep_stack
+from hsdsl.lower import LoweredMode, number
+from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.lower.straight import Gradient
+from hsdsl.lower.switches import with_switches
+from hsdsl.program import Routines
+from hsdsl.system import TIME, HybridSystem
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """The slopes of a mode that are not zero everywhere, of the routine ``slopes``.
+
+    ``places`` has for each its row and column: rows are the flow of each state, then the outputs, columns the states,
+    then the sampled inputs.
+    """
+
+    routines: Routines
+    places: tuple[tuple[int, int], ...]
+
+
+def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
+    """The slopes of each mode, then of the motions along guards: in the order of `Program.flows`."""
+    with deep_stack():
+        whole, switches = with_switches(system)
+        names = number(whole, switches.symbols)
+        held = (contact(mode, k) for mode in whole.modes for k in range(len(mode.edges)))
+        flows = (*whole.modes, *(motion.mode for motion in held if motion is not None))
+        return tuple(_slopes(LoweredMode(mode, names)) for mode in flows)
+
+
+def _slopes(mode: LoweredMode) -> Slopes:
+    given = [k for k, output in enumerate(mode.mode.outputs) if output is not None]
+    outputs = mode.place(mode.mode.outputs[k] for k in given)
+    rows = [*range(len(mode.flow)), *(len(mode.flow) + k for k in given)]
+    columns = (*mode.states, *mode.names.inputs)
+    slopes = Gradient((*mode.flow, *outputs), columns)
+    order = {symbol: i for i, symbol in enumerate(columns)}
+    places = [(row, order[symbol]) for row, sparse in zip(rows, slopes.sparse, strict=True) for symbol in sparse]
+    values = tuple(slope for sparse in slopes.sparse for slope in sparse.values())
+    definition = Definition("slopes", (TIME, *mode.states), values, slopes.statements)
+    return Slopes(print_routines((definition,), mode.names.data), tuple(places))
+
+
+def lower_given(system: HybridSystem) -> Routines:
+    """Routines ``given_i`` of time: the expression of input i, where it may be driven from outside."""
+    with deep_stack():
+        whole, switches = with_switches(system)
+        names = number(whole, switches.symbols)
+        placed = ((i, given.given) for i, given in enumerate(whole.inputs) if given.given is not None)
+        definitions = [Definition(f"given_{i}", (TIME,), (expr.xreplace(names.shared),)) for i, expr in placed]
+        return print_routines(definitions, names.data)

@@ -1,0 +1,291 @@
+"""Functional mock-up units against runs: FMPy validates and simulates them, and calls their functions one by one."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from export.c_builds import COMPILERS, WARNINGS
+
+import hsdsl
+from hsdsl.export import files_of, source_of
+from hsdsl.export.fmi import archive
+from hsdsl.export.fmi.variables import unit_of
+from hsdsl.model import Model
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
+from fmpy.validation import validate_fmu  # noqa: E402
+
+MODELS = Path(__file__).parents[2] / "models"
+NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml"))]
+VERSIONS = (2, 3)
+BALL = """
+hsdsl: 1
+parameters: {g: 9.81, e: 0.7}
+modes:
+  fly: {flow: {h: v, v: -g}, transitions: [{name: bounce, when: h <= 0, to: fly, reset: {v: -e*v}}]}
+initial: {mode: fly, h: 1, v: 0}
+experiment: {until: 2.4}
+"""
+DRIVEN = """
+hsdsl: 1
+title: "]]> <a b='c'> & \\"--> ü"
+units: {t: s, x: m, v: m/s, k: N/m, m: kg, u: N}
+parameters: {k: {value: 4, min: 0, about: "stiffness < \\"&"}, m: 2, c: k/m, start: m/2}
+inputs:
+  u: sin(t)
+  w: {times: [0, 1, 2], values: [0, 1, 0.5], hold: linear}
+  s: {times: [0, 1.5], values: [0, 1], hold: zero}
+modes:
+  slide:
+    flow: {x: v, v: u/m - c*x + w*x*s}
+    transitions: [{name: "<hit>&", when: x >= 2, to: slide, reset: {v: -v/2}}]
+outputs: {force: k*x + u}
+initial: {mode: slide, x: start, v: 1}
+experiment: {until: 3, tolerance: 1e-10}
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Units by model and version, each made once."""
+    known: dict[tuple[str, int], str] = {}
+
+    def make(text: str, version: int) -> str:
+        if (text, version) not in known:
+            model = hsdsl.loads(text) if "\n" in text else hsdsl.load(MODELS / f"{text}.yaml")
+            ((name, content),) = files_of(source_of(model, {}), f"fmi{version}").items()
+            path = tmp_path_factory.mktemp("unit") / name
+            path.write_bytes(content)
+            known[text, version] = str(path)
+        return known[text, version]
+
+    yield make
+
+
+def loaded(text: str) -> Model:
+    return hsdsl.loads(text) if "\n" in text else hsdsl.load(MODELS / f"{text}.yaml")
+
+
+def jumps(result: Any, names: list[str]) -> list[float]:
+    """The times at which a result has two rows that differ."""
+    same = np.diff(result["time"]) == 0
+    differ = np.any([np.diff(result[name]) != 0 for name in names], axis=0)
+    return list(result["time"][1:][same & differ])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("text", [*NAMES, BALL, DRIVEN], ids=[*NAMES, "ball", "driven"])
+def test_descriptions_have_no_findings(text: str, version: int, tmp_path: Path) -> None:
+    unit = unit_of(source_of(loaded(text), {}))
+    module = __import__(f"hsdsl.export.fmi{version}", fromlist=["description"])
+    path = tmp_path / "unit.fmu"
+    path.write_bytes(archive.archived({"modelDescription.xml": module.description(unit).encode()}))
+    assert validate_fmu(str(path)) == []
+
+
+def test_all_functions_of_the_standard_are_exported(made: Any) -> None:
+    text = (archive.FOLDER / "headers" / "fmi3Functions.h").read_text()
+    names = set(re.findall(r"FMI3_Export\s+\w+\s+(fmi3\w+);", text))
+    assert len(names) == 75
+    folder = Path(fmpy.extract(made(BALL, 3)))
+    (library,) = folder.glob("binaries/*/*.so")
+    loaded_library = ctypes.CDLL(str(library))
+    assert all(hasattr(loaded_library, name) for name in names)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_sources_compile_without_warnings(compiler: str, version: int, tmp_path: Path) -> None:
+    unit = unit_of(source_of(loaded(DRIVEN), {}))
+    for name, content in archive.sources_of(unit, version).items():
+        (tmp_path / name).write_bytes(content)
+    names = [name for name in archive.compiled_names(version) if name != "hs.c"]  # the tests of C compile that
+    command = [*COMPILERS[compiler], *WARNINGS, "-c", *names]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_ball_in_model_exchange_and_co_simulation(version: int, made: Any) -> None:
+    path, run = made(BALL, version), loaded(BALL).simulate()
+    exact = [made.time for made in run.transitions]
+    result = fmpy.simulate_fmu(path, fmi_type="ModelExchange", relative_tolerance=1e-10, stop_time=2.4)
+    times = jumps(result, ["v"])
+    assert times[0] == pytest.approx(0.4515236409857, abs=1e-6)
+    assert len(times) == len(exact)
+    assert times == pytest.approx(exact, abs=1e-6)
+    assert result["h"].min() > -1e-8
+    result = fmpy.simulate_fmu(path, fmi_type="CoSimulation", output_interval=0.1, stop_time=2.4)
+    assert result["h"] == pytest.approx(run.sample(result["time"].clip(0, 2.4))["h"], abs=1e-12)
+
+
+def test_ball_with_event_mode_makes_the_same_transitions(made: Any) -> None:
+    run = loaded(BALL).simulate()
+    result = fmpy.simulate_fmu(
+        made(BALL, 3), fmi_type="CoSimulation", output_interval=0.1, stop_time=2.4, use_event_mode=True,
+        early_return_allowed=True,
+    )  # fmt: skip
+    assert jumps(result, ["v"]) == pytest.approx([made.time for made in run.transitions], abs=1e-12)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_ball_comes_to_rest_and_stays(version: int, made: Any) -> None:
+    result = fmpy.simulate_fmu(made(BALL, version), fmi_type="ModelExchange", relative_tolerance=1e-10, stop_time=4)
+    late = result[result["time"] > 2.6]
+    assert np.all(late["v"] == 0)
+    assert np.all(np.abs(late["h"]) < 1e-8)
+    result = fmpy.simulate_fmu(made(BALL, version), fmi_type="CoSimulation", output_interval=0.1, stop_time=4)
+    assert np.all(result[result["time"] > 2.6]["v"] == 0)
+
+
+# how far times may be off in model exchange, where the solver's error decides them; of a stiff model more
+TOLERANCE = {"stiff-switch": 1e-6, "thermostat": 1e-6}
+CHATTERING = {"oscillator-with-stop-2"}  # how often it hits while it is stuck is a matter of tolerances
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_model_agrees_with_its_run(name: str, version: int, made: Any) -> None:
+    model, path = loaded(name), made(name, version)
+    source = source_of(model, {})
+    until = source.problem.settings.until
+    states = list(source.problem.program.all_states)
+    located = model.simulate(scheme="located", method="auto", tolerance=1e-10)
+    result = fmpy.simulate_fmu(
+        path, fmi_type="ModelExchange", relative_tolerance=1e-9, output_interval=until / 50, stop_time=until
+    )
+    final = located.stop.reason == "final"  # FMPy ends before the last event then
+    allowed = TOLERANCE.get(name, 1e-7) * until
+    found = [t for t in jumps(result, [*states, "mode"]) if t < until - allowed]
+    exact = [t.time for t in located.transitions if t.time < until - allowed]
+    exact = exact[:-1] if final else exact
+    if name not in CHATTERING:
+        assert found == pytest.approx(exact, abs=allowed)
+    run = model.simulate()
+    steps = {"output_interval": until / 50, "stop_time": until, "fmi_type": "CoSimulation"}
+    result = fmpy.simulate_fmu(path, **steps)
+    close = 1e-3 if run.settings.get("step") else 1e-5  # communication points change the steps, and so their errors
+    scale = max(1.0, *np.abs(run.values[np.isfinite(run.values)]))
+    for state, value in run.final.state.items():
+        assert result[state][-1] == pytest.approx(value, abs=close * scale)
+    assert final or result["time"][-1] == pytest.approx(until)
+
+
+class Stepped:
+    """A unit of FMI 3 in co-simulation, function by function."""
+
+    def __init__(self, path: str, **start: float) -> None:
+        self.description = fmpy.read_model_description(path)
+        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.unit: Any = fmpy.instantiate_fmu(fmpy.extract(path), self.description, "CoSimulation")
+        self.set(**start)
+        self.unit.enterInitializationMode(startTime=0)
+        self.unit.exitInitializationMode()
+        self.time = 0.0
+
+    def set(self, **values: float) -> None:
+        for name, value in values.items():
+            self.unit.setFloat64([self.references[name]], [value])
+
+    def get(self, *names: str) -> list[float]:
+        return list(self.unit.getFloat64([self.references[name] for name in names]))
+
+    def go_to(self, time: float, step: float = 0.1) -> None:
+        while self.time < time - 1e-9:
+            size = min(step, time - self.time)
+            self.unit.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
+            self.time += size
+
+
+def test_states_are_copied_and_serialized(made: Any) -> None:
+    path = made(DRIVEN, 3)
+    first, other = Stepped(path), Stepped(path)
+    first.go_to(1.3)
+    first.set(k=3.0, u=0.25)
+    state = first.unit.getFMUState()
+    stored = first.unit.serializeFMUState(state)
+    first.go_to(3)
+    known = first.get("x", "v", "force")
+    first.unit.setFMUState(state)
+    first.time = 1.3
+    first.go_to(3)
+    assert first.get("x", "v", "force") == known
+    other.unit.setFMUState(other.unit.deserializeFMUState(stored))
+    other.time = 1.3
+    other.go_to(3)
+    assert other.get("x", "v", "force") == known
+
+
+def test_parameters_and_what_depends_on_them_can_be_tuned(made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3), m=1.0)
+    assert unit.get("c", "start", "x") == [4.0, 0.5, 0.5]
+    unit.go_to(3)
+    run = loaded(DRIVEN).simulate(parameters={"m": 1})
+    assert unit.get("x", "v") == pytest.approx(list(run.final.state.values()), abs=1e-8)
+
+
+DRIVEN_OTHERWISE = DRIVEN.replace("u: sin(t)", "u: {times: [0, 1, 2], values: [0.5, -1, 2], hold: zero}")
+
+
+def test_inputs_follow_the_file_until_they_are_set(made: Any) -> None:
+    given, run = Stepped(made(DRIVEN, 3)), loaded(DRIVEN).simulate()
+    given.go_to(3)
+    assert given.get("x", "v", "force") == pytest.approx(
+        [*run.final.state.values(), run.final.outputs["force"]], abs=1e-8
+    )
+    held, run = Stepped(made(DRIVEN, 3), u=0.5), loaded(DRIVEN_OTHERWISE).simulate()
+    for until, value in ((1.0, 0.5), (2.0, -1.0), (3.0, 2.0)):
+        held.set(u=value)
+        held.go_to(until)
+    assert held.get("x", "v") == pytest.approx(list(run.final.state.values()), abs=1e-8)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_inputs_drive_model_exchange(version: int, made: Any) -> None:
+    times = np.array([0, 1, 1, 2, 2, 3.0])
+    values = np.array([0.5, 0.5, -1, -1, 2, 2.0])
+    signals = np.array(list(zip(times, values, strict=True)), dtype=[("time", float), ("u", float)])
+    result = fmpy.simulate_fmu(
+        made(DRIVEN, version), fmi_type="ModelExchange", relative_tolerance=1e-10, stop_time=3, input=signals
+    )
+    run = loaded(DRIVEN_OTHERWISE).simulate()
+    assert [result["x"][-1], result["v"][-1]] == pytest.approx(list(run.final.state.values()), abs=1e-5)
+
+
+def test_directional_derivatives_are_those_of_differences(made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3))
+    unit.go_to(0.7)
+    unit.set(u=0.3)
+    knowns, unknowns = ["x", "v", "u"], ["der(x)", "der(v)", "force"]
+    step = 1e-6
+    for known in knowns:
+        (at,) = unit.get(known)
+        rows: list[list[float]] = []
+        for side in (step, -step):
+            unit.set(**{known: at + side})
+            rows.append(unit.get(*unknowns))
+        unit.set(**{known: at})
+        slopes = unit.unit.getDirectionalDerivative(
+            [unit.references[name] for name in unknowns], [unit.references[known]], [1.0]
+        )
+        assert list(slopes) == pytest.approx([(a - b) / (2 * step) for a, b in zip(*rows, strict=True)], abs=1e-7)
+
+
+def test_texts_of_a_model_stay_texts_and_bytes_stay_the_same(made: Any) -> None:
+    description = fmpy.read_model_description(made(DRIVEN, 3))
+    assert "]]> <a b='c'> & \"--> ü" in description.description
+    units = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
+    assert (units["N/m"].kg, units["N/m"].s, units["N/m"].m) == (1, -2, 0)
+    names = {variable.name: variable for variable in description.modelVariables}
+    assert names["der(x)"].unit == "(m)/(s)"
+    assert names["k"].description == 'stiffness < "&'
+    again = files_of(source_of(loaded(DRIVEN), {}), "fmi3")
+    assert list(again.values()) == [Path(made(DRIVEN, 3)).read_bytes()]
