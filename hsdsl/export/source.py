@@ -58,17 +58,13 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     Raises UsageError: a name, value or combination that a run would refuse, too.
     """
     prepared = model.pipeline.prepare({**arguments, "engine": "python"})
-<<<<<<< HEAD
     completed = model.pipeline.sliding if prepared.settings.completion == "auto" else model.pipeline
-    return Source(completed.system, prepared)
-=======
-    return Source(model.system, prepared, model, arguments)
+    return Source(completed.system, prepared, model, arguments)
 
 
 def drivable(source: Source) -> Source:
     """The same source with inputs of time that can be driven from outside; see `hsdsl.elaborate.drivable`."""
     pipeline = source.model.pipeline.drivable()
     problem = pipeline.prepare({**source.arguments, "engine": "python"})
-    own = pipeline if problem.program is pipeline.program else pipeline.sliding
-    return replace(source, system=own.system, problem=problem)
->>>>>>> d2b1671 (Export functional mock-up units of FMI 2.0 and 3.0)
+    completed = pipeline.sliding if problem.settings.completion == "auto" else pipeline
+    return replace(source, system=completed.system, problem=problem)
