@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from hsdsl.model.stream import Streamed
     from hsdsl.orbits.branch import Branch
     from hsdsl.orbits.orbit import Orbit
+    from hsdsl.orbits.sampling import OrbitalStability
     from hsdsl.sensitivity.result import Sensitivity
     from hsdsl.system import HybridSystem
 
@@ -261,6 +262,40 @@ class Model:
         from hsdsl.model.orbits import Orbits
 
         return Orbits(self, section, laps, period, arguments).continued(parameter, start, end)
+
+    def orbital_stability(
+        self,
+        wrt: str | Sequence[str] | None = None,
+        *,
+        radii: Sequence[float] = (1e-3, 1e-5, 1e-7),
+        samples: int = 8,
+        seed: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> OrbitalStability:
+        """Test by runs from nearby whether the model's execution is orbitally stable, in the quotient metric.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str, optional
+            What is moved: initial states as ``initial.NAME``, and parameters, such as those of inputs. Left out, all
+            initial states.
+        radii : sequence of float
+            How far, relative to each value (or where it is zero to the state's largest size), falling.
+        samples : int
+            How many directions at each radius; at least both ways along every axis.
+        seed : int
+            Of the random directions.
+        progress : callable, optional
+            Called after each run with how many are done, and how many there are.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+
+        Raises UsageError: an unknown name, or radii that do not fall.
+        """
+        from hsdsl.model.nearby import orbital_stability
+
+        return orbital_stability(self, wrt, radii, samples, seed, progress, arguments)
 
     def fit(
         self,

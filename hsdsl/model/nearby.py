@@ -1,0 +1,85 @@
+"""Orbital stability of a model's execution: runs from nearby and their distances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.model.differentiate import located_arguments
+from hsdsl.model.distances import distance_of_runs
+from hsdsl.model.options import check_arguments, overrides_of
+from hsdsl.model.settings import whole
+from hsdsl.model.values import initial_state, with_parameters
+from hsdsl.orbits.sampling import OrbitalStability, directions, sampled
+from hsdsl.sensitivity.names import targets
+
+if TYPE_CHECKING:
+    from hsdsl.model.model import Model
+
+REFUSED = ("step", "scheme", "samples", "precision")
+
+
+def orbital_stability(
+    model: Model,
+    wrt: str | Sequence[str] | None,
+    radii: Sequence[float],
+    samples: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+    arguments: Mapping[str, Any],
+) -> OrbitalStability:
+    """Test an execution; see `Model.orbital_stability`."""
+    check_arguments(arguments, "a stability test", REFUSED)
+    if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
+        raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
+    call = located_arguments(model.pipeline, arguments)
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters"))
+    _, states, x = initial_state(values, overrides_of(call, "initial"))
+    by = targets(wrt if wrt is not None else [f"initial.{name}" for name in states], model.program, states)
+    known: dict[str, float] = dict(zip(model.program.parameters, map(float, values.parameters), strict=True))
+    known |= {f"initial.{name}": float(value) for name, value in zip(states, x, strict=True)}
+    run = model.simulate(**call)
+    scales = np.array([abs(known[t.label]) or _size(run, t.name) for t in by])
+    ways = directions(len(by), whole(samples, "samples", 1), seed)
+    total, done = len(radii) * len(ways), 0
+
+    def look(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
+        nonlocal done
+        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        for target in by:
+            (initial if target.initial else parameters)[target.name] = known[target.label] + shift[target.label]
+        moved: dict[str, Any] = {**call, "parameters": parameters, "initial": initial}
+        other = model.simulate(**moved)
+        found = _distance(run, other, model)
+        done += 1
+        if progress is not None:
+            progress(done, total)
+        return (*found, tuple(made.edge for made in other.transitions))
+
+    title = run.title or run.model
+    return sampled([t.label for t in by], scales, list(radii), ways, look, title)
+
+
+def _distance(run: Execution, other: Execution, model: Model) -> tuple[float, float]:
+    """How far apart two runs are; one that stops for another reason is nowhere near."""
+    if run.stop.reason != other.stop.reason:
+        return inf, inf
+    found = distance_of_runs(run, other, model=model).interval
+    return float(found.lower), float(found.upper)
+
+
+def _size(run: Execution, name: str) -> float:
+    """The largest size of a state in a run, 1 where it has none."""
+    sizes = [
+        float(np.max(np.abs(run.values[arc.first : arc.last + 1, arc.states.index(name)])))
+        for arc in run.arcs
+        if name in arc.states
+    ]
+    return max(sizes, default=0.0) or 1.0
