@@ -30,7 +30,7 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
     colour = colours([mode.name for mode in program.modes])
     return {
         "title": visible(system.title or source.name),
-        "about": list(source.heading),
+        "about": [*source.heading, *([visible(system.source)] if system.source else [])],
         "controls": [*_parameters(source), *_starts(source, run)],
         "parameters": len(program.parameters),
         "starts": len(problem.states),

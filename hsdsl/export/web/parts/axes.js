@@ -86,8 +86,19 @@ function trace({context, box, x, y}, arcOf, xs, ys) {
   context.restore();
 }
 
-function dot({context}, a, b) {
+// A dot with a text, on the side where there is room.
+function dot({context, box}, a, b, text) {
   if (!Number.isFinite(a) || !Number.isFinite(b)) return;
   context.fillStyle = palette.focus;
   context.beginPath(); context.arc(a, b, 4, 0, 2 * Math.PI); context.fill();
+  const [right, high] = [a > (box.left + box.right) / 2, b < (box.top + box.bottom) / 2];
+  context.textAlign = right ? "right" : "left";
+  context.textBaseline = high ? "top" : "bottom";
+  context.lineWidth = 4;
+  context.lineJoin = "round";
+  context.strokeStyle = palette.ground;
+  context.fillStyle = palette.text;
+  const place = [a + (right ? -8 : 8), b + (high ? 3 : -3)];
+  context.strokeText(text, ...place);
+  context.fillText(text, ...place);
 }

@@ -70,14 +70,15 @@ function show(share, point) {
   cursor = share;
   $("cursor").value = Math.round(1000 * share);
   const next = run.times[i + 1] > run.times[i] ? (t - run.times[i]) / (run.times[i + 1] - run.times[i]) : 0;
-  $("now").textContent = `t = ${format(run.times[i], 6)}`;
-  $("cursor").setAttribute("aria-valuetext", `t = ${format(run.times[i], 4)}, mode ${modeOf(run.arcs[run.arcOf[i]].mode)}`);
+  const mode = modeOf(run.arcs[run.arcOf[i]].mode);
+  $("now").textContent = `t = ${format(run.times[i], 5)}, ${mode}`;
+  $("cursor").setAttribute("aria-valuetext", `t = ${format(run.times[i], 4)}, mode ${mode}`);
   drawScene(run, i, Math.min(1, Math.max(0, next)));
   drawCursor(run, i);
   const texts = [["t", run.times[i]], ...model.columns.map((name, k) => [withUnit(name), run.columns[k][i]])];
-  const mode = element("tr", {}, element("th", {textContent: "mode", scope: "row"}), element("td", {textContent: modeOf(run.arcs[run.arcOf[i]].mode)}));
-  const rows = texts.map(([name, x]) => element("tr", {}, element("th", {textContent: name, scope: "row"}), cell(x)));
-  $("values").tBodies[0].replaceChildren(mode, ...rows);
+  const row = (name, value) => element("tr", {}, element("th", {textContent: name, scope: "row"}), value);
+  const rows = texts.map(([name, x]) => row(name, cell(x)));
+  $("values").tBodies[0].replaceChildren(row("mode", element("td", {textContent: mode})), ...rows);
 }
 
 function pointed(canvas, made, a, b) {

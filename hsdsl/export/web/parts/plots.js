@@ -72,9 +72,13 @@ function drawCursor(run, i) {
   over($("ribbon"), line);
   for (const [name, canvas] of shownPanels()) over(canvas, (made) => {
     line(made);
-    dot(made, made.x(t), made.y(column(run, name)[i]));
+    const value = column(run, name)[i];
+    dot(made, made.x(t), made.y(value), format(value, 5));
   });
-  over($("phase"), (made) => dot(made, made.x(made.xs[i]), made.y(made.ys[i])));
+  over($("phase"), (made) => {
+    const [a, b] = [made.xs[i], made.ys[i]];
+    dot(made, made.x(a), made.y(b), `${format(a, 5)}, ${format(b, 5)}`);
+  });
 }
 
 // The point of a run nearest to a place in phase space.

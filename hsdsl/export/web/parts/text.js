@@ -29,5 +29,5 @@ const palette = {}; // the colours of the style sheet
 
 function readPalette() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["ink", "text", "faint", "line", "curve", "focus"]) palette[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["ink", "text", "faint", "line", "curve", "focus", "ground"]) palette[name] = style.getPropertyValue(`--${name}`).trim();
 }
