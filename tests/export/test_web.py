@@ -167,6 +167,7 @@ CASES: list[tuple[str, dict[str, float], dict[str, Any]]] = [
     ("bouncing-ball", {"e": 0.4}, {"scheme": "relaxed", "method": "rk4", "step": 1e-2, "relaxation": 1e-4}),
     ("thermostat", {"rate": 0.2}, {"method": "dop853", "tolerance": 1e-7}),
 ]
+CASES += [(path.stem, {}, {}) for path in MODELS.glob("*.yaml") if path.stem not in {name for name, _, _ in CASES}]
 
 
 @in_browser
