@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.errors import Decided
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure
 from hsdsl.lint.analysis.proof import Proof, closed, strict
@@ -29,17 +28,8 @@ from hsdsl.system import Edge
 DEEPEST = 6  # derivatives along the flow that are looked at
 
 
-@dataclass(frozen=True)
-class Uncrossed:
-    """A guard that no flow crosses: why, how that is known, and within which bounds of names."""
-
-    why: str
-    decided: Decided
-    searched: tuple[tuple[Any, float, float], ...]
-
-
-def uncrossed(dynamics: Dynamics, edge: Edge) -> Uncrossed | None:
-    """Say why no flow crosses the guard of an edge; None where that is not known."""
+def uncrossed(dynamics: Dynamics, edge: Edge) -> tuple[str, Proof] | None:
+    """Say why no flow crosses the guard of an edge, with the proof; None where that is not known."""
     mode, residual = dynamics.modes[edge.source], dynamics.residual(edge.surface)
     conditions, broken = dynamics.condition(edge), discontinuities(residual)
     if conditions is None or broken is None or residual.free_symbols & dynamics.inputs:
@@ -51,14 +41,13 @@ def uncrossed(dynamics: Dynamics, edge: Edge) -> Uncrossed | None:
         return None
     if proof.never(inside, zero(residual)):
         where = "where `if` holds" if edge.condition is not None else "of the mode"
-        return Uncrossed(f"its surface does not meet the domain {where}", proof.decided, proof.searched)
+        return f"its surface does not meet the domain {where}", proof
     cut = pieces(residual, dynamics.flow(mode))
     found = [_Part(proof, piece, domain, inside).outcome() for piece in cut] if cut else [None]
     if None in found:
         return None
     along = " or runs along it" if "along" in found else ""
-    why = f"wherever its surface meets the domain, the flow points back inside{along}"
-    return Uncrossed(why, proof.decided, proof.searched)
+    return f"wherever its surface meets the domain, the flow points back inside{along}", proof
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from operator import add, mul
@@ -29,20 +28,11 @@ Array = NDArray[Any]  # of numbers, or of truth values
 Function = Callable[..., Any]
 
 
-@dataclass(frozen=True)
-class Operation:
-    """One operation on numbers and on intervals, and the earlier results that it takes."""
-
-    arguments: tuple[int, ...]
-    on_numbers: Function
-    on_intervals: Function
-
-
 class StraightLine:
     """Some expressions of ``symbols``, the columns of points and boxes, numbers and the language's functions."""
 
     def __init__(self, expressions: Iterable[Any], symbols: Sequence[Any]) -> None:
-        self._operations: list[Operation] = []
+        self._operations: list[tuple[tuple[int, ...], Function, Function]] = []  # arguments; on numbers, on intervals
         self._names = len(symbols)
         self._known: dict[Any, int] = {symbol: i for i, symbol in enumerate(symbols)}
         self.results = [self._of(expr) for expr in expressions]
@@ -52,23 +42,23 @@ class StraightLine:
 
     def at(self, points: Array) -> Array:
         """The values at points: array (n, symbols) to array (results, n); NaN where there is no real value."""
-        values: list[Array] = list(points.T)
         with quiet():
-            for operation in self._operations:
-                values.append(operation.on_numbers(*(values[i] for i in operation.arguments)))
-            rows = [np.broadcast_to(values[i], (len(points),)) for i in self.results]
-        return np.array(rows).reshape(len(rows), len(points))
+            return self._rows(self._run(list(points.T), 1), len(points))
 
     def over(self, low: Array, high: Array) -> Range:
-        """RationalBounds over boxes: arrays (n, symbols) to arrays (results, n)."""
-        values: list[Range] = hull(low, high)
+        """Bounds over boxes: arrays (n, symbols) to arrays (results, n)."""
         with quiet():
-            for operation in self._operations:
-                values.append(operation.on_intervals(*(values[i] for i in operation.arguments)))
-        shape = (len(self.results), len(low))
-        rows = zip(*((values[i].low, values[i].high) for i in self.results), strict=True)
-        ends = [np.array([np.broadcast_to(end, len(low)) for end in row]).reshape(shape) for row in rows]
-        return Range(*ends) if ends else Range(np.zeros(shape), np.zeros(shape))
+            values: list[Range] = self._run(hull(low, high), 2)
+        return Range(*(self._rows([getattr(value, end) for value in values], len(low)) for end in ("low", "high")))
+
+    def _run(self, values: list[Any], kind: int) -> list[Any]:
+        for operation in self._operations:
+            values.append(operation[kind](*(values[i] for i in operation[0])))
+        return values
+
+    def _rows(self, values: list[Any], count: int) -> Array:
+        rows = [np.broadcast_to(values[i], count) for i in self.results]
+        return np.array(rows).reshape(len(rows), count)
 
     def _of(self, expr: Any) -> int:
         found = self._known.get(expr)
@@ -77,7 +67,7 @@ class StraightLine:
         return found
 
     def _add(self, on_numbers: Function, on_intervals: Function, *arguments: int) -> int:
-        self._operations.append(Operation(arguments, on_numbers, on_intervals))
+        self._operations.append((arguments, on_numbers, on_intervals))
         return len(self) - 1
 
     def _call(self, name: str, *arguments: int) -> int:

@@ -31,10 +31,11 @@ def guard_never_crossed(subject: Subject) -> Iterator[Finding]:
         found = uncrossed(subject.dynamics, edge.edge)
         if found is None or entered_beyond(subject.dynamics, edge.edge):
             continue
-        where = within(found.searched)
+        why, proof = found
+        where = within(proof.searched)
         crosses = f"{'does not cross' if where else 'never crosses'} the guard of '{edge.edge.name}'{where}"
         hint = "turn the inequality round, correct its level, or remove the transition"
-        yield Finding(edge.document.when.place.span, f"the flow {crosses}: {found.why}", hint, found.decided)
+        yield Finding(edge.document.when.place.span, f"the flow {crosses}: {why}", hint, proof.decided)
 
 
 def condition_beyond_surface(subject: Subject) -> Iterator[Finding]:
