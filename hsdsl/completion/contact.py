@@ -156,7 +156,7 @@ def _fixed_point(states: list[sp.Symbol], equations: list[sp.Expr], further: Seq
 
 def _number(value: sp.Expr, at: Point) -> float:
     number = sp.sympify(value).xreplace({name: sp.Float(number) for name, number in at.items()}).evalf()
-    return float(number) if number.is_real else math.nan
+    return float(number) if number.is_Number and number.is_real else math.nan
 
 
 def _numbers(matrix: sp.Matrix, at: Point) -> np.ndarray:
