@@ -79,7 +79,7 @@ def _refusal(scene: Scene, options: dict[str, Any], size: str, value: float) -> 
 
 
 def _simulate(scene: Scene, until: float, options: dict[str, Any]) -> Execution:
-    return scene.model.simulate(until, **options, initial=scene.initial or None)
+    return scene.model.simulate(until, **options, initial=scene.initial or None, parameters=scene.parameters or None)
 
 
 def _run(scene: Scene, options: dict[str, Any]) -> Result:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,8 @@ class Scene:
     countable : (float, float)
         The fewest and the most transitions of a right result: those near the end may be missed, and past a Zeno point
         any number counts.
+    parameters : mapping
+        Those that differ from the model's own.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Scene:
     exact_values: Array
     exact_modes: Array
     countable: tuple[float, float]
+    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @staticmethod
     def of(

@@ -76,12 +76,12 @@ def translate(scene: Scene) -> PlainModel:
     system = scene.model.system
     if any(hasattr(signal, "times") for signal in system.inputs):
         raise Refused("sampled inputs are not translated")
-    values = with_parameters(scene.model.pipeline.values(FLOAT64), {}).parameters
+    values = with_parameters(scene.model.pipeline.values(FLOAT64), scene.parameters).parameters
     named = zip(system.parameters, values, strict=True)
     numbers = {sp.Symbol(parameter.name, real=True): sp.Float(value, 17) for parameter, value in named}
     index = {mode.name: k for k, mode in enumerate(system.modes)}
     modes = tuple(_mode(mode, index, numbers) for mode in system.modes)
-    start = scene.model.simulate(0, initial=scene.initial)
+    start = scene.model.simulate(0, initial=scene.initial, parameters=scene.parameters)
     first = start.arcs[0]
     x = tuple(float(v) for v in start.values[0][: len(first.states)])
     return PlainModel(modes, index[first.mode], x)

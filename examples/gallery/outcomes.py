@@ -1,0 +1,38 @@
+"""Runs in processes of their own, which end them where they hang or crash."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+from gallery.scenes import Entry
+from gallery.settings import Setting, run
+from hsdsl.chart.outcome import Outcome
+from hsdsl.chart.processes import HANGS, Lost, in_processes
+
+LIMIT = 30.0  # processor seconds of a run
+MEMORY = 12 << 30  # bytes of address space
+REASONS = {HANGS: f"no result in {LIMIT:.0f} s"}
+
+
+def outcomes(entry: Entry, settings: Sequence[Setting], processes: int = 1) -> Iterator[tuple[Setting, Outcome]]:
+    """Run a scene with each setting, in processes that last as long as nothing hangs or crashes."""
+    found = dict(in_processes(partial(_run, entry), settings, processes, LIMIT))
+    for index, setting in enumerate(settings):
+        answer = found[index]
+        lost = isinstance(answer, Lost)
+        yield setting, Outcome(answer.word, REASONS.get(answer.word, "the process died")) if lost else answer
+
+
+def _run(entry: Entry, setting: Setting) -> Outcome:
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard), hard))
+    try:
+        return run(entry, setting)
+    except MemoryError:
+        return Outcome("crashes", "no memory left")
+    except Exception as error:  # a peer's own, which is its answer
+        if setting.tool.startswith("hsdsl"):
+            raise
+        return Outcome("refuses", f"{type(error).__name__}: {error}")

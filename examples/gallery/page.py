@@ -1,0 +1,139 @@
+"""The page of the gallery, from the records and the models."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from gallery.records import Record, Records
+from gallery.scenes import Entry
+from gallery.settings import MOST, WITHIN
+from hsdsl.chart import PEERS
+from hsdsl.chart.outcome import OUTCOMES
+from hsdsl.simulate import SCHEMES
+
+OURS = ("hsdsl c", "hsdsl python")
+HEAD = """<!-- Written by examples/gallery: edit the models and the code, not this page. -->
+
+# Where methods fail
+
+{count} small scenes, one phenomenon each, all with exact solutions. One command runs every one of them with every
+scheme, method and engine of ours and with the tools that are installed:
+
+```console
+$ python examples/gallery
+```
+
+It judges each run against the exact execution and writes this page, its pictures and `gallery.json`. The models are
+`models/gallery/*.yaml`; the exact executions lie next to them and come from `models/references`, in eighty digits and
+without the simulator.
+
+## Who is right
+
+Each cell counts outcomes: of ours over all methods and sizes and both engines, of other tools at tolerances of 1e-6 and
+1e-9.
+
+| word | meaning |
+| --- | --- |
+| right | the exact execution: transitions, modes, and states within {state:.0%} of their span, {time:.1%} of the run |
+| warns | another execution, and the verdict says `left` or `unknown` |
+| stops | the run ends before the end, with a reason |
+| refuses | the tool or its translation does not take the model, with a reason |
+| **wrong** | another execution, without a word |
+| **hangs** | no result within 30 seconds of the processor |
+| **crashes** | the process dies |
+
+{table}
+
+Versions: {versions}.
+
+Tools other than ours run as their documentation shows (`hsdsl/chart/peers`), with events restarted after each
+transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
+methods of every order, explicit ones on stiff scenes too, tolerances of 1e-6 and 1e-9, steps of a thousandth and a
+ten-thousandth of the run, and at most {most:,} transitions; fixed steps are estimated (`--estimate`). The Python
+engine, which agrees with the compiled one to the last bit, runs three methods at the looser size.
+
+"""
+
+
+def page(records: Records, entries: Sequence[Entry]) -> str:
+    """The whole page as Markdown."""
+    tools = ", ".join(f"{name} {number or '(not installed)'}" for name, number in records.versions.items())
+    head = HEAD.format(
+        count=len(entries),
+        state=WITHIN.state,
+        time=WITHIN.time,
+        table=_table(records, entries),
+        versions=tools,
+        most=MOST,
+    )
+    return head + "\n".join(_section(records, entry) for entry in entries)
+
+
+def _table(records: Records, entries: Sequence[Entry]) -> str:
+    peers = [name for name in PEERS if records.versions.get(name)]
+    lines = [f"| scene | {' | '.join((*SCHEMES, *peers))} |", "| --- |" + " --- |" * (len(SCHEMES) + len(peers))]
+    for entry in entries:
+        ours = [[r for tool in OURS for r in records.of(entry.name, tool, scheme)] for scheme in SCHEMES]
+        cells = [_counted(found) for found in (*ours, *(records.of(entry.name, name) for name in peers))]
+        lines.append(f"| [{entry.name}](#{entry.name}) | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _counted(found: Sequence[Record]) -> str:
+    count = Counter(record.outcome.word for record in found)
+    if len(count) == 1:
+        return _shown(next(iter(count)))
+    return ", ".join(f"{count[word]} {_shown(word)}" for word in OUTCOMES if count[word]) or "-"
+
+
+def _shown(word: str) -> str:
+    return f"**{word}**" if word in ("wrong", "hangs", "crashes") else word
+
+
+def _section(records: Records, entry: Entry) -> str:
+    what, exact, hard = entry.words
+    title = entry.model.system.title
+    lines = [
+        f"## {entry.name}",
+        "",
+        f"![{title}](images/gallery/{entry.name}.svg)",
+        "",
+        f"**{title}**: {what}",
+        "",
+        f"Exact: {exact}",
+        "",
+        f"Why methods fail: {hard}",
+        "",
+        *_others(records, entry),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _others(records: Records, entry: Entry) -> Iterator[str]:
+    """Every outcome that is not right, those with the same word and reason together."""
+    found = [r for r in records.rows if r.scene == entry.name and r.outcome.word != "right"]
+    ours = [r for r in found if r.setting.tool in OURS]
+    theirs = [r for r in found if r.setting.tool not in OURS]
+    for (scheme, word), group in groupby(sorted(ours, key=_kind), key=_kind):
+        members = list(group)
+        methods = ", ".join(dict.fromkeys(f"`{r.setting.method}`" for r in members if r.setting.method))
+        why = Counter(r.outcome.why for r in members).most_common(1)[0][0]
+        yield f"- {scheme}{f' with {methods}' if methods else ''}: {_shown(word)} ({_plain(why)})"
+    for tool, group in groupby(theirs, key=lambda r: r.setting.tool):
+        reasons: dict[tuple[str, str], list[str]] = {}
+        for r in group:
+            reasons.setdefault((r.outcome.word, r.outcome.why), []).append(f"{r.setting.tolerance:.0e}")
+        for (word, why), sizes in reasons.items():
+            yield f"- {tool} at {' and '.join(sizes)}: {_shown(word)} ({_plain(why)})"
+
+
+def _kind(record: Record) -> tuple[str, str]:
+    return record.setting.scheme, record.outcome.word
+
+
+def _plain(text: str) -> str:
+    """A reason inside a line of Markdown."""
+    line = " ".join(text.split())
+    return "".join(f"\\{c}" if c in "*_<>[]`|" else c for c in line)

@@ -1,0 +1,181 @@
+"""Maps of outcomes over a plane of settings and numbers: where methods converge, and how they fail where they do not.
+
+=============  =====================================================================
+`axes`         what varies, read from text
+`cells`        the outcome of one run, against a reference at the same numbers
+`limits`       known limits of linear stability
+`table`        a map as CSV and as plain values
+=============  =====================================================================
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.chart.processes import Lost, in_processes
+from hsdsl.chart.stability.axes import SIZES, Axis, read_axes
+from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell, Tool
+from hsdsl.chart.stability.limits import eigenvalues, largest_step
+from hsdsl.errors import UsageError
+from hsdsl.integrators import METHODS
+from hsdsl.model import Model
+
+__all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "Tool", "stability_map"]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A tool's outcomes; ``cells[j][i]`` is at value j of y and value i of x.
+
+    ``limit`` has the largest stable step at each value of y, or is None where none is known.
+    """
+
+    tool: Tool
+    cells: tuple[tuple[Cell, ...], ...]
+    limit: tuple[float | None, ...] | None
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """A plane of outcomes for each tool."""
+
+    name: str
+    x: Axis
+    y: Axis
+    panels: tuple[Panel, ...]
+
+
+def stability_map(
+    model: Model,
+    map: str,
+    *,
+    schemes: Sequence[str] = (),
+    methods: Sequence[str] = (),
+    against: Sequence[str] = (),
+    parameters: Mapping[str, Any] | None = None,
+    initial: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    with_rho: bool = True,
+    processes: int | None = None,
+    patience: float = 10.0,
+    watch: Progress = lambda done, count: None,
+) -> StabilityMap:
+    """Run a model over a plane, on all cores, and say what comes of each run.
+
+    Parameters
+    ----------
+    map : str
+        Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.chart.stability.axes.read_axes`.
+    schemes, methods : sequence of str
+        Ours, a panel for each pair; left out, those of the file.
+    against : sequence of str
+        Names of :data:`hsdsl.chart.PEERS`; they take no step.
+    parameters, initial, settings : mapping, optional
+        Overrides of every run.
+    with_rho : bool
+        Compute rho of the runs that get to the end.
+    processes : int, optional
+        Left out, as many as there are cores for this process.
+    patience : float
+        Processor seconds of a run; a longer one is stuck.
+    watch : callable
+        Called with how many runs are done, and how many there are.
+
+    Raises
+    ------
+    UsageError
+        A name that cannot be varied, an empty range, or settings that no run can have.
+    """
+    base = {"parameters": dict(parameters or {}), "initial": dict(initial or {}), "settings": dict(settings or {})}
+    until = float(model.pipeline.prepare({k: v for k, v in base.items() if v}).settings.until)
+    x, y = read_axes(model, map, until)
+    _check_free(base, (x, y))
+    tools = _tools(model, schemes, methods, against, {x.kind, y.kind})
+    _check_ends(model, base, (x, y))
+    bench = Bench(model, base, with_rho)
+    places = [(k, j, i) for j in range(len(y.values)) for i in range(len(x.values)) for k in range(len(tools))]
+    found: dict[tuple[int, int, int], Cell] = {}
+
+    def work(place: tuple[int, int, int]) -> Cell:
+        k, j, i = place
+        return bench.run(tools[k], _merged(x.arguments(x.values[i]), y.arguments(y.values[j])))
+
+    for index, answer in in_processes(work, places, processes or _cores(), patience):
+        lost = isinstance(answer, Lost)
+        found[places[index]] = Cell(STUCK, why=f"it {answer.word}") if lost else answer
+        watch(len(found), len(places))
+    grids = [
+        tuple(tuple(found[k, j, i] for i in range(len(x.values))) for j in range(len(y.values)))
+        for k in range(len(tools))
+    ]
+    panels = tuple(
+        Panel(tool, cells, _limit(model, base, tool, x, y)) for tool, cells in zip(tools, grids, strict=True)
+    )
+    return StabilityMap(os.path.basename(model.program.path).removesuffix(".yaml"), x, y, panels)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of both axes; both may be parameters."""
+    groups = {key: {**one[key], **other[key]} for key in one.keys() & other.keys()}
+    return {**one, **other, **groups}
+
+
+def _check_free(base: Mapping[str, Mapping[str, Any]], axes: Sequence[Axis]) -> None:
+    """Refuse an axis that ``--set`` has fixed."""
+    for axis in axes:
+        group = "settings" if axis.name in SIZES else "initial" if axis.kind == "initial" else "parameters"
+        name = axis.kind if group == "settings" else axis.name.removeprefix("initial.")
+        if name in base[group]:
+            raise UsageError(f"--map {axis.name}: it is fixed by --set", "leave out one of the two")
+
+
+def _check_ends(model: Model, base: Mapping[str, Any], axes: Sequence[Axis]) -> None:
+    """Refuse numbers outside what the file allows, before anything runs."""
+    for axis in axes:
+        if axis.kind in ("parameter", "initial"):
+            for value in (axis.values[0], axis.values[-1]):
+                given = axis.arguments(value)
+                call = {group: {**base[group], **given.get(group, {})} for group in ("parameters", "initial")}
+                model.pipeline.prepare({**call, "settings": base["settings"] or None})
+
+
+def _tools(
+    model: Model, schemes: Sequence[str], methods: Sequence[str], against: Sequence[str], kinds: set[str]
+) -> list[Tool]:
+    """Schemes with methods, and peers."""
+    options = model.resolve()
+    schemes = list(schemes) or [options.scheme]
+    fallback = "rk4" if "step" in kinds else "auto"
+    named = list(methods) or [fallback]
+    if "step" in kinds and against:
+        raise UsageError("--against: peers choose their own steps, so a map of h cannot show them", "map tolerance")
+    for method in named if "tolerance" in kinds else ():
+        if method in METHODS and not METHODS[method].adaptive:
+            raise UsageError(f"--method {method}: it has a fixed step and keeps no tolerance", "map h")
+    found = [
+        Tool(scheme, method if scheme != "paoli-schatzman" else "")
+        for scheme in schemes
+        for method in (named if scheme != "paoli-schatzman" else named[:1])
+    ]
+    return [*found, *(Tool(peer=name) for name in against)]
+
+
+def _limit(model: Model, base: Mapping[str, Any], tool: Tool, x: Axis, y: Axis) -> tuple[float | None, ...] | None:
+    """The largest stable step at each value of y, where x is the step and the flow is linear."""
+    if x.kind != "step" or tool.peer or not tool.method:
+        return None
+    found: list[float | None] = []
+    for value in y.values:
+        given = y.arguments(value)
+        numbers = {group: {**base[group], **given.get(group, {})} for group in ("parameters", "initial")}
+        values = eigenvalues(model, numbers)
+        found.append(None if values is None else largest_step(tool.method, values, x.values[0] / 10, x.values[-1] * 10))
+    return tuple(found) if any(found) else None

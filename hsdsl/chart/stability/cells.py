@@ -1,0 +1,166 @@
+"""The outcome of one run of a stability map, against a reference at the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite, nan
+from typing import Any
+
+from hsdsl.chart.outcome import Outcome, Tolerance, outcome
+from hsdsl.chart.peers import prepare
+from hsdsl.chart.result import Refused, Result
+from hsdsl.chart.scene import Scene, sampled
+from hsdsl.errors import UsageError
+from hsdsl.exact import reference
+from hsdsl.execution import Execution
+from hsdsl.model import Model
+from hsdsl.model.distances import distance_of_runs
+
+CONVERGED, INACCURATE, OTHER = "converged", "inaccurate", "wrong transitions"
+BLOWN_UP, STUCK, REFUSED, UNKNOWN = "blown up", "stuck", "refused", "no reference"
+WORDS = (CONVERGED, INACCURATE, OTHER, BLOWN_UP, STUCK, REFUSED, UNKNOWN)
+WITHIN = Tolerance(state=0.05, time=0.005)  # of a converged run
+LARGE = 10.0  # spans of a state: a run that goes farther has blown up
+PRECISE = 1e-12  # the tolerance of a reference run
+SAMPLES = 400
+SECONDS, MOST_ROWS = 0.5, 20_000  # for rho: longer runs are shaded by the error of their samples
+PEER_TOLERANCE = 1e-6
+RAN_AWAY = ("not_finite", "left_domain")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What came of a run: a word of :data:`WORDS`, ``rho`` (at most) or NaN, the samples' error, and why."""
+
+    word: str
+    rho: float = nan
+    error: float = nan
+    transitions: int | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Our scheme and method, or a peer by its name."""
+
+    scheme: str = ""
+    method: str = ""
+    peer: str = ""
+
+    @property
+    def label(self) -> str:
+        """What a panel is called."""
+        return self.peer or " ".join(filter(None, (self.scheme, self.method)))
+
+
+@dataclass
+class Bench:
+    """Runs of a model: ``base`` are the arguments that all of them have; references are kept by what varies.
+
+    A model's exact execution is the reference where nothing but settings differs from the file; else it is a located
+    run at a tolerance of 1e-12.
+    """
+
+    model: Model
+    base: Mapping[str, Any]
+    with_rho: bool
+    scenes: dict[tuple[Any, ...], Scene | str] = field(default_factory=dict[tuple[Any, ...], "Scene | str"])
+
+    @cached_property
+    def exact(self) -> Execution | None:
+        """The model's exact execution."""
+        try:
+            return reference(self.model)
+        except UsageError:
+            return None
+
+    def run(self, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        """Run a tool with further arguments."""
+        scene = self.scene(arguments)
+        if isinstance(scene, str):
+            return Cell(UNKNOWN, why=scene)
+        try:
+            return self._peer(scene, tool, arguments) if tool.peer else self._own(scene, tool, arguments)
+        except UsageError as error:
+            return Cell(REFUSED, why=str(error))
+        except Refused as refusal:
+            return Cell(BLOWN_UP if "finite" in str(refusal) else REFUSED, why=str(refusal))
+
+    def scene(self, arguments: Mapping[str, Any]) -> Scene | str:
+        """The reference at these numbers; a reason where there is none."""
+        numbers = {
+            group: {**self.base.get(group, {}), **arguments.get(group, {})} for group in ("parameters", "initial")
+        }
+        key = tuple(sorted((group, name, value) for group, given in numbers.items() for name, value in given.items()))
+        if key not in self.scenes:
+            self.scenes[key] = self._scene(numbers)
+        return self.scenes[key]
+
+    def _scene(self, numbers: dict[str, dict[str, Any]]) -> Scene | str:
+        exact = self.exact if not any(numbers.values()) and not self.base.get("settings") else None
+        if exact is None:
+            settings = {key: value for key, value in self.base.get("settings", {}).items() if key in ("until", "scale")}
+            try:
+                given: dict[str, Any] = {"tolerance": PRECISE, "settings": settings, **numbers}
+                exact = self.model.simulate(scheme="located", method="auto", **given)
+            except UsageError as error:
+                return str(error)
+            if not exact.stop.complete:
+                return f"the reference stops: {exact.stop.message}"
+        end = float(exact.stop.time)
+        made = Scene.of(self.model, exact=exact, samples=SAMPLES, clearance=1e-4 * end)
+        count = len(exact.transitions)
+        certain = sum(float(t.time) < end * (1 - 1e-9) for t in exact.transitions)
+        countable = made.countable if exact.verdict.theorem == "left" else (certain, count)
+        return replace(made, countable=countable, **numbers)
+
+    def _own(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        given: dict[str, Any] = {"parameters": scene.parameters, "initial": scene.initial}
+        given |= {key: value for key, value in arguments.items() if key not in given}
+        chosen = {"scheme": tool.scheme or None, "method": tool.method or None, "settings": self.base.get("settings")}
+        run = self.model.simulate(**chosen, **given)
+        values, modes = sampled(run, scene.grid, scene.states)
+        problem = None if run.stop.complete else run.stop.message
+        found = outcome(scene, Result(values, modes, lambda: run.made, problem, run), WITHIN)
+        cell = _cell(scene, found, run.stop.reason)
+        if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
+            cell = replace(cell, word=OTHER, why="other transitions")
+        if self.with_rho and cell.word in (CONVERGED, INACCURATE) and len(run.times) <= MOST_ROWS:
+            cell = replace(cell, rho=self._rho(scene, run))
+        return cell
+
+    def _rho(self, scene: Scene, run: Execution) -> float:
+        options: dict[str, Any] = {"model": self.model, "parameters": scene.parameters, "seconds": SECONDS}
+        try:
+            rho = distance_of_runs(run, scene.exact, **options).interval.upper
+        except UsageError:  # the model's space has none
+            return nan
+        return rho if isfinite(rho) else nan
+
+    def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        found = outcome(scene, prepare(tool.peer, scene)(arguments.get("tolerance", PEER_TOLERANCE)), WITHIN)
+        return _cell(scene, found, "stopped")
+
+
+def _cell(scene: Scene, found: Outcome, reason: str) -> Cell:
+    """The word of an outcome."""
+    if found.word == "stops":
+        word = BLOWN_UP if reason in RAN_AWAY or found.error > LARGE else STUCK
+    elif found.word == "right":
+        word = CONVERGED
+    elif found.error > LARGE:
+        word = BLOWN_UP
+    else:
+        counted = found.transitions is not None
+        word = OTHER if "transitions" in found.why or ("mode" in found.why and not counted) else INACCURATE
+    return Cell(word, nan, found.error, found.transitions, found.why)
+
+
+def _same_transitions(scene: Scene, run: Execution) -> bool:
+    """Whether the transitions are the reference's, up to those at the end; any are where it has no certain ones."""
+    if scene.exact.verdict.theorem == "left":
+        return True
+    both = zip(run.transitions, scene.exact.transitions, strict=False)
+    return all(one.edge == other.edge or one.edge in other.alternatives for one, other in both)

@@ -1,0 +1,85 @@
+"""A stability map as CSV, as plain values, and as the panels of a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterator
+from math import isfinite, log10
+from typing import Any
+
+from hsdsl.chart.stability import Axis, Panel, StabilityMap
+from hsdsl.chart.stability.cells import CONVERGED, WORDS, Cell
+from hsdsl.plot import stability as picture
+
+COLUMNS = ("tool", "scheme", "method", "outcome", "rho", "error", "transitions", "why")
+
+
+def records(found: StabilityMap) -> Iterator[dict[str, Any]]:
+    """A mapping for each run."""
+    for panel in found.panels:
+        for j, row in enumerate(panel.cells):
+            for i, cell in enumerate(row):
+                place = {found.x.name: found.x.values[i], found.y.name: found.y.values[j]}
+                yield place | _plain(panel, cell)
+
+
+def _plain(panel: Panel, cell: Cell) -> dict[str, Any]:
+    numbers = {name: value if isfinite(value) else None for name, value in (("rho", cell.rho), ("error", cell.error))}
+    tool = {"tool": panel.tool.peer or "hsdsl", "scheme": panel.tool.scheme, "method": panel.tool.method}
+    return tool | {"outcome": cell.word} | numbers | {"transitions": cell.transitions, "why": cell.why}
+
+
+def as_csv(found: StabilityMap) -> str:
+    """The table with a header, a line for each run."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, (found.x.name, found.y.name, *COLUMNS), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(records(found))
+    return text.getvalue()
+
+
+def as_plain(found: StabilityMap) -> dict[str, Any]:
+    """What ``--json`` prints."""
+    limits = {panel.tool.label: panel.limit for panel in found.panels if panel.limit}
+    axes = {"x": found.x.name, "y": found.y.name}
+    return {"model": found.name, **axes, "limits": limits, "runs": list(records(found))}
+
+
+def as_text(found: StabilityMap) -> str:
+    """How many runs of each tool came to what."""
+    width = max(len(panel.tool.label) for panel in found.panels)
+    lines: list[str] = []
+    for panel in found.panels:
+        count = Counter(cell.word for row in panel.cells for cell in row)
+        words = ", ".join(f"{count[word]} {word}" for word in WORDS if count[word])
+        limits = [limit for limit in panel.limit or () if limit]
+        known = f"; linearly stable up to h = {min(limits):.3g}" if limits else ""
+        known += f" to {max(limits):.3g}" if limits and max(limits) > 1.001 * min(limits) else ""
+        lines.append(f"{panel.tool.label:{width}}  {words}{known}")
+    return "\n".join(lines)
+
+
+def panels(found: StabilityMap) -> list[picture.Panel]:
+    """The panels of a picture."""
+    return [
+        picture.Panel(
+            panel.tool.label,
+            [[cell.word for cell in row] for row in panel.cells],
+            [[_shade(cell) for cell in row] for row in panel.cells],
+            panel.limit,
+        )
+        for panel in found.panels
+    ]
+
+
+def _shade(cell: Cell) -> float | None:
+    """The logarithm of rho, or of the error of samples where there is no rho; None where it says nothing."""
+    size = cell.rho if isfinite(cell.rho) else cell.error
+    return log10(max(size, 1e-15)) if cell.word == CONVERGED and isfinite(size) else None
+
+
+def axis(given: Axis) -> picture.Scale:
+    """An axis of a picture."""
+    return picture.Scale(given.name, given.values, given.logarithmic)

@@ -1,0 +1,60 @@
+"""``hsdsl stability``: files, JSON, and one clear message for what cannot be."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+DECAY = """hsdsl: 1
+parameters: {rate: 100}
+modes:
+  fast:
+    flow: {x: -rate*x, y: 1}
+    transitions: [{name: late, when: y >= 1, to: slow}]
+  slow:
+    flow: {x: -x, y: 0}
+initial: {mode: fast, x: 1, y: 0}
+experiment: {until: 2}
+"""
+
+
+def test_table_picture_and_json_agree(command, model, tmp_path):
+    table, png, svg = (tmp_path / name for name in ("map.csv", "map.png", "map.svg"))
+    given = [model(DECAY), "--map", "h=1e-3:0.1:3,rate=10:100:2", "--method", "euler,rk4", "--scheme", "located"]
+    first = command("stability", *given, "--out", table, "--plot", png)
+    assert first.code == 0
+    assert first.out.splitlines()[0].startswith("located euler")
+    answer = command("stability", *given, "--plot", svg, "--json").json
+    with table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(answer["runs"]) == 12
+    assert {row["outcome"] for row in rows} == {run["outcome"] for run in answer["runs"]} >= {"converged", "blown up"}
+    assert answer["limits"]["located euler"] == pytest.approx([0.2, 0.02])
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in svg.read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--map", "h,nothing"), "there is no setting, parameter or initial value 'nothing'"),
+        (("--map", "h,x"), "it is a state"),
+        (("--map", "h=2:1,rate"), "expected FROM below TO"),
+        (("--map", "h,rate", "--set", "rate=3"), "it is fixed by --set"),
+        (("--map", "h,rate", "--set", "experiment.step=3"), "it is fixed by --set"),
+        (("--map", "h,rate", "--against", "scipy"), "peers choose their own steps"),
+        (("--map", "h,rate", "--against", "nobody"), "there is no 'nobody'"),
+        (("--map", "tolerance,rate", "--method", "rk4"), "keeps no tolerance"),
+        (("--map", "h,rate", "--scheme", "other"), "there is no 'other'"),
+        (("--map", "h,rate", "--plot", "map.pdf"), "must end in .png or .svg"),
+        (("--map", "h,rate", "--out", "map.txt"), "must end in .csv"),
+        (("--map", "h,rate", "--patience", "0"), "expected positive numbers"),
+        (("--map", "h,rate", "--set", "nothing=1"), "nothing"),
+    ],
+)
+def test_bad_words_get_one_message(command, model, words, message):
+    answer = command("stability", model(DECAY), *words)
+    assert (answer.code, answer.out) == (2, "")
+    assert answer.err.startswith("hsdsl: ")
+    assert message in answer.err
