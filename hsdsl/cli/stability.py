@@ -69,7 +69,7 @@ def stability(
 
 
 def _report(found: Any, out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
-    from hsdsl.chart.stability.table import as_csv, as_plain, as_text, axis, panels
+    from hsdsl.chart.stability.table import as_csv, as_plain, as_text, axis, panels, shaded
     from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
 
@@ -81,7 +81,7 @@ def _report(found: Any, out: Path | None, plot: Path | None, json: bool, quiet: 
     if plot is not None:
         from hsdsl.plot.stability import plot_stability
 
-        plot_stability(plot, found.name, axis(found.x), axis(found.y), panels(found))
+        plot_stability(plot, found.name, axis(found.x), axis(found.y), panels(found), shaded(found))
         say(f"wrote {plot}")
     if json:
         print_json(as_plain(found))

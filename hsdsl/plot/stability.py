@@ -57,12 +57,14 @@ class Panel:
     limit: Sequence[float | None] | None
 
 
-def plot_stability(path: str | os.PathLike[str], name: str, x: Scale, y: Scale, panels: Sequence[Panel]) -> None:
-    """Draw the panels to a .png or .svg file."""
-    save(lambda: _figure(name, x, y, panels), path)
+def plot_stability(
+    path: str | os.PathLike[str], name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str = "rho"
+) -> None:
+    """Draw the panels to a .png or .svg file; ``shaded`` says what the shades are of."""
+    save(lambda: _figure(name, x, y, panels, shaded), path)
 
 
-def _figure(name: str, x: Scale, y: Scale, panels: Sequence[Panel]) -> Figure:
+def _figure(name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str) -> Figure:
     from matplotlib.figure import Figure
 
     columns = min(3, len(panels))
@@ -80,7 +82,7 @@ def _figure(name: str, x: Scale, y: Scale, panels: Sequence[Panel]) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel(y.name)
     figure.suptitle(name, fontsize=10)
-    _legend(figure, panels, span if shades else None)
+    _legend(figure, panels, f"{shaded} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else "")
     return figure
 
 
@@ -112,7 +114,7 @@ def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[
     return tuple(colour * (1 - white) + white)
 
 
-def _legend(figure: Figure, panels: Sequence[Panel], span: tuple[float, float] | None) -> None:
+def _legend(figure: Figure, panels: Sequence[Panel], shades: str) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -120,8 +122,8 @@ def _legend(figure: Figure, panels: Sequence[Panel], span: tuple[float, float] |
     handles: list[Any] = [
         Patch(facecolor=colour, edgecolor="#888888", label=word) for word, colour in COLOURS.items() if word in present
     ]
-    if span is not None and handles:
-        handles[0].set_label(f"converged, rho 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)")
+    if shades and handles:
+        handles[0].set_label(f"converged, {shades}")
     if any(panel.limit is not None for panel in panels):
         handles.append(Line2D([], [], color=LIMIT, linewidth=2.2, label="limit of linear stability"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)), frameon=False, fontsize=8)

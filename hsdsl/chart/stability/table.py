@@ -80,6 +80,12 @@ def _shade(cell: Cell) -> float | None:
     return log10(max(size, 1e-15)) if cell.word == CONVERGED and isfinite(size) else None
 
 
+def shaded(found: StabilityMap) -> str:
+    """What the shades are of."""
+    cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
+    return "rho" if any(isfinite(cell.rho) for cell in cells) else "error"
+
+
 def axis(given: Axis) -> picture.Scale:
     """An axis of a picture."""
     return picture.Scale(given.name, given.values, given.logarithmic)
