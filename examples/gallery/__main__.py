@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     file = asked.out / "gallery.json"
     if not asked.page:
         _run(file, chosen, _settings(asked.tools), asked.processes)
-    if not asked.page or asked.pictures:
+    if asked.pictures if asked.pictures is not None else not asked.page:
         (asked.out / "images" / "gallery").mkdir(parents=True, exist_ok=True)
         for entry in chosen:
             _say(f"{entry.name}: picture")
@@ -71,7 +71,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--tools", nargs="+", default=[], metavar="TOOL", help="these tools: 'hsdsl c', scipy, ...")
     parser.add_argument("--page", action="store_true", help="write the page from gallery.json, and run nothing")
-    parser.add_argument("--pictures", action="store_true", help="with --page: draw the pictures, too")
+    drawn = "draw the pictures; else with everything but --page"
+    parser.add_argument("--pictures", action=argparse.BooleanOptionalAction, help=drawn)
     parser.add_argument("--processes", type=int, default=1, metavar="N", help="how many runs at a time (1)")
     parser.add_argument("--out", type=Path, default=DOCS, metavar="DIR", help="where the files go (docs)")
     return parser
