@@ -82,7 +82,14 @@ def _figure(name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str)
     for axes in grid[:, 0]:
         axes.set_ylabel(y.name)
     figure.suptitle(name, fontsize=10)
-    _legend(figure, panels, f"{shaded} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else "")
+    limited = any(_has_limit(panel, x) for panel in panels)
+    _legend(
+        figure,
+        panels,
+        limited,
+        columns + (columns > 2),
+        f"{shaded} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else "",
+    )
     return figure
 
 
@@ -97,11 +104,16 @@ def _draw(axes: Axes, panel: Panel, x: Scale, y: Scale, span: tuple[float, float
     if y.logarithmic:
         axes.set_yscale("log")
     axes.set_title(panel.title, fontsize=9)
-    if panel.limit is not None:
-        known = [(h, value) for h, value in zip(panel.limit, y.values, strict=True) if h]
+    if _has_limit(panel, x):
+        known = [(h, value) for h, value in zip(panel.limit or (), y.values, strict=True) if h]
         axes.plot(*zip(*known, strict=True), color=LIMIT, linewidth=2.2)
     axes.set_xlim(x.edges[0], x.edges[-1])
     axes.set_ylim(y.edges[0], y.edges[-1])
+
+
+def _has_limit(panel: Panel, x: Scale) -> bool:
+    """Whether its limit lies in the picture."""
+    return any(h is not None and x.edges[0] <= h <= x.edges[-1] for h in panel.limit or ())
 
 
 def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[float, ...]:
@@ -114,7 +126,7 @@ def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[
     return tuple(colour * (1 - white) + white)
 
 
-def _legend(figure: Figure, panels: Sequence[Panel], shades: str) -> None:
+def _legend(figure: Figure, panels: Sequence[Panel], limited: bool, columns: int, shades: str) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -124,6 +136,6 @@ def _legend(figure: Figure, panels: Sequence[Panel], shades: str) -> None:
     ]
     if shades and handles:
         handles[0].set_label(f"converged, {shades}")
-    if any(panel.limit is not None for panel in panels):
+    if limited:
         handles.append(Line2D([], [], color=LIMIT, linewidth=2.2, label="limit of linear stability"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)), frameon=False, fontsize=8)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)

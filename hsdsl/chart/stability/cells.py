@@ -25,7 +25,8 @@ WITHIN = Tolerance(state=0.05, time=0.005)  # of a converged run
 LARGE = 10.0  # spans of a state: a run that goes farther has blown up
 PRECISE = 1e-12  # the tolerance of a reference run
 SAMPLES = 400
-SECONDS, MOST_ROWS = 0.5, 20_000  # for rho: longer runs are shaded by the error of their samples
+SECONDS, MOST_ROWS = 5.0, 25_000  # for rho, which longer runs do not get
+LOOSE = 0.5  # of rho's upper bound: bounds farther apart than that say little
 PEER_TOLERANCE = 1e-6
 RAN_AWAY = ("not_finite", "left_domain")
 
@@ -134,10 +135,10 @@ class Bench:
     def _rho(self, scene: Scene, run: Execution) -> float:
         options: dict[str, Any] = {"model": self.model, "parameters": scene.parameters, "seconds": SECONDS}
         try:
-            rho = distance_of_runs(run, scene.exact, **options).interval.upper
+            rho = distance_of_runs(run, scene.exact, **options).interval
         except UsageError:  # the model's space has none
             return nan
-        return rho if isfinite(rho) else nan
+        return rho.upper if isfinite(rho.upper) and rho.upper - rho.lower <= LOOSE * rho.upper else nan
 
     def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
         found = outcome(scene, prepare(tool.peer, scene)(arguments.get("tolerance", PEER_TOLERANCE)), WITHIN)

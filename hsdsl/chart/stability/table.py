@@ -67,23 +67,23 @@ def panels(found: StabilityMap) -> list[picture.Panel]:
         picture.Panel(
             panel.tool.label,
             [[cell.word for cell in row] for row in panel.cells],
-            [[_shade(cell) for cell in row] for row in panel.cells],
+            [[_shade(cell, shaded(found)) for cell in row] for row in panel.cells],
             panel.limit,
         )
         for panel in found.panels
     ]
 
 
-def _shade(cell: Cell) -> float | None:
-    """The logarithm of rho, or of the error of samples where there is no rho; None where it says nothing."""
-    size = cell.rho if isfinite(cell.rho) else cell.error
+def _shade(cell: Cell, measure: str) -> float | None:
+    """The logarithm of a measure of a converged run; None of any other."""
+    size = getattr(cell, measure)
     return log10(max(size, 1e-15)) if cell.word == CONVERGED and isfinite(size) else None
 
 
 def shaded(found: StabilityMap) -> str:
-    """What the shades are of."""
+    """What the shades are of: ``rho`` where most converged runs have it, else ``error``."""
     cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
-    return "rho" if any(isfinite(cell.rho) for cell in cells) else "error"
+    return "rho" if 2 * sum(isfinite(cell.rho) for cell in cells) > len(cells) else "error"
 
 
 def axis(given: Axis) -> picture.Scale:
