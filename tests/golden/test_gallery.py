@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from exact.arithmetic import evaluate
-from gallery.page import page
-from gallery.records import read, save
 from gallery.scenes import GALLERY, OLDER, Entry, entries
 from gallery.settings import WITHIN, Setting, own_settings, run
 from references.gallery import GALLERY as SOLVED
 from references.gallery import two_ways
 
 import hsdsl
-from hsdsl.chart import PEERS
 from hsdsl.chart.outcome import Tolerance, outcome
 from hsdsl.chart.result import Result
 from hsdsl.execution import Verdict
 
 SCENES = entries()
-DOCS = Path(__file__).parents[2] / "docs"
 BY_SERIES = {"lorenz-section", "stick-slip"}
 NOT_AS_WRITTEN = {
     "dry-friction": "sliding",
@@ -187,32 +182,3 @@ def test_either_of_two_executions_needs_a_word() -> None:
     assert run(entry, FAST[0]).verdict == "left"
     other = two_ways("top")
     assert other.final.mode == "b" and entry.exact.final.mode == "a"
-
-
-PAGE = DOCS / "gallery.md"
-
-
-def test_the_page_is_in_step_with_the_records() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page(read(DOCS / "gallery.json"), list(SCENES.values()))
-
-
-def test_every_scene_is_recorded_with_every_tool() -> None:
-    records = read(DOCS / "gallery.json")
-    tools = {name for name in PEERS if records.versions[name]} | {"hsdsl c"}
-    for name in SCENES:
-        assert tools <= {row.setting.tool for row in records.rows if row.scene == name}, name
-        assert (DOCS / "images" / "gallery" / f"{name}.svg").read_text().startswith("<?xml")
-
-
-def test_no_run_of_ours_is_recorded_as_wrong() -> None:
-    ours = [row for row in read(DOCS / "gallery.json").rows if row.setting.tool.startswith("hsdsl")]
-    wrong = {(row.scene, row.setting.label) for row in ours if row.outcome.word in ("wrong", "crashes")}
-    assert wrong <= set(INEXACT)
-    assert {row.outcome.word for row in ours} <= {"right", "warns", "stops", "refuses", "hangs", "wrong"}
-
-
-def test_records_survive_their_file(tmp_path: Path) -> None:
-    records = read(DOCS / "gallery.json")
-    save(tmp_path / "again.json", records)
-    assert read(tmp_path / "again.json").versions == records.versions
-    assert (tmp_path / "again.json").read_text() == (DOCS / "gallery.json").read_text()
