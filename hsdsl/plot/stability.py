@@ -120,6 +120,8 @@ def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[
     from matplotlib.colors import to_rgb
 
     colour = np.array(to_rgb(COLOURS[word]))
+    if shade is None and word == "converged":
+        shade = (span[0] + span[1]) / 2  # by how much is not known
     if shade is None:
         return tuple(colour)
     white = PALEST * (shade - span[0]) / (span[1] - span[0] or 1.0)
