@@ -18,6 +18,7 @@ import numpy as np
 import sympy as sp
 from sympy.core.relational import Relational
 
+from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, Mode, Surface
 
@@ -60,10 +61,10 @@ def contact(mode: Mode, k: int) -> Contact | None:
     push, order = _push(states, mode.flow, edge, at)
     if order is None:
         return None
-    release = replace(edge, surface=zero_surface(-push), condition=None,
+    release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
                       reset=tuple(states), reset_texts=mode.states)  # fmt: skip
     edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *_ends_of_condition(release, edge.condition))
-    held = replace(mode, flow=flow, flow_texts=tuple(map(str, flow)), edges=edges)
+    held = replace(mode, flow=flow, flow_texts=tuple(map(text_of, flow)), edges=edges)
     rate = cancelled(along(edge.surface.residual, states, mode.flow))
     return Contact(k, order, held, rate, push, landing)
 
@@ -127,7 +128,7 @@ def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> list[Edge]:
 
 def zero_surface(residual: sp.Expr) -> Surface:
     """The surface where an expression rises through zero."""
-    return Surface(residual, sp.S.Zero, residual, f"{residual} >= 0")
+    return Surface(residual, sp.S.Zero, residual, f"{text_of(residual)} >= 0")
 
 
 def cancelled(value: sp.Expr) -> sp.Expr:

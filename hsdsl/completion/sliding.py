@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.completion.contact import along, cancelled, zero_surface
+from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
@@ -85,14 +86,14 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
     flow = tuple(cancelled(f + share * (g - f)) for f, g in zip(a.flow, b.flow, strict=True))
     stay = {"target_states": a.states, "reset": tuple(states), "reset_texts": a.states, "condition": None}
     onto = tuple(x - r * slope * x**2 / size if curved else x for slope, x in zip(slopes, states, strict=True))
-    leave = {**stay, "reset": onto, "reset_texts": tuple(map(str, onto))}
+    leave = {**stay, "reset": onto, "reset_texts": tuple(map(text_of, onto))}
     leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **leave)
     leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **leave)
     mode = replace(
         a,
         name=name,
         flow=flow,
-        flow_texts=tuple(map(str, flow)),
+        flow_texts=tuple(map(text_of, flow)),
         edges=(leave_a, leave_b, *_others(name, a, out, b, back)),
         walls=tuple(dict.fromkeys((*a.walls, *b.walls))),
         outputs=tuple(_blended(f, g, share) for f, g in zip(a.outputs, b.outputs, strict=True)),
@@ -102,8 +103,11 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
     enter = {**stay, "target": name}
     into_a = replace(out, name=f"{a.name}->{name}", priority=out.priority + 1, **enter)
     into_b = replace(back, name=f"{b.name}->{name}", priority=back.priority + 1, **enter)
-    entries = (replace(into_a, condition=sp.Lt(inwards, 0)), replace(into_b, condition=sp.Gt(outwards, 0)))
-    return Sliding(mode, entries)
+    return Sliding(mode, (_where(into_a, sp.Lt(inwards, 0)), _where(into_b, sp.Gt(outwards, 0))))
+
+
+def _where(edge: Edge, condition: sp.Basic) -> Edge:
+    return replace(edge, condition=condition, condition_text=text_of(condition))
 
 
 def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:

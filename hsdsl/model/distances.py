@@ -171,6 +171,8 @@ class _RunSpace:
                 f"{model.system.path} is not the model that the run is of, or was edited since",
                 "run it again, or give the model as it was",
             )
+        if "auto" in (run.settings.get("completion") for run in (self.run, self.other)):
+            model = model.sliding
         first, second = (parameters_of(run.overrides) | dict(self.parameters or {}) for run in (self.run, self.other))
         plain = model.pipeline.values(FLOAT64)
         values = with_parameters(plain, first)
