@@ -92,7 +92,9 @@ def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
     tree = ast.parse(content)
     strings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
     assert {"import", "a\" ''' \\"} <= strings
-    defined = [node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    targets = [target for node in tree.body if isinstance(node, ast.Assign) for target in node.targets]
+    defined = [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+    defined += [node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     assert len(defined) == len(set(defined))
 
 

@@ -12,7 +12,7 @@ from hsdsl.export.routines import data_names, definitions
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.numbers import table_numbers
-from hsdsl.program import ModeProgram, Program
+from hsdsl.program import ModeProgram
 
 
 def model_text(source: Source, table: ButcherTableau) -> str:
@@ -21,52 +21,68 @@ def model_text(source: Source, table: ButcherTableau) -> str:
     fixed = fixed_parameters(program)
     parts = [
         "# " + "-" * 70 + "\n# The model\n# " + "-" * 70 + "\n",
-        *_functions(program),
+        *_functions(source),
         *values_text(source),
         timeline_text(source),
-        _tables(program),
+        _tables(source),
         _method(table),
         _experiment(source, table, fixed),
     ]
     return "\n\n".join(parts)
 
 
-def _functions(program: Program) -> Iterable[str]:
+def flows(source: Source) -> tuple[ModeProgram, ...]:
+    """The modes and, where a run has them, the motions along their guards."""
+    program = source.problem.program
+    return program.modes if source.problem.settings.completion == "none" else program.flows
+
+
+def _functions(source: Source) -> Iterable[str]:
+    program = source.problem.program
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
-    for j, mode in enumerate(program.modes):
+    for j, mode in enumerate(flows(source)):
         for name, definition in definitions(mode.routines).items():
             spread = ", s" if name.startswith("spread") else ""
             yield function(f"mode_{j}_{name}", definition, data, f"p, t, x{spread}")
 
 
-def _tables(program: Program) -> str:
-    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in program.modes))
+def _tables(source: Source) -> str:
+    program, modes = source.problem.program, flows(source)
+    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in modes))
     wide = max(1, width(program))
     states = program.all_states
     lines = [f"SIZES = {wide}, {surfaces}, {len(program.outputs)}", f"STATES = {_strings(states)}"]
-    modes, edges = list[str](), list[str]()
+    numbers, edges = list[tuple[int, ...]](), list[str]()
     for j, mode in enumerate(program.modes):
-        modes.append(_mode(j, mode, states, len(edges)))
+        numbers.append(tuple(range(len(edges), len(edges) + len(mode.edges))))
         for k, edge in enumerate(mode.edges):
             target = tuple(map(states.index, edge.target_states))
             edges.append(
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
                 f"SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}),"
             )
-    lines += ["MODES = (", *modes, ")", "EDGES = (", *edges, ")"]
+    texts = [_mode(j, mode, modes, states, numbers) for j, mode in enumerate(modes)]
+    lines += ["MODES = (", *texts, ")", "EDGES = (", *edges, ")"]
     return "\n".join(lines) + "\n"
 
 
-def _mode(j: int, mode: ModeProgram, states: tuple[str, ...], first: int) -> str:
+def _mode(
+    j: int, mode: ModeProgram, modes: tuple[ModeProgram, ...], states: tuple[str, ...], numbers: list[tuple[int, ...]]
+) -> str:
     surfaces = range(len(mode.edges) + len(mode.walls))
-    conditions = [[name for name in mode.routines.names if name.startswith(f"condition_{k}_")] for k in
-                  range(len(mode.edges))]  # fmt: skip
+    conditions = [
+        [name for name in mode.routines.names if name.startswith(f"condition_{k}_")] for k in range(len(mode.edges))
+    ]
     listed = [_names(j, [f"{kind}_{k}" for k in surfaces]) for kind in ("gradient", "rate")]
     parts = "".join(f"{_names(j, names)}, " for names in conditions)
-    edges = tuple(range(first, first + len(mode.edges)))
+    owner, held = next(((i, k) for i, m in enumerate(modes) for k, e in enumerate(m.edges) if e.contact == j), (j, -1))
+    own = numbers[owner]
+    edges = own if owner == j else (*own, *(own[held] for _ in mode.edges[len(own) :]))
+    contacts = tuple(-1 if edge.contact is None or edge.contact >= len(modes) else edge.contact for edge in mode.edges)
+    contact = contacts, tuple(edge.releases for edge in mode.edges), owner, held, mode.push_order
     return (
-        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {edges}, SIZES,\n"
-        f"            mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
+        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {edges}, {contact},\n"
+        f"            SIZES, mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
         f"            ({parts}), mode_{j}_outputs),"
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
+from .contact import close_tail, into_contact, out_of_contact, takes_back
 from .functions import NAN, chosen, frozen
 from .lane import (
     BOUNDARY,
@@ -22,17 +23,19 @@ from .lane import (
     stopped,
 )
 from .model import Bound
-from .relaxed import at_once
-from .rest import close_tail, rests, takes_back
 from .surfaces import standing
-from .trials import scaled
+from .transitions import at_once
+from .verdicts import scaled
 
 
 def boundary(model, config, p, lane, record):
     """Go on behind a jump of an input, or end; the end is closed, so a guard reached at it fires."""
-    mask, still = lane.phase == BOUNDARY, frozen(lane)
+    mask = lane.phase == BOUNDARY
     bound = Bound(model, frozen(p), lane.segment)
     end = mask & bound.last
+    if model.holds:
+        lane = into_contact(model, p, out_of_contact(model, lane, mask), end)
+    still = frozen(lane)
     found = standing(model, bound, still, still.t, still.x, 1e-12 * still.t)
     event = at_once(model, config, p, lane, end & found.any(), found)
     if config.scheme == "relaxed":
@@ -49,7 +52,13 @@ def boundary(model, config, p, lane, record):
         phase=jnp.int32(ENTER), inside=plain & (values < -noise), since=jnp.asarray(0.0), reset_at=jnp.asarray(NAN),
         made=jnp.asarray(False), visited=lane.visited._replace(room=jnp.int32(0)),
     )  # fmt: skip
-    return chosen(mask & ~end, jump, lane), record, event
+    kink = lane._replace(
+        phase=jnp.int32(STEP), segment=lane.segment + 1, entered_t=still.t, entered_x=still.x,
+        terms=jnp.zeros_like(lane.terms),
+    )  # fmt: skip
+    if model.holds and config.scheme == "located":
+        kink = into_contact(model, p, kink, mask)
+    return chosen(mask & ~end, chosen(bound.next_jumps, jump, kink), lane), record, event
 
 
 def met(model, bound, lane):
@@ -71,7 +80,7 @@ def enter(model, config, p, lane, record):
     mask = lane.phase == ENTER
     placed = noticed(model, lane, frozen(lane.x))._replace(
         segment=model.segment(frozen(p), frozen(lane.t)).astype(jnp.int32), entered_t=frozen(lane.t),
-        entered_x=frozen(lane.x), terms=jnp.zeros_like(lane.terms), resting=jnp.full_like(lane.resting, -1),
+        entered_x=frozen(lane.x), terms=jnp.zeros_like(lane.terms), held=jnp.full_like(lane.held, -1),
         trial=lane.h, clear=jnp.asarray(False),
     )  # fmt: skip
     bound, still = Bound(model, frozen(p), placed.segment), frozen(placed)
@@ -123,7 +132,7 @@ def flowing(model, config, p, lane, record, mask):
     slides = same & lane.made
     if config.scheme == "relaxed":
         other = bound.flow(still.mode, still.t, still.x)
-        undone = takes_back(still.slope, other, jnp.abs(still.slope), 0.0)
+        undone = takes_back(still.slope, other, jnp.abs(still.slope))
         dimension = jnp.asarray(model.dimension)
         alike = dimension[still.mode_before] == dimension[still.mode]
         slides = slides & (still.mode_before != still.mode) & ~(alike & undone)
@@ -133,13 +142,11 @@ def flowing(model, config, p, lane, record, mask):
     )  # fmt: skip
     made = lane.made
     lane = chosen(mask, stopped(ready, slides, ZENO), lane)
-    if config.scheme == "relaxed" or not model.loops.any():
+    if config.scheme == "relaxed":
         return lane, record
     mask = mask & (lane.phase == STEP)
-    lane, record = close_tail(model, config, p, lane, record, mask & made)
-    resting = rests(model, config, p, lane)
-    now = mask & (lane.phase == STEP) & (resting >= 0)
-    lane = lane._replace(
-        resting=jnp.where(now, resting, lane.resting), trial=jnp.where(now, config.rest_step, lane.trial)
-    )
+    if model.loops.any():
+        lane, record = close_tail(model, config, p, lane, record, mask & made)
+    if model.holds:
+        lane = into_contact(model, p, lane, mask & (lane.phase == STEP))
     return lane, record

@@ -34,6 +34,7 @@ class Lane(NamedTuple):
     ``scale`` has the sizes of the numbers that the state was computed from on entry, ``scales`` the largest that each
     state of the model has had. ``active`` and ``emerging`` are as in the reference loop. ``h`` is the step to try next,
     ``trial`` the one under way, halved ``halvings`` times. ``terms`` has the sizes of the terms of the last step.
+    ``held`` is the edge whose guard holds the state, or -1.
     ``edge`` is that of the last transition, and ``slope`` the flow before it.
     """
 
@@ -67,7 +68,7 @@ class Lane(NamedTuple):
     accepted: Any
     rejected: Any
     stretch: Any
-    resting: Any
+    held: Any
     made: Any
     flowed: Any
     edge: Any

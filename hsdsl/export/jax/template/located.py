@@ -11,14 +11,14 @@ import jax.numpy as jnp
 from jax import lax
 
 from .functions import INF, chosen, frozen
-from .lane import CROSS, LEFT_DOMAIN, STEP, sampled, stopped
+from .lane import CROSS, LEFT_DOMAIN, sampled, stopped
 from .model import Bound
-from .relaxed import Event, corrected, passed_over, sizes_of
 from .steps import at, slope_at, step
 from .surfaces import SCAN, choose, closed, each_at, standing, ties
-from .trials import attempted, looked_along, motion, rising, scaled, terms_of
+from .transitions import Event, corrected, passed_over, sizes_of
+from .verdicts import attempted, looked_along, motion, rising, scaled, terms_of
 
-HALVINGS, CORRECTIONS = 40, 8
+HALVINGS, NEWTON_STEPS = 40, 8
 
 
 def slopes_at(bound, lane, trial, shares):
@@ -77,7 +77,7 @@ def settled(model, bound, lane, trial, shares):
         return jnp.where(over, shares, further), best, least, over
 
     state = shares, shares, jnp.full(model.M, INF), jnp.zeros(model.M, bool)
-    best = lax.fori_loop(0, CORRECTIONS, correct, state)[1]
+    best = lax.fori_loop(0, NEWTON_STEPS, correct, state)[1]
     times, states = jax.vmap(point)(best)
     return best, times, states
 
@@ -121,41 +121,31 @@ def first_rises(model, bound, lane, trial, wanted):
     return lax.while_loop(lambda s: s[0].any(), look, state)[1:]
 
 
-def located_crossing(model, config, p, lane, record, release):
+def located_crossing(model, config, p, lane, record):
     """What a step with a possible crossing leads to: a transition, the end at a wall, or nothing."""
     mask = lane.phase == CROSS
     still, bound = frozen(lane), Bound(model, frozen(p), lane.segment)
     trial = attempted(model, bound, still, still.trial)
-    mode, number = lane.mode, jnp.arange(model.M)
-    wanted = model.of(model.is_edge | model.is_wall, mode) & (number != lane.resting) & mask
+    mode = lane.mode
+    wanted = model.of(model.is_edge | model.is_wall, mode) & mask
     found, share, times, states = first_rises(model, bound, still, trial, wanted)
     guards, walls = found & model.of(model.is_edge, mode), found & model.of(model.is_wall, mode)
     wall = jnp.argmin(jnp.where(walls, times, INF))
     hits = walls.any() & ~(guards & (times <= times[wall] + ties(config, times[wall]))).any()
-    free, released = release(model, config, bound, still, trial, jnp.where(found, times, INF).min())
     on = standing(model, bound, still, times[wall], states[wall], ties(config, times[wall]))
-    leaves = hits & ~on.any() & ~free
+    leaves = hits & ~on.any()
     guards = jnp.where(hits, on, guards)
     times = jnp.where(hits, times[wall], times)
     states = jnp.where(hits, states[wall], states)
     share = jnp.where(hits, share[wall], share)
     first, k, tied = choose(model, config, bound, still, guards, times, states)
-    goes = mask & guards.any() & ~leaves & ~free
+    goes = mask & guards.any() & ~leaves
     event = arriving(model, p, lane, trial, goes, first, k, share[first], times[first], states[first], tied)
-    ends = mask & (goes | leaves | free)
-    until = jnp.where(free, released, jnp.where(leaves, times[wall], event.t))
+    ends = mask & (goes | leaves)
+    until = jnp.where(leaves, times[wall], event.t)
     record = until_crossing(model, config, p, lane, record, ends, until)
     lane = chosen(mask & leaves, stopped(lane, True, LEFT_DOMAIN)._replace(t=times[wall], x=states[wall]), lane)
-    lane = chosen(mask & free, let_go(config, lane, released), lane)
     return passed_over(lane, mask & ~ends), record, event
-
-
-def let_go(config, lane, time):
-    """A run that rested, at the moment when it is let go."""
-    return lane._replace(
-        t=time, phase=jnp.int32(STEP), resting=jnp.full_like(lane.resting, -1), trial=lane.h,
-        entered_t=time, entered_x=lane.x,
-    )  # fmt: skip
 
 
 def until_crossing(model, config, p, lane, record, mask, end):

@@ -1,113 +1,14 @@
 # pyright: basic, reportCallIssue=false
-"""What is generated from a model, and its routines as functions of the mode's number, with derivatives."""
+"""A model and its routines as functions of the mode's number, with derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-
-from .functions import padded
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A mode: its name, the numbers of its states among those of all modes, and its routines.
-
-    A routine takes (p, t, x); vectors are as wide as in the widest mode. ``edges`` are numbers among all
-    edges.
-    """
-
-    name: str
-    states: tuple[int, ...]
-    final: bool
-    edges: tuple[int, ...]
-    walls: int
-    flow: Callable
-    surfaces: Callable
-    magnitudes: Callable
-    gradients: Callable
-    rates: Callable
-    conditions: Callable
-    outputs: Callable
-
-
-def mode_of(name, states, final, edges, sizes, flow, surfaces, magnitudes, gradients, rates, conditions, outputs):
-    """A mode of plain routines, which return a tuple each, padded to ``sizes`` (W, M, outputs)."""
-    width, count, results = sizes
-    rest = count - len(rates)
-
-    def all_gradients(p, t, x):
-        rows = [padded(gradient(p, t, x), width + 1) for gradient in gradients]
-        return jnp.stack(rows + [jnp.zeros(width + 1)] * rest)
-
-    def all_conditions(p, t, x):
-        holds = [jnp.stack([part(p, t, x)[0] for part in parts]).all() for parts in conditions]
-        return jnp.stack(holds + [jnp.asarray(True)] * (count - len(holds)))
-
-    return Mode(
-        name,
-        states,
-        final,
-        edges,
-        len(rates) - len(edges),
-        lambda p, t, x: padded(flow(p, t, x), width),
-        lambda p, t, x: padded(surfaces(p, t, x), count, -1.0),
-        lambda p, t, x: padded(magnitudes(p, t, x), count),
-        all_gradients,
-        lambda p, t, x: padded([rate(p, t, x)[0] for rate in rates], count),
-        all_conditions,
-        lambda p, t, x: padded(outputs(p, t, x), results),
-    )
-
-
-def edge_of(name, source, target, states, conditional, priority, width, reset, spread):
-    """An edge of plain routines."""
-    return Edge(
-        name,
-        source,
-        target,
-        states,
-        conditional,
-        priority,
-        lambda p, t, x: padded(reset(p, t, x), width),
-        lambda p, t, x, s: padded(spread(p, t, x, s), width),
-    )
-
-
-@dataclass(frozen=True)
-class Edge:
-    """An edge between modes, given by their numbers; ``keeps`` says that both have the same states."""
-
-    name: str
-    source: int
-    target: int
-    states: tuple[int, ...]
-    conditional: bool
-    priority: int
-    reset: Callable
-    spread: Callable
-
-
-@dataclass(frozen=True)
-class Method:
-    """A table of an explicit method: rows of (stage, weight); stage ``stages`` is the flow at the step's end."""
-
-    name: str
-    order: int
-    stages: int
-    extra: int
-    interpolant: str
-    nodes: tuple
-    a: tuple
-    b: tuple
-    error: tuple
-    coarse: tuple
-    dense: tuple
 
 
 def with_derivatives(branches):
@@ -173,28 +74,36 @@ class Model:
         self._tabulate()
 
     def _tabulate(self):
-        modes, edges = self.modes, self.edges
-        count, width = len(modes), self.M
+        modes, edges, shape = self.modes, self.edges, (len(self.modes), self.M)
         self.final = np.array([mode.final for mode in modes])
-        self.is_edge, self.is_wall = np.zeros((count, width), bool), np.zeros((count, width), bool)
-        self.conditional, self.loops = np.zeros((count, width), bool), np.zeros((count, width), bool)
-        self.priority, self.edge = np.zeros((count, width), int), np.zeros((count, width), int)
-        self.place = np.full((count, self.W), -1)
+        self.owner, self.push_order = np.array([m.owner for m in modes]), np.array([m.push_order for m in modes])
+        self.dimension = np.array([len(mode.states) for mode in modes])
+        self.is_edge, self.is_wall, self.conditional, self.loops, self.releases = np.zeros((5, *shape), bool)
+        self.priority, self.edge = np.zeros((2, *shape), int)
+        self.contact, self.of_owner, self.in_contact = np.full((3, *shape), -1)
+        self.place = np.full((len(modes), self.W), -1)
         for j, mode in enumerate(modes):
-            own = len(mode.edges)
+            own, count = len(mode.edges), len(mode.edges) + mode.walls
             self.is_edge[j, :own] = True
-            self.is_wall[j, own : own + mode.walls] = True
+            self.is_wall[j, own:count] = True
             self.place[j, : len(mode.states)] = mode.states
+            self.contact[j, :own], self.releases[j, :own] = mode.contacts, mode.releases
             for k, number in enumerate(mode.edges):
                 edge = edges[number]
                 self.edge[j, k], self.priority[j, k] = number, edge.priority
-                self.conditional[j, k] = edge.conditional
-                self.loops[j, k] = edge.target == j and edge.states == mode.states
-        self.dimension = np.array([len(mode.states) for mode in modes])
+                self.conditional[j, k] = edge.conditional and not mode.releases[k]
+                self.loops[j, k] = edge.target == mode.owner and edge.states == mode.states
+            if mode.owner != j:
+                self._relate(j, len(modes[mode.owner].edges), own, mode.walls)
+        self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
-        self.target_place = np.full((max(len(edges), 1), self.W), -1)
-        for number, edge in enumerate(edges):
-            self.target_place[number, : len(edge.states)] = edge.states
+
+    def _relate(self, j, edges, own, walls):
+        """The surfaces of a motion along a guard among those of its mode, and the other way round."""
+        for k in range(edges):
+            self.of_owner[j, k] = self.in_contact[j, k] = k
+        for k in range(walls):
+            self.of_owner[j, own + k], self.in_contact[j, edges + k] = edges + k, own + k
 
     @property
     def transparent(self):

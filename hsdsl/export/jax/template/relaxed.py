@@ -1,68 +1,20 @@
 # pyright: basic
-"""Transitions, and those of the relaxed scheme: crossings on the interpolant of a step, and the strip."""
+"""Transitions of the relaxed scheme: crossings on the interpolant of a step."""
 
 from __future__ import annotations
-
-from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from .control import accepted, error_ratio
-from .functions import NAN, chosen, frozen, keeping
-from .lane import (
-    CROSS,
-    DEEP,
-    ENTER,
-    FLAT,
-    FREE,
-    INWARD,
-    LIMIT,
-    NOT_FINITE,
-    STEP,
-    STUCK,
-    UNTIL,
-    VALUE,
-    contraction,
-    recorded,
-    sampled,
-    stopped,
-)
+from .functions import frozen
+from .lane import CROSS, DEEP, FLAT, INWARD, sampled
 from .model import Bound
 from .steps import at, error_of, hermite
-from .surfaces import SCAN, along, choose, each_at, last_up_crossing, standing, ties
-from .trials import Verdict, attempted, motion, scaled, shortened
-
-
-class Event(NamedTuple):
-    """Where ``mask`` holds: edge k of the mode goes from (t, x); a step into a strip ended at ``landed``, this deep."""
-
-    mask: Any
-    k: Any
-    t: Any
-    x: Any
-    landed: Any
-    depth: Any
-    sizes: Any
-    tied: Any
-
-
-def corrected(bound, lane, k, t, x, time, state):
-    """The time and state of a crossing of surface k, with their derivatives.
-
-    (time, state) is a point with the same numbers, on the trajectory at a share of a step that does not depend on
-    anything; the crossing moves along the flow as the surface's value there says.
-    """
-    rate = frozen(bound.rates(lane.mode, t, x)[k])
-    r = bound.surfaces(lane.mode, time, state)[k]
-    late = -(r - frozen(r)) / jnp.where(rate == 0, jnp.inf, rate)
-    return keeping(t, time + late), keeping(x, state + frozen(bound.flow(lane.mode, t, x)) * late)
-
-
-def sizes_of(lane, x, z):
-    """The sizes of the numbers that a point between x and z is computed from."""
-    still = jnp.where(z == lane.entered_x, lane.scale, jnp.abs(z))
-    return frozen(jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(z)), still))
+from .surfaces import SCAN, along, choose, each_at, last_up_crossing
+from .transitions import Event, corrected, passed_over, sizes_of
+from .trials import shortened
+from .verdicts import Verdict, attempted, motion, scaled
 
 
 def crossings(model, config, bound, lane, trial):
@@ -123,7 +75,7 @@ def values_at_start(bound, lane, trial):
     return along(bound, lane.mode, trial.t, trial.h, trial.x, trial.piece, jnp.zeros(1))[0]
 
 
-def relaxed_crossing(model, config, p, lane, record, _):
+def relaxed_crossing(model, config, p, lane, record):
     """What a step that ended in strips leads to: a transition, a shorter step, or nothing where it may be there."""
     mask = lane.phase == CROSS
     still, bound = frozen(lane), Bound(model, frozen(p), lane.segment)
@@ -146,11 +98,6 @@ def relaxed_crossing(model, config, p, lane, record, _):
     return passed_over(lane, mask & none & trial.ends), record, event
 
 
-def passed_over(lane, mask):
-    """A run whose trial has no crossing after all: it counts when it is made again."""
-    return lane._replace(clear=lane.clear | mask, phase=jnp.where(mask, STEP, lane.phase))
-
-
 def grown(config, lane, trial, ratio):
     """The next step after one into a strip."""
     return accepted(config, lane, trial.h, ratio, jnp.isfinite(ratio)).h
@@ -167,7 +114,9 @@ def landing(model, p, lane, trial, mask, first, k, share, time, state, depth, ti
         piece = jnp.where(made.ends, cubic, jnp.zeros_like(cubic).at[:1].set(piece))
     t, x = jnp.where(mask, time, lane.t), jnp.where(mask, state, lane.x)
     t, x = corrected(bound, lane, first, frozen(t), frozen(x), made.t + share * made.h, at(made.x, piece, share))
-    return Event(mask, k, t, x, frozen(made.t1), frozen(depth), sizes_of(lane, trial.x, trial.z), tied)
+    sizes = sizes_of(lane, trial.x, trial.z)  # those of the entry count for what has not moved since
+    sizes = jnp.where(state == lane.entered_x, jnp.maximum(sizes, lane.scale), sizes)
+    return Event(mask, k, t, x, frozen(made.t1), frozen(depth), sizes, tied)
 
 
 def within_step(config, model, p, lane, record, mask, event):
@@ -180,90 +129,3 @@ def within_step(config, model, p, lane, record, mask, event):
         record, config, mask, lane.mode, made.t, event.t,
         lambda times: jax.vmap(lambda time: at(made.x, made.piece, (time - made.t) / length))(times),
     )  # fmt: skip
-
-
-def at_once(model, config, p, lane, mask, found):
-    """The event of guards that a state is on."""
-    bound = Bound(model, p, lane.segment)
-    places, count = jnp.broadcast_to(frozen(lane.x), (model.M, model.W)), jnp.full(model.M, frozen(lane.t))
-    first, k, tied = choose(model, config, Bound(model, frozen(p), lane.segment), frozen(lane), found, count, places)
-    t, x = corrected(bound, lane, first, frozen(lane.t), frozen(lane.x), lane.t, lane.x)
-    sizes = sizes_of(lane, frozen(lane.x), frozen(lane.x))
-    return Event(mask, k, t, x, frozen(lane.t), jnp.asarray(0.0), sizes, tied)
-
-
-def stuck(model, config, p, lane):
-    """A run that no step leads on: a guard that it is on goes, or it ends with the reason."""
-    mask, still = lane.phase == STUCK, frozen(lane)
-    bound = Bound(model, frozen(p), lane.segment)
-    may = (lane.failure == VALUE) | ((config.scheme == "relaxed") & (lane.failure >= 1) & (lane.failure <= INWARD))
-    found = standing(model, bound, still, still.t, still.x, 1e-12 * still.t) & may
-    event = at_once(model, config, p, lane, mask & found.any(), found)
-    reasons = jnp.asarray([7, 3, 7, 7, 7, 6, 7, 7])  # by failure: a wall, no value, else no step is short enough
-    return stopped(lane, mask & ~found.any(), reasons[lane.failure]), event
-
-
-def either(one, other):
-    """The event of one of two, of which at most one is an event."""
-    return chosen(one.mask, one, other)
-
-
-def transit(model, config, p, lane, record, event):
-    """Make a transition: wait in the strip, reset, and enter the target next."""
-    bound = Bound(model, p, lane.segment)
-    edge = model.of(model.edge, lane.mode)[event.k]
-    mask = event.mask
-    over = mask & (lane.count >= config.max_transitions)
-    lane, mask = stopped(lane._replace(t=jnp.where(over, event.t, lane.t)), over, LIMIT), mask & ~over
-    x = jnp.where(mask, event.x, lane.x)
-    after = bound.routines.reset(edge, bound.p, event.t, x)
-    spread = bound.routines.spread(edge, bound.p, frozen(event.t), frozen(x), event.sizes)
-    scale = frozen(jnp.where(jnp.isfinite(spread).all(), spread, jnp.abs(after)))
-    if config.scheme == "relaxed":
-        resumed = event.landed + (config.relaxation - event.depth)
-    else:
-        resumed = event.t + jnp.where(crowded(config, lane, event.t), config.relaxation, 0.0)
-    waits = resumed > event.t
-    late = waits & (resumed > config.until + ties(config, config.until))
-    resumed = keeping(jnp.minimum(resumed, jnp.where(waits, config.until, resumed)), event.t)
-    bad = ~jnp.isfinite(after).all() & ~late
-    record = recorded(
-        record, lane, mask & (late | ~bad), event.t, jnp.where(late, NAN, resumed), edge, x,
-        jnp.where(late, NAN, after), jnp.asarray(False),
-    )  # fmt: skip
-    record = sampled(
-        record, config, mask & waits, lane.mode, event.t, jnp.minimum(resumed, config.until),
-        lambda times: jnp.broadcast_to(x, (len(times), model.W)),
-    )  # fmt: skip
-    stops = mask & (late | bad)
-    ended = stopped(lane, stops, jnp.where(late, UNTIL, NOT_FINITE))
-    ended = ended._replace(t=jnp.where(late, config.until, event.t), x=x, count=lane.count + jnp.where(late, 1, 0))
-    made = lane._replace(
-        phase=jnp.int32(ENTER), t=resumed, x=after, mode=jnp.asarray(model.target, jnp.int32)[edge],
-        scale=scale, since=since_of(config, lane, event), inside=jnp.zeros_like(lane.inside),
-        reset_at=frozen(event.t), resting=jnp.full_like(lane.resting, -1), made=jnp.asarray(True),
-        flowed=event.t > lane.entered_t, edge=edge.astype(jnp.int32),
-        slope=frozen(bound.flow(lane.mode, event.t, x)), mode_before=lane.mode,
-        times=jnp.concatenate([lane.times[1:], frozen(event.t)[None]]),
-        waits=jnp.concatenate([lane.waits[1:], frozen(resumed - event.t)[None]]),
-        loops=jnp.concatenate([lane.loops[1:], edge.astype(jnp.int32)[None]]), count=lane.count + 1,
-        trial=lane.h, clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
-        visited=lane.visited._replace(room=jnp.int32(0)),
-    )  # fmt: skip
-    lane = chosen(stops, ended, lane)
-    return chosen(mask & ~stops, made, lane), record
-
-
-def crowded(config, lane, t):
-    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit."""
-    flown = t - lane.times[0] - lane.waits.sum()
-    return (lane.count >= FREE) & ~contraction(lane)[0] & (flown <= config.relaxation)
-
-
-def since_of(config, lane, event):
-    """The time within which a surface that the flow passes is active: of tied transitions that of a tie."""
-    if config.scheme == "relaxed":
-        return jnp.asarray(0.0)
-    tie = ties(config, event.t)
-    at_this_instant = (lane.count > 0) & (event.t - lane.times[-1] - lane.waits[-1] <= tie)
-    return frozen(jnp.where(event.tied | at_this_instant, tie, 0.0))

@@ -12,12 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from .contact import let_go
 from .entry import boundary, enter
 from .lane import RUNNING, STEP, STEPS, STOPS, start
 from .located import located_crossing
 from .model import Bound, Model
-from .relaxed import either, relaxed_crossing, stuck, transit
-from .rest import release, releases
+from .relaxed import relaxed_crossing
+from .transitions import either, stuck, transit
 from .trials import advance
 
 ROUND = 16  # trial steps between two looks at what they found
@@ -48,11 +49,6 @@ class Config:
     def least(self):
         """The least one."""
         return max(self.tolerance or 0.0, 2.0**-26.5) * self.largest
-
-    @property
-    def rest_step(self):
-        """The step over a state at rest."""
-        return self.until / 100 if self.tolerance is not None else min(self.step, 0.1 * self.until)
 
 
 class Run(NamedTuple):
@@ -85,10 +81,13 @@ class Run(NamedTuple):
 def look(model, config, p, lane, record):
     """Do what steps have led to: transitions, ends, entries."""
     crossed = relaxed_crossing if config.scheme == "relaxed" else located_crossing
-    lane, record, event = crossed(model, config, p, lane, record, release)
+    lane, record, event = crossed(model, config, p, lane, record)
     lane, other = stuck(model, config, p, lane)
     lane, record, third = boundary(model, config, p, lane, record)
-    lane, record = transit(model, config, p, lane, record, either(event, either(other, third)))
+    event = either(event, either(other, third))
+    if model.holds and config.scheme == "located":
+        lane, event = let_go(model, config, p, lane, event)
+    lane, record = transit(model, config, p, lane, record, event)
     return enter(model, config, p, lane, record)
 
 
@@ -102,7 +101,7 @@ def one_round(model, config, p, state):
         return same_types(look(model, config, p, *state), state)
 
     def tried(state, _):
-        return same_types(advance(model, config, releases, p, *state), state), None
+        return same_types(advance(model, config, p, *state), state), None
 
     state = lax.cond(state[0].phase == STEP, lambda s: s, looked, state)
     lane, record = lax.scan(tried, state, None, ROUND)[0]
@@ -124,8 +123,9 @@ def run(model, config, p, mode, x0, rounds=None):
     lane, record = state
     stop = jnp.where(lane.stop == RUNNING, STEPS, lane.stop)
     bound = Bound(model, p, lane.segment)
-    outputs = bound.routines.outputs(lane.mode, bound.p, lane.t, lane.x)
-    return Run(*record, lane.count, stop, lane.t, lane.mode, lane.x, outputs, lane.steps)
+    mode = model.of(model.owner, lane.mode).astype(jnp.int32)
+    outputs = bound.routines.outputs(mode, bound.p, lane.t, lane.x)
+    return Run(*record, lane.count, stop, lane.t, mode, lane.x, outputs, lane.steps)
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,10 @@ def standing(model, bound, lane, t, x, since):
     """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true."""
     mode = lane.mode
     r = bound.surfaces(mode, t, x)
-    rate = jnp.where(lane.resting < 0, bound.rates(mode, t, x), bound.gradients(mode, t, x)[:, 0])
+    rate = bound.rates(mode, t, x)
     noise = bound.noise(mode, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
     near = jnp.abs(r) <= jnp.maximum(noise, rate * since)
-    own = model.of(model.is_edge, mode) & (jnp.arange(model.M) != lane.resting)
-    return near & (rate > 0) & bound.conditions(mode, t, x) & own
+    return near & (rate > 0) & bound.conditions(mode, t, x) & model.of(model.is_edge, mode)
 
 
 def choose(model, config, bound, lane, found, times, states):

@@ -1,0 +1,178 @@
+# pyright: basic
+"""Motion along a guard that holds a state, at rest where that is none, and Zeno tails that end in it."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from .functions import chosen, frozen, keeping, when
+from .lane import STEP, ZENO, contraction, noticed, sampled, scales_here, stopped
+from .model import Bound
+from .steps import at
+from .surfaces import UNIT, ties
+
+SAME_UNITS, ZERO_UNITS, ROUNDS, CORRECTIONS, DOUBLINGS = 4, 16, 60, 8, 14
+
+
+def takes_back(slope, back, sizes):
+    """Whether one direction is opposite to another that is not zero, relative to the size of each component."""
+    moving = slope != 0
+    along = jnp.argmax(jnp.where(moving, jnp.abs(slope) / jnp.where(sizes > 0, sizes, 1.0), -1.0))
+    share = back[along] / jnp.where(slope[along] == 0, 1.0, slope[along])
+    off = jnp.abs(back - share * slope)
+    return moving.any() & (share < 0) & (off <= 1e-6 * jnp.abs(share) * sizes).all()
+
+
+def after_reset(model, bound, mode, k, t, x):
+    """Where edge k leads."""
+    return bound.routines.reset(model.of(model.edge, mode)[k], bound.p, t, x)
+
+
+def keeps(model, bound, lane, k, t, x):
+    """Whether edge k is possible and leaves the state where it is."""
+    noise = SAME_UNITS * UNIT * scales_here(model, lane)
+    still = (jnp.abs(after_reset(model, bound, lane.mode, k, t, x) - x) <= noise).all()
+    return still & bound.conditions(lane.mode, t, x)[k]
+
+
+def is_tangent(model, bound, lane, k, t, x):
+    """Whether the flow is tangent to surface k, to round-off."""
+    rows = jax.jacfwd(lambda x: bound.flow(lane.mode, t, x))(x)
+    sizes = jnp.abs(bound.flow(lane.mode, t, x)) + jnp.abs(rows) @ scales_here(model, lane)
+    gradient = bound.gradients(lane.mode, t, x)[k]
+    size = jnp.abs(gradient[0]) + jnp.abs(gradient[1:]) @ sizes
+    return jnp.abs(bound.rates(lane.mode, t, x)[k]) <= ZERO_UNITS * UNIT * size
+
+
+def presses(model, bound, lane, k, t, x):
+    """Whether a state's flow presses on the guard of edge k, and its reset keeps the state."""
+    contact = model.of(model.contact, lane.mode)[k]
+    held = jnp.maximum(contact, 0)
+    inside = bound.surfaces(held, t, x)[k] < -bound.noise(held, t, x, jnp.zeros_like(x))[k]
+    first = jnp.asarray(model.push_order)[held] == 1
+    on = (contact >= 0) & keeps(model, bound, lane, k, t, x) & inside
+    return on & (first | is_tangent(model, bound, lane, k, t, x))
+
+
+def into_contact(model, p, lane, mask):
+    """Let a guard that a state is on hold it, if it does."""
+    bound, still = Bound(model, frozen(p), frozen(lane.segment)), frozen(lane)
+    may = mask & lane.active & (model.of(model.contact, lane.mode) >= 0)
+
+    def pressed():
+        return jax.vmap(lambda k: presses(model, bound, still, k, still.t, still.x))(jnp.arange(model.M))
+
+    found = may & when(may.any(), pressed, may)
+    k = jnp.argmax(found)
+    contact = jnp.maximum(model.of(model.contact, lane.mode)[k], 0).astype(jnp.int32)
+    known = model.of(model.of_owner, contact)
+    active = (known >= 0) & lane.active[known] & (jnp.arange(model.M) != k)
+    held = lane._replace(mode=contact, held=k.astype(jnp.int32), active=active, emerging=jnp.zeros_like(lane.emerging))
+    return chosen(found.any(), held, lane)
+
+
+def out_of_contact(model, lane, mask):
+    """A run in its mode itself again, on the guard that held it."""
+    known = model.of(model.in_contact, lane.mode)
+    active = ((known >= 0) & lane.active[known]) | (jnp.arange(model.M) == lane.held)
+    free = lane._replace(
+        mode=model.of(model.owner, lane.mode).astype(jnp.int32), held=jnp.full_like(lane.held, -1), active=active,
+        emerging=jnp.zeros_like(lane.emerging),
+    )  # fmt: skip
+    return chosen(mask & (lane.held >= 0), free, lane)
+
+
+def let_go(model, config, p, lane, event):
+    """End a contact at an event that does; what is left of events are transitions."""
+    ends = event.mask & model.of(model.releases, lane.mode)[event.k]
+    bound = Bound(model, frozen(p), lane.segment)
+    t, x, owner = frozen(event.t), frozen(event.x), model.of(model.owner, lane.mode)
+    after = UNIT * config.until * 2.0 ** jnp.arange(DOUBLINGS)
+    after = jnp.where(after <= ties(config, t), after, 0.0)
+    slope = bound.flow(lane.mode, t, x)
+    holds = jax.vmap(lambda s: bound.conditions(owner, t + s, x + s * slope)[lane.held])(after)
+    own = event.k == lane.held
+    late = jnp.where(own, 0.0, after[jnp.argmax(~holds)])
+    frees = own | ~holds.all()
+    here = noticed(model, lane, x)._replace(
+        t=event.t + late, x=event.x + late * slope, trial=lane.h, clear=jnp.asarray(False), phase=jnp.int32(STEP),
+        halvings=jnp.zeros_like(lane.halvings), terms=jnp.zeros_like(lane.terms),
+    )  # fmt: skip
+    on = here._replace(active=here.active | (jnp.arange(model.M) == event.k))
+    free = out_of_contact(model, here, jnp.asarray(True))
+    free = free._replace(scale=event.sizes, entered_t=frozen(here.t), entered_x=frozen(here.x))
+    lane = chosen(ends, chosen(frees, free, on), lane)
+    return lane, event._replace(mask=event.mask & ~ends)
+
+
+def fixed_point(reset, x, wanted):
+    """The point that repeated resets run to (Aitken's acceleration, by component)."""
+
+    def accelerate(_, x):
+        one = reset(x)
+        two = reset(one)
+        bend = two - 2 * one + x
+        further = jnp.where(bend == 0, two, x - (one - x) * (one - x) / jnp.where(bend == 0, 1.0, bend))
+        return jnp.where((one == x).all(), x, further)
+
+    found = when(wanted, lambda: lax.fori_loop(0, ROUNDS, accelerate, frozen(x)), frozen(x))
+    return keeping(found, accelerate(0, x))
+
+
+def onto_guard(bound, lane, k, t, x, scales):
+    """A point near a guard taken to it, each state in proportion to its scale."""
+
+    def correct(_, x):
+        r, gradient = bound.surfaces(lane.mode, t, x)[k], bound.gradients(lane.mode, t, x)[k, 1:]
+        near = jnp.abs(r) <= bound.noise(lane.mode, t, x, jnp.zeros_like(x))[k]
+        weights = gradient * scales * scales
+        across = gradient @ weights
+        return jnp.where(near | ~(across > 0), x, x - r / jnp.where(across > 0, across, 1.0) * weights)
+
+    return lax.fori_loop(0, CORRECTIONS, correct, x)
+
+
+def limit_of(model, p, lane, k, end, left, wanted):
+    """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
+    bound, whole = Bound(model, frozen(p), lane.segment), Bound(model, p, lane.segment)
+    contact = model.of(model.contact, lane.mode)[k]
+    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, frozen(lane.t), x), lane.x, wanted)
+    still, t = frozen(q), frozen(lane.t)
+    moved = still + left * bound.flow(jnp.maximum(contact, 0), t, still)
+    moved = onto_guard(bound, lane, k, end, moved, scales_here(model, frozen(lane)))
+    q = jnp.where(contact >= 0, keeping(moved, q), q)
+    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, end, x), q, wanted)
+
+
+def close_tail(model, config, p, lane, record, mask):
+    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
+    bound, still = Bound(model, frozen(p), lane.segment), frozen(lane)
+    shrinks, flight, ratio = contraction(still)
+    edge = jnp.maximum(still.loops[-1], 0)
+    k = jnp.argmax((model.of(model.edge, lane.mode) == edge) & model.of(model.is_edge, lane.mode))
+    left = flight * ratio / (1 - jnp.where(ratio < 1, ratio, 0.0))
+    end = still.t + left
+    near = mask & shrinks & model.of(model.loops, lane.mode)[k] & (left <= config.relaxation) & (end <= bound.end)
+    q = limit_of(model, p, lane, k, end, left, near)
+    limit = frozen(q)
+    r, noise = bound.surfaces(lane.mode, end, limit), bound.noise(lane.mode, end, limit, still.scale)
+    first = bound.surfaces(lane.mode, still.t, still.x)
+    before = bound.noise(lane.mode, still.t, still.x, jnp.where(still.active[:, None], still.scale, 0.0))
+    others = (r > noise) & ~(first > before) & (jnp.arange(model.M) != k)
+    near = near & (jnp.abs(r[k]) <= noise[k]) & keeps(model, bound, still, k, end, limit)
+    none = near & (model.of(model.contact, lane.mode)[k] < 0)
+    pressed = when(near, lambda: presses(model, bound, still, k, end, limit), jnp.asarray(False))
+    goes = near & ~none & pressed & ~others.any()
+    record = sampled(
+        record, config, goes, lane.mode, lane.t, end,
+        lambda times: jax.vmap(lambda time: at(lane.x, (q - lane.x)[None], (time - lane.t) / left))(times),
+    )  # fmt: skip
+    lane = stopped(lane, none, ZENO)
+    active = (jnp.abs(r) <= noise) | (jnp.arange(model.M) == k)
+    rest = noticed(model, lane, limit)._replace(
+        t=keeping(end, lane.t), x=q, active=active, emerging=jnp.zeros_like(lane.emerging), entered_t=end,
+        entered_x=limit,
+    )  # fmt: skip
+    return chosen(goes, rest, lane), record
