@@ -289,6 +289,10 @@ class TestInABrowser:
         typed(driver, "initial.x", 2.0)
         assert driver.find_element("id", "verdict-title").text.endswith("not of these")
 
+    def test_sliding_is_named(self, driver, tmp_path):
+        opened(driver, exported(hsdsl.loads(SLIDING.replace(", completion: auto", "")), tmp_path))
+        assert "zeno: sliding at t = 1: the flows of" in driver.find_element("id", "outcome").text
+
     def test_texts_of_a_model_stay_texts(self, driver, tmp_path):
         model = hsdsl.loads(ESCAPING)
         opened(driver, exported(model, tmp_path))

@@ -40,7 +40,7 @@ function stopped(run) {
     "left": `left_domain: ${ends} leaves it`,
     "stuck": stuck[model.failures[failure]] ?? stuck.other,
     "interrupted": `interrupted at ${time(t)}: a run in a page may take 10 s and 256 MB`,
-    "accumulated": `zeno: transitions accumulate at ${time(t)}, and no motion along its guard goes on there`,
+    "accumulated": `zeno: ${run.notes.length ? noted(run.notes[run.notes.length - 1]) : time(t)}`,
   };
   return sentences[model.reasons[reason]];
 }
@@ -51,7 +51,7 @@ function noted({kind, mode, surface, number, time: t, other}) {
     "crowded": `more than 16 transitions within the relaxation, from ${time(t)} on in strips`,
     "in contact": `${number ? "at rest on" : "motion along"} the guard of ${edge} from ${time(t)} to ${time(other)}`,
     "replaced": `Zeno at ${time(t)}: the transitions of ${edge} after number ${number} are replaced by their limit`,
-    "accumulates": `the transitions of ${edge} accumulate at ${time(t)}`,
+    "accumulates": `the transitions of ${edge} accumulate at ${time(t)}, and no motion along its guard goes on there`,
     "unsettled": `surface ${surface} of mode ${modeOf(mode)} would not settle on a polynomial at ${time(t)}`,
     "slides": `sliding at ${time(t)}: the flows of ${modeOf(mode)} and ${modeOf(number)} lead into each other`,
   }[model.notices[kind]];
