@@ -54,17 +54,10 @@ class ConeShape:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     @cached_property
-    def _factors(self) -> tuple[Array, Array, Array]:
-        """Its singular vectors and values."""
-        left, values, right = np.linalg.svd(self.stacked, full_matrices=False)
-        return left, values, right
-
-    @cached_property
     def back(self) -> Array:
         """Its pseudo-inverse."""
-        left, values, right = self._factors
-        kept = values > max(self.stacked.shape) * 2 * UNIT * values.max(initial=0.0)
-        return (right[kept].T / values[kept]) @ left[:, kept].T
+        found: Any = np.linalg.pinv(self.stacked, rcond=max(self.stacked.shape) * 2 * UNIT)
+        return found
 
     @cached_property
     def spread(self) -> float:
@@ -81,7 +74,7 @@ class ConeShape:
         """How much the legs together change at least; 0 where rounding leaves that open."""
         if self.size == 0:
             return 0.0
-        values = self._factors[1]
+        values = np.linalg.svd(self.stacked, compute_uv=False)
         least = float(values[-1]) if len(values) == self.size else 0.0
         return max(0.0, least - self.operations * UNIT * float(np.linalg.norm(self.stacked)))
 
@@ -108,9 +101,9 @@ class GateSequence:
         for passage, first, row in zip(self.passages, firsts, rows, strict=False):
             gate = passage.gate
             self.normals[row : row + len(gate.levels), first : first + gate.size] = gate.normals
-            for sides, (base, frame) in ((self.enters, passage.enter), (self.leaves, passage.leave)):
-                wide = np.zeros((len(base), 1 + firsts[-1]))
-                wide[:, 0], wide[:, 1 + first : 1 + first + gate.size] = base, frame
+            for sides, side in ((self.enters, passage.enter), (self.leaves, passage.leave)):
+                wide = np.zeros((len(side), 1 + firsts[-1]))
+                wide[:, 0], wide[:, 1 + first : 1 + first + gate.size] = side[:, 0], side[:, 1:]
                 sides.append(wide)
         self.shapes: dict[tuple[bool, bool, bool], ConeShape] = {}
 

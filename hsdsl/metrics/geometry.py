@@ -65,22 +65,18 @@ def _or_infinite(value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Gate:
-    """A convex piece of a guard, ``base + frame s`` with unit ``normals s <= levels``, and its image.
+    """A convex piece of a guard, and its image: two maps of s (base, then frame), with unit ``normals s <= levels``.
 
-    The image is ``image_base + image_frame s``. ``frame`` has orthonormal columns, so lengths on the guard are lengths
-    of s. Every number is that of ``exact``, rounded once. ``inner`` is a point s at which every inequality holds with
-    some ``room``. ``across`` are unit vectors and levels, for the guard and for its image: ``vectors @ x = levels``
-    there. ``curved`` are conditions on the guard's points that are not affine; with any, the piece contains the guard
-    and may be larger.
+    The guard's frame has orthonormal columns, so lengths on the guard are lengths of s. Every number is that of
+    ``exact``, rounded once. ``inner`` is a point s at which every inequality holds with some ``room``. ``across`` are
+    unit vectors and levels, for the guard and for its image: ``vectors @ x = levels`` there. ``curved`` are conditions
+    on the guard's points that are not affine; with any, the piece contains the guard and may be larger.
     """
 
     edge: str
     source: int
     target: int
-    base: Array
-    frame: Array
-    image_base: Array
-    image_frame: Array
+    sides: tuple[Array, Array]
     normals: Array
     levels: Array
     inner: Array
@@ -92,7 +88,7 @@ class Gate:
     @property
     def size(self) -> int:
         """Dimension of the guard."""
-        return self.frame.shape[1]
+        return self.sides[0].shape[1] - 1
 
     @cached_property
     def plane(self) -> Gate:
@@ -141,8 +137,8 @@ class CurvedGate:
 class Passage:
     """A gate passed in one direction, from a source mode into a target.
 
-    ``enter`` and ``leave`` are base and frame, affine in s, of the sides where it is entered and left. ``across`` are
-    unit vectors and levels of the planes that hold the two sides, and ``exact`` both sides in rational numbers.
+    ``enter`` and ``leave`` are the sides where it is entered and left, as maps of s. ``across`` are unit vectors and
+    levels of the planes that hold the two sides, and ``exact`` both sides in rational numbers.
     """
 
     index: int
@@ -150,18 +146,18 @@ class Passage:
     forward: bool
     source: int
     target: int
-    enter: tuple[Array, Array]
-    leave: tuple[Array, Array]
+    enter: Array
+    leave: Array
     across: tuple[tuple[Array, Array], tuple[Array, Array]]
     exact: tuple[Exact, Exact]
 
     @classmethod
     def through(cls, gate: Gate, index: int) -> Passage:
         """Forwards for even indices, else backwards."""
-        guard = gate.source, (gate.base, gate.frame), gate.across[0], gate.exact.sides[0]
-        image = gate.target, (gate.image_base, gate.image_frame), gate.across[1], gate.exact.sides[1]
-        a, b = (image, guard) if index % 2 else (guard, image)
-        return cls(index, gate, index % 2 == 0, a[0], b[0], a[1], b[1], (a[2], b[2]), (a[3], b[3]))
+        a, b = (1, 0) if index % 2 else (0, 1)
+        modes, sides, across, exact = (gate.source, gate.target), gate.sides, gate.across, gate.exact.sides
+        pairs = (across[a], across[b]), (exact[a], exact[b])
+        return cls(index, gate, index % 2 == 0, modes[a], modes[b], sides[a], sides[b], *pairs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -169,9 +169,9 @@ def to_exit(passage: Passage, points: Array) -> Array:
     return _to_side(passage, passage.leave, passage.across[1], points)
 
 
-def _to_side(passage: Passage, side: tuple[Array, Array], across: tuple[Array, Array], points: Array) -> Array:
+def _to_side(passage: Passage, side: Array, across: tuple[Array, Array], points: Array) -> Array:
     """Less than rounding from exact on guards of at most one dimension, else to the whole plane."""
-    base, frame = side
+    base, frame = side[:, 0], side[:, 1:]
     gate = passage.gate
     if gate.size > 1:
         vectors, levels = across

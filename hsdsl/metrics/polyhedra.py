@@ -60,11 +60,9 @@ def _rounded(edge: str, modes: tuple[int, int], exact: ExactGate, curved: tuple[
     inner = exact.inner.astype(float)
     depths = -exact.rows[:, 0] - exact.rows[:, 1:] @ np.array([Fraction(v) for v in inner.tolist()], dtype=object)
     room = np.array([float(depth / about(row[1:])) for depth, row in zip(depths, exact.rows, strict=True)])
-    (base, frame), (image, image_frame) = (
-        (side[:, 0].astype(float), side[:, 1:].astype(float)) for side in exact.sides
-    )
-    across = _across(exact.sides[0]), _across(exact.sides[1])
-    return Gate(edge, *modes, base, frame, image, image_frame, normals, levels, inner, room, across, exact, curved)
+    guard, image = exact.sides
+    sides, across = (guard.astype(float), image.astype(float)), (_across(guard), _across(image))
+    return Gate(edge, *modes, sides, normals, levels, inner, room, across, exact, curved)
 
 
 def unit_rows(rows: Iterable[Exact]) -> tuple[Array, Array]:

@@ -75,11 +75,12 @@ def bend(space: Space, mode: int) -> Crossing:
 
 def _as_formulas(gate: Gate) -> tuple[Formula, Formula, Formula]:
     """Surface, conditions and reset of an affine guard, in the coordinates of its mode."""
-    normal = np.linalg.svd(gate.frame.T)[2][-1:] if gate.size else np.ones((1, len(gate.base)))
-    along, image = gate.normals @ gate.frame.T, gate.image_frame @ gate.frame.T
-    conditions = affine(along, -along @ gate.base - gate.levels)
-    reset = affine(image, gate.image_base - image @ gate.base)
-    return affine(normal, -normal @ gate.base), stacked([conditions, *gate.curved]), reset
+    (base, frame), (image_base, image_frame) = ((side[:, 0], side[:, 1:]) for side in gate.sides)
+    normal = np.linalg.svd(frame.T)[2][-1:] if gate.size else np.ones((1, len(base)))
+    along, image = gate.normals @ frame.T, image_frame @ frame.T
+    conditions = affine(along, -along @ base - gate.levels)
+    reset = affine(image, image_base - image @ base)
+    return affine(normal, -normal @ base), stacked([conditions, *gate.curved]), reset
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,9 +74,9 @@ def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> N
     axis.contourf(x, y, _beyond(domain, x, y), levels=[-np.inf, 0], colors=["#eef4fa"])
     for gate in space.gates:
         if gate.source == mode:
-            _line(axis, gate, gate.base, gate.frame, extent, own, "-", f"guard of {gate.edge}")
+            _line(axis, gate, gate.sides[0], extent, own, "-", f"guard of {gate.edge}")
         if gate.target == mode:
-            _line(axis, gate, gate.image_base, gate.image_frame, extent, own, ":", f"image of {gate.edge}")
+            _line(axis, gate, gate.sides[1], extent, own, ":", f"image of {gate.edge}")
     for gate in space.curved_gates:
         if gate.source == mode:
             _curve(axis, x, y, gate.surface, gate.conditions)
@@ -105,8 +105,9 @@ def _beyond(domain: Domain, x: Array, y: Array) -> Array:
     return np.nan_to_num(worst, nan=1.0).reshape(len(y), len(x))
 
 
-def _line(axis: Any, gate: Gate, base: Array, frame: Array, extent: float, own: Array, style: str, label: str) -> None:
+def _line(axis: Any, gate: Gate, side: Array, extent: float, own: Array, style: str, label: str) -> None:
     """A guard or image: a segment, cut off some way outside the panel."""
+    base, frame = side[:, 0], side[:, 1:]
     if not np.any(frame):
         axis.plot(*base, marker="s", color=FAINT, label=label, linestyle="none")
         return
