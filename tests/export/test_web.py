@@ -207,6 +207,13 @@ class TestInABrowser:
         opened(driver, exported(model, tmp_path))
         check(driver, model.simulate())
 
+    def test_every_digit_is_equal_where_no_function_of_a_library_is_called(self, driver, tmp_path):
+        arguments = {"scheme": "relaxed", "method": "rk4", "step": 1e-2, "relaxation": 1e-4}
+        model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+        opened(driver, exported(model, tmp_path, **arguments))
+        typed(driver, "e", 0.6)
+        check(driver, model.simulate(**arguments, parameters={"e": 0.6}), exactly=0)
+
     def test_a_model_without_states_is_a_page(self, driver, tmp_path):
         model = hsdsl.loads(STATELESS)
         opened(driver, exported(model, tmp_path))
