@@ -70,8 +70,9 @@ def _columns(given: Any) -> tuple[str, dict[str, Sequence[Any]]]:
     if isinstance(given, (str, Path)):
         return str(given), _read(Path(given))
     if hasattr(given, "columns") or isinstance(given, Mapping):
-        names = cast("Sequence[Any]", getattr(given, "columns", given))  # pyright: ignore[reportUnknownArgumentType]
-        return "data", {str(name): list(given[name]) for name in names}
+        table = cast(Any, given)
+        names: Sequence[Any] = getattr(table, "columns", table)
+        return "data", {str(name): list(table[name]) for name in names}
     raise UsageError(f"data: expected a CSV file, a mapping or a DataFrame, got {type(given).__name__}")
 
 

@@ -94,8 +94,10 @@ class Differentiator:
         if key not in self._augmented:
             from hsdsl.sensitivity.augment import augmented, preferring
 
-            system = preferring(augmented(ready.change, ready.by, ready.entries), ready.firsts)
-            self._augmented[key] = Pipeline(system)
+            self._augmented[key] = self.pipeline.derived(
+                ("derivatives", *(t.label for t in ready.by), str(ready.entries), *ready.firsts, repr(key[-1])),
+                lambda: preferring(augmented(ready.change, ready.by, ready.entries), ready.firsts),
+            )
         settings, arithmetic = ready.setting.plain.settings, ready.setting.plain.arithmetic
         tolerance = settings.tolerance
         assert settings.method is not None and tolerance is not None

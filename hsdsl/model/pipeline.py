@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -214,6 +214,15 @@ class Pipeline:
         for names in self._part:
             system = only(system, names)
         return Pipeline(system)
+
+    def derived(self, name: tuple[str, ...], make: Callable[[], HybridSystem]) -> Pipeline:
+        """The pipeline of a system made of this one, whose program is kept under a name of its own."""
+        part = (*self._part, name)
+        cached = None if self._files is None else program_cache.find(self._files, part)
+        if cached is not None:
+            program, files = cached
+            return Pipeline(None, 0.0, files, program, part)
+        return Pipeline(make(), 0.0, self._files, part=part)
 
     def only(self, names: tuple[str, ...]) -> Pipeline:
         """The pipeline of these states and outputs with what they need; this one where that is the whole model."""

@@ -35,7 +35,13 @@ class Overridden:
         """What derivatives depend on besides the file."""
         derived = {p.name for p in self.system.parameters if p.value.free_symbols}
         values = tuple(p.value for p in self.system.parameters)
-        return self.fixed & derived, self.placed, values, self.system.initial, self.system.experiment
+        return (
+            tuple(sorted(self.fixed & derived)),
+            tuple(sorted(self.placed)),
+            values,
+            self.system.initial,
+            self.system.experiment,
+        )
 
 
 def is_expression(value: Any) -> bool:

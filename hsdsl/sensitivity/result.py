@@ -12,6 +12,7 @@ import numpy as np
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
 from hsdsl.sensitivity.ties import Tie, ties
+from hsdsl.sensitivity.touching import touched
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.run_view import RunView
@@ -135,10 +136,17 @@ class Sensitivity:
             found.append((stop.time, f"the run ends there ({stop.reason}): {stop.message}"))
         return tuple(sorted(found, key=lambda found: found[0]))
 
+    @cached_property
+    def touches(self) -> tuple[str, ...]:
+        """Guards that the run touches within its error, without a transition: no derivative exists from there on."""
+        return tuple(reason for _, reason in touched(RunView(self.setting.plain, self.run)))
+
     @property
     def exists(self) -> bool | None:
-        """Whether the derivatives exist; None where the run's verdict is ``unknown``."""
+        """Whether the derivatives exist; None where that is not known, as the run's verdict is ``unknown``."""
         if self.breaks or self.verdict.theorem == "left":
+            return False
+        if self.verdict.theorem == "unknown" and self.touches:
             return False
         return True if self.verdict.theorem == "holds" else None
 
@@ -146,7 +154,7 @@ class Sensitivity:
     def reasons(self) -> tuple[str, ...]:
         """Why they do not exist, or are not known to."""
         own = tuple(reason for _, reason in self.breaks)
-        return own if self.verdict.theorem == "holds" else (*own, *self.verdict.reasons)
+        return own if self.verdict.theorem == "holds" else (*own, *self.touches, *self.verdict.reasons)
 
     def _exists_at(self, index: int) -> bool:
         """Whether the derivatives of a transition exist."""

@@ -211,7 +211,7 @@ experiment: {until: 3}
 
 
 @pytest.mark.parametrize(
-    ("level", "exists"), [("1", None), ("1 - 1e-12", False), ("1 - 1e-6", True), ("1 + 1e-6", True)]
+    ("level", "exists"), [("1", False), ("1 - 1e-12", False), ("1 - 1e-6", True), ("1 + 1e-6", True)]
 )
 def test_grazing(level: str, exists: bool | None) -> None:
     found = hsdsl.loads(GRAZING).sensitivity("s,initial.v", parameters={"s": level})
