@@ -11,3 +11,17 @@ packages=(
 )
 apt-get update
 apt-get install --yes --no-install-recommends "${packages[@]}"
+
+# The Modelica Association's own ball, beside which tests of --to fmi2 and --to fmi3 simulate ours.
+reference=${HSDSL_REFERENCE_FMUS:-/opt/reference-fmus}
+if [ ! -d "$reference" ]; then
+  apt-get install --yes --no-install-recommends git gcc libc6-dev make
+  sources=$(mktemp -d)
+  git clone --quiet --depth 1 https://github.com/modelica/Reference-FMUs "$sources"
+  for version in 2 3; do
+    cmake -S "$sources" -B "$sources/build$version" -DFMI_VERSION=$version
+    cmake --build "$sources/build$version" --target BouncingBall
+    install -D "$sources/build$version/fmus/BouncingBall.fmu" "$reference/BouncingBall$version.fmu"
+  done
+  rm -rf "$sources"
+fi

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from export.c_builds import COMPILERS, built, exported, output
 
 import hsdsl
 from hsdsl.cli.verbs import obey
+from hsdsl.export import files_of, source_of
 from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
 from hsdsl.export.c.sources import COMPILED
 from hsdsl.report import as_json
@@ -125,6 +127,27 @@ def test_every_model_in_single_precision(name: str, compiler: str, tmp_path: Pat
     ]
     assert [edge for edge, _ in both[0]] == [edge for edge, _ in both[1]]
     assert max(abs(a - b) for (_, a), (_, b) in zip(*both, strict=True)) <= allowed
+
+
+def test_numbers_of_a_program_are_as_they_were() -> None:
+    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
+    files = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "c")
+    names = ("problem.h", "model.c", "problem.c")
+    found = "".join(f"/* {name} */\n" + files[name].decode().partition("*/\n")[2] for name in names)
+    golden = Path(__file__).parent / "golden" / "thermostat.c.txt"
+    if os.environ.get("HSDSL_WRITE_GOLDEN"):
+        golden.write_text(found)
+    assert found == golden.read_text()
+
+
+def test_nothing_is_allocated(tmp_path: Path) -> None:
+    compiler = next(iter(COMPILERS.values()))
+    folder = exported(hsdsl.load(MODELS / "thermostat.yaml"), tmp_path)
+    for number, name in enumerate(COMPILED):
+        object_file = tmp_path / f"{number}.o"
+        command = [*compiler, "-std=c99", "-O1", f"-I{folder}", f"-I{folder / 'runtime'}"]
+        subprocess.run([*command, "-c", "-o", str(object_file), str(folder / name)], check=True)
+        assert not any(word in object_file.read_bytes() for word in (b"malloc", b"calloc", b"alloca", b"free\0"))
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import subprocess
 from collections.abc import Iterator
@@ -135,6 +136,28 @@ def test_ball_with_event_mode_makes_the_same_transitions(made: Any) -> None:
     assert jumps(result, ["v"]) == pytest.approx([made.time for made in run.transitions], abs=1e-12)
 
 
+REFERENCE = Path(os.environ.get("HSDSL_REFERENCE_FMUS", "/opt/reference-fmus"))
+
+
+@pytest.mark.tools
+@pytest.mark.skipif(not REFERENCE.is_dir(), reason="no Reference-FMUs here: tests/export/install-tools.sh")
+@pytest.mark.parametrize("version", VERSIONS)
+def test_ball_agrees_with_that_of_the_reference_units(version: int, made: Any) -> None:
+    """Theirs comes to rest below 0.1 m/s, and integrates by Euler's method with 1e-3 in co-simulation."""
+    paths = str(REFERENCE / f"BouncingBall{version}.fmu"), made(BALL, version)
+    solver = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-10, "stop_time": 2.4, "output_interval": 0.01}
+    theirs, ours = (fmpy.simulate_fmu(path, **solver) for path in paths)
+    times = [jumps(result, ["v"]) for result in (theirs, ours)]
+    assert len(times[0]) == len(times[1]) == 8
+    assert times[1] == pytest.approx(times[0], abs=1e-6)
+    theirs, ours = (theirs[np.diff(theirs["time"], append=np.inf) > 0], ours[np.diff(ours["time"], append=np.inf) > 0])
+    at = np.linspace(0, 2.4, 49)
+    assert np.interp(at, ours["time"], ours["h"]) == pytest.approx(np.interp(at, theirs["time"], theirs["h"]), abs=1e-4)
+    steps = {"fmi_type": "CoSimulation", "stop_time": 2.4, "output_interval": 0.1}
+    theirs, ours = (fmpy.simulate_fmu(path, **steps) for path in paths)
+    assert np.abs(ours["h"] - theirs["h"]).max() < 0.05
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_ball_comes_to_rest_and_stays(version: int, made: Any) -> None:
     result = fmpy.simulate_fmu(made(BALL, version), fmi_type="ModelExchange", relative_tolerance=1e-10, stop_time=4)
@@ -143,6 +166,60 @@ def test_ball_comes_to_rest_and_stays(version: int, made: Any) -> None:
     assert np.all(np.abs(late["h"]) < 1e-8)
     result = fmpy.simulate_fmu(made(BALL, version), fmi_type="CoSimulation", output_interval=0.1, stop_time=4)
     assert np.all(result[result["time"] > 2.6]["v"] == 0)
+
+
+ROLLING = BALL.replace("v: -g}", "v: -g, x: w, w: -w}").replace("v: 0}", "v: 0, x: 0, w: 1}").replace("2.4", "5")
+RIDGE = """
+hsdsl: 1
+modes:
+  on:
+    flow: {x: v, v: 1 - t}
+    transitions: [{name: stop, when: x >= 0, to: on, reset: {v: -v/2}}]
+initial: {mode: on, x: 0, v: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [ROLLING, RIDGE], ids=["rolling", "released"])
+@pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
+def test_what_a_guard_holds_moves_along_it_until_it_is_released(text: str, kind: str, made: Any) -> None:
+    run = loaded(text).simulate()
+    until = run.final.time
+    solver = {"relative_tolerance": 1e-10} if kind == "ModelExchange" else {"output_interval": 0.1}
+    result = fmpy.simulate_fmu(made(text, 3), fmi_type=kind, stop_time=until, **solver)
+    for state, value in run.final.state.items():
+        assert result[state][-1] == pytest.approx(value, abs=1e-5)
+
+
+@pytest.mark.parametrize("start", [(1e-9, 1e-4), (0.0, 0.0), (0.0, 3.0)])
+@pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
+def test_nothing_falls_through_a_guard(start: tuple[float, float], kind: str, made: Any) -> None:
+    values = dict(zip(("h", "v"), start, strict=True))
+    result = fmpy.simulate_fmu(made(BALL, 3), fmi_type=kind, start_values=values, stop_time=2, output_interval=0.05)
+    assert result["h"].min() > -1e-6
+
+
+def test_time_may_begin_anywhere(made: Any) -> None:
+    for kind in ("ModelExchange", "CoSimulation"):
+        result = fmpy.simulate_fmu(
+            made(BALL, 3), fmi_type=kind, start_time=5, stop_time=7.4, output_interval=0.1, relative_tolerance=1e-10
+        )
+        assert result["h"][-1] == pytest.approx(loaded(BALL).simulate().final.state["h"], abs=1e-6)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_descriptions_are_as_they_were(version: int) -> None:
+    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
+    unit = unit_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}))
+    module = __import__(f"hsdsl.export.fmi{version}", fromlist=["description"])
+    text = re.sub(
+        r' (?:guid|instantiationToken|description|generationTool)="[^"]*"', "", module.description(unit), count=3
+    )
+    golden = Path(__file__).parent / "golden" / f"thermostat.fmi{version}.xml"
+    if os.environ.get("HSDSL_WRITE_GOLDEN"):
+        golden.write_text(text)
+    assert text == golden.read_text()
 
 
 # how far times may be off in model exchange, where the solver's error decides them; of a stiff model more
