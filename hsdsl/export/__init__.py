@@ -26,6 +26,7 @@ TARGETS = {
     "fmi3": "a functional mock-up unit of FMI 3.0, for model exchange and co-simulation",
     "jax": "a module for JAX, whose simulators vectorise and differentiate",
     "latex": "the model as mathematics, a LaTeX document",
+    "matlab": "functions and a driver for MATLAB and GNU Octave",
     "mermaid": "the mode graph as a Mermaid diagram",
     "rust": "a crate for Rust without its standard library",
     "web": "one HTML page that runs the model in a browser",

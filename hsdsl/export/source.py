@@ -14,6 +14,8 @@ from hsdsl.names import visible
 from hsdsl.simulate import Problem
 from hsdsl.system import HybridSystem
 
+LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
+
 
 @dataclass(frozen=True)
 class Source:
@@ -31,7 +33,7 @@ class Source:
     @property
     def name(self) -> str:
         """The model's file name as an ASCII identifier, such as ``bouncing_ball``."""
-        return ascii_name(Path(self.system.path).stem)
+        return ascii_name(Path(self.system.path).stem)[:LONGEST]
 
     @property
     def heading(self) -> tuple[str, ...]:

@@ -1,0 +1,122 @@
+"""A model for MATLAB and GNU Octave: flow set and map, jump set and map, and a driver that needs no toolbox."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from hsdsl.errors import UsageError
+from hsdsl.export.c.tuning import derived, structural
+from hsdsl.export.matlab.language import body, helpers, literal
+from hsdsl.export.matlab.method import driven_by
+from hsdsl.export.matlab.model import ModelText, definitions, parameter_fields
+from hsdsl.export.matlab.text import comment, string
+from hsdsl.export.source import Source
+from hsdsl.names import visible
+
+PARTS = Path(__file__).parent / "parts"
+
+
+def files(source: Source) -> dict[str, bytes]:
+    """Functions, each in a file of its name.
+
+    Raises UsageError: the driver has no such scheme.
+    """
+    settings = source.problem.settings
+    if settings.method is None:
+        raise UsageError(f"the driver for MATLAB has no scheme {settings.scheme}", "choose --scheme located or relaxed")
+    name = source.name
+    texts = {
+        f"{name}_model.m": ModelText(source).text(),
+        f"{name}_parameters.m": _parameters(source),
+        f"{name}_initial.m": _initial(source),
+        f"{name}_run.m": _part("run.m", source),
+        **{f"{name}_{part}.m": _part(f"{part}.m", source) for part in ("f", "C", "g", "D")},
+        "hsdsl_simulate.m": (PARTS / "hsdsl_simulate.m").read_text(encoding="utf-8"),
+        "README.md": _part("README.md", source),
+    }
+    return {path: text.encode() for path, text in texts.items()}
+
+
+def _part(path: str, source: Source) -> str:
+    """A file that is the same for every model but for names; no text of the model is markup in it."""
+    text = (PARTS / path).read_text(encoding="utf-8")
+    settings = source.problem.settings
+    assert settings.method is not None
+    method = driven_by(settings.method).name
+    instead = "" if method == settings.method.name else f" in place of {settings.method.name}"
+    heading = comment(source.heading) if path.endswith(".m") else "".join(f"    {line}\n" for line in source.heading)
+    for key, value in {"NAME": source.name, "HEADING\n": heading, "METHOD": method + instead}.items():
+        text = text.replace(f"@{key}", value) if key != "HEADING\n" else text.replace("@HEADING\n", value)
+    return text
+
+
+def _parameters(source: Source) -> str:
+    """The function of the parameters; one that others decide follows them unless it is given."""
+    problem = source.problem
+    program, own, fixed = problem.program, derived(problem), structural(problem)
+    fields = parameter_fields(program)
+    bodies = definitions(program.constants)
+    names = {f"given[{i}]": f"p.{field}" for i, field in enumerate(fields.values())}
+    about = {p.name: p for p in source.system.parameters}
+    lines: list[str] = []
+    functions: list[str] = []
+    for i, (name, field) in enumerate(fields.items()):
+        value = literal(problem.timeline.segments[0].data[i])
+        if name in own:
+            text = _given(bodies[f"parameter_{i}"], names, f"derived_{field}")
+            functions.append(text)
+            value = f"derived_{field}(p)"
+        notes = [visible(part) for part in (about[name].unit, about[name].about) if part]
+        notes += ["inputs keep the times that it had here"] if name in fixed else []
+        note = f"  % {', '.join(notes)}" if notes else ""
+        lines.append(f"  p.{field} = given(chosen, {string(field)}, {value});{note}\n")
+    head = (
+        f"function p = {source.name}_parameters(varargin)\n"
+        + comment([f"p = {source.name}_parameters('name', value, ...)  Parameters, some of them changed."])
+        + comment(source.heading)
+        + "  chosen = struct(varargin{:});\n  p = struct();\n"
+    )
+    known = "  unknown = setdiff(fieldnames(chosen), fieldnames(p));\n  if ~isempty(unknown)\n"
+    known += "    error('hsdsl:parameter', 'there is no parameter %s', unknown{1});\n  end\n"
+    given = "\nfunction value = given(chosen, name, value)\n  if isfield(chosen, name)\n"
+    given += "    value = chosen.(name);\n  end\nend\n"
+    rest = "".join(f"\n{text}" for text in functions)
+    return head + "".join(lines) + known + "end\n" + given + rest + _called(rest)
+
+
+def _initial(source: Source) -> str:
+    """The function of the initial state: the mode's number, and the states."""
+    problem = source.problem
+    program, overrides = problem.program, problem.settings.overrides
+    names = {f"given[{i}]": f"p.{field}" for i, field in enumerate(parameter_fields(program).values())}
+    inner = _given(definitions(program.constants)["initial"], names, "given_values")
+    lines = [f"function x0 = {source.name}_initial(p)\n"]
+    lines.append(comment([f"x0 = {source.name}_initial(p)  Where a run starts: [mode; states].", *source.heading]))
+    lines.append("  values = given_values(p);\n" if program.initial_states else "")
+    width = max(len(mode.states) for mode in program.modes)
+    lines.append(f"  x0 = zeros({1 + max(width, len(problem.states))}, 1);\n  x0(1) = {problem.mode + 1};\n")
+    for i, (name, number) in enumerate(zip(problem.states, problem.x, strict=True)):
+        kept = f"initial.{name}" not in overrides and name in program.initial_states
+        value = f"values({program.initial_states.index(name) + 1})" if kept else literal(number)
+        lines.append(f"  x0({i + 2}) = {value};  % {visible(name)}\n")
+    text = "".join(lines) + "end\n" + (f"\n{inner}" if program.initial_states else "")
+    return text + _called(text)
+
+
+def _called(text: str) -> str:
+    calls = helpers(text)
+    return f"\n{calls}" if calls else ""
+
+
+def _given(definition: object, names: dict[str, str], name: str) -> str:
+    """A routine of parameters alone, which are its arguments ``given[i]``."""
+    assert isinstance(definition, ast.FunctionDef)
+
+    class Named(ast.NodeTransformer):
+        def visit_Subscript(self, node: ast.Subscript) -> ast.Name:
+            return ast.Name(f"p{ast.unparse(node.slice)}", ast.Load())
+
+    Named().visit(definition)
+    numbered = {f"p{key[6:-1]}": value for key, value in names.items()}
+    return f"function out = {name}(p)\n{body(definition, numbered)}\nend\n"

@@ -1,0 +1,21 @@
+function dx = @NAME_f(x, t, j, p)
+% dx = @NAME_f(x, t, j, p)  Flow map: the derivative of x = [mode; states].
+@HEADING
+  persistent m
+  if isempty(m)
+    m = @NAME_model();
+  end
+  if nargin < 2
+    t = 0;
+  end
+  if nargin < 4
+    p = @NAME_parameters();
+  end
+  q = x(1);
+  n = m.dim(q);
+  d = m.data(max(1, find(m.starts <= t, 1, 'last')), :);
+  dx = zeros(size(x));
+  if n > 0
+    dx(2:n + 1) = m.flow{q}(t, reshape(x(2:n + 1), [], 1), p, d);
+  end
+end
