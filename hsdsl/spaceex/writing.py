@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from hsdsl import __version__
 from hsdsl.names import visible
 from hsdsl.spaceex.drafts import ModeDraft, TransitionDraft
+from hsdsl.spaceex.formula import renamed, within
 from hsdsl.spaceex.product import Key
 from hsdsl.spaceex.start import Start
 
@@ -40,14 +41,18 @@ def written(
 
 
 def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapping[Key, ModeDraft]) -> list[str]:
-    place = draft.place
+    place, inner = draft.place, _substituted(draft, drafts)
     notes = [location.note for location in place.locations if location.note]
     lines = [*_comment(notes), f"{_plain(place.name)}:", *_indented(_comment(draft.comments))]
-    lines += _indented(_section("let", draft.lets))
-    flow = {name: place.flow[name].right for name in draft.states}
+    lines += _indented(_section("let", {name: text for name, text in draft.lets.items() if name not in inner}))
+    flow = {name: renamed(place.flow[name].right, inner) for name in draft.states}
     lines += _indented(_section("flow", flow)) if flow else ["  flow: {}"]
     covered = [t.facet.excess for t in transitions if t.facet and not t.condition]
-    walls = [facet.relation.text for facet in draft.facets if facet.excess not in covered and not draft.kept(facet)]
+    walls = [
+        facet.relation.renamed(inner).text
+        for facet in draft.facets
+        if facet.excess not in covered and not draft.kept(facet)
+    ]
     if walls:
         lines += _indented(["domain:", *_indented([f"- {_plain(wall)}" for wall in walls])])
     if transitions:
@@ -59,14 +64,29 @@ def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapp
 
 
 def _transition(t: TransitionDraft, drafts: Mapping[Key, ModeDraft], labels: Counter[str]) -> list[str]:
-    arrow = t.arrow
+    arrow, inner = t.arrow, _substituted(drafts[t.arrow.source], drafts)
     source, target = drafts[arrow.source], drafts[arrow.target]
     entries = {"name": arrow.label} if arrow.label and labels[arrow.label] == 1 else {}
-    entries |= {"when": t.when.text.replace("==", ">="), "if": " and ".join(t.condition), "to": target.place.name}
+    entries |= {
+        "when": t.when.renamed(inner).text,
+        "if": " and ".join(renamed(part, inner) for part in t.condition),
+        "to": target.place.name,
+    }
     reset = {name: relation.right for name, relation in arrow.reset.items() if name in target.states}
     reset |= {name: name for name in target.states if name not in reset and name in source.lets}
+    reset = {name: renamed(text, inner) for name, text in reset.items()}
     body = _entries({key: text for key, text in entries.items() if text}) + _section("reset", reset)
     return [*_comment([*arrow.notes, *t.comments]), f"- {body[0]}", *_indented(body[1:])]
+
+
+def _substituted(draft: ModeDraft, drafts: Mapping[Key, ModeDraft]) -> dict[str, str]:
+    """The texts that replace names which equations give here, and which are states of other modes."""
+    states = {name for other in drafts.values() for name in other.states}
+    inner: dict[str, str] = {}
+    for name, text in draft.lets.items():
+        if name in states:
+            inner[name] = within(renamed(text, inner))
+    return inner
 
 
 def _section(key: str, entries: Mapping[str, str]) -> list[str]:

@@ -402,9 +402,13 @@ function [w, here, event, done] = boundary(w, here)
   x = here.x;
   q = here.q;
   if t >= w.s.until
-    found = on_guard(w, here, t, x, 1e-12 * t);
+    found = setdiff(on_guard(w, here, t, x, 1e-12 * t), here.rest);
     if ~isempty(found)
       [unused, best] = max(w.m.edge_priority{q}(found));
+      if ~strcmp(w.s.scheme, 'relaxed')
+        event = struct('k', found(best), 't', t, 'x', x, 'depth', 0, 't1', t, 'sizes', sizes_along(here, x, x));
+        return
+      end
       w = record(w, q, found(best), t, NaN, x, [], false);
     end
     w = ended(w, 'until', sprintf('reached t = %.10g', t));
