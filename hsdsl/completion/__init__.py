@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.contact import Contact, contact, contacts
 from hsdsl.completion.sliding import Sliding, slidings, with_sliding
 
-__all__ = ["Contact", "Sliding", "contact", "slidings", "with_sliding"]
+__all__ = ["Contact", "Sliding", "contact", "contacts", "slidings", "with_sliding"]

@@ -22,6 +22,7 @@ from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, Mode, Surface
 
+MOST_TOGETHER = 3  # edges whose motions along several guards at once are derived
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
@@ -31,21 +32,55 @@ Point = dict[sp.Symbol, float]
 
 @dataclass(frozen=True)
 class Contact:
-    """Motion of a mode along the guard of its edge ``edge``.
+    """Motion of a mode along the guards of some of its edges, ``edges`` by their numbers.
 
-    ``mode`` is the mode with the constrained flow. The first of its edges are those of the mode itself, but the one
-    with number ``edge`` releases the state: its surface is the push with which the flow presses on the guard, negative.
-    Edges beyond the mode's own are where an `if` may end.
+    ``mode`` is the mode with the constrained flow. The first of its edges are those of the mode itself, but those in
+    contact release the state: their surfaces are the pushes with which the flow presses on the guards, negative. Edges
+    beyond the mode's own are where an `if` may end. What follows is of the last edge.
     ``push`` is the derivative of the guard along the flow that presses, of this ``order``: 1, or 2 where the first one,
     ``rate``, is zero on it. ``landing`` is the state that repeated resets take a state near the guard to.
     """
 
-    edge: int
+    edges: tuple[int, ...]
     order: int
     mode: Mode
     rate: sp.Expr
     push: sp.Expr
     landing: tuple[sp.Expr, ...]
+
+
+def contacts(mode: Mode) -> dict[frozenset[int], Contact]:
+    """The motions along guards of a mode, by the edges in contact.
+
+    Those along several guards are there for up to :data:`MOST_TOGETHER` such edges, where none changes what presses on
+    the others.
+    """
+    singles = {frozenset((k,)): found for k in range(len(mode.edges)) if (found := contact(mode, k)) is not None}
+    every = dict(singles)
+    for size in range(2, len(singles) + 1) if len(singles) <= MOST_TOGETHER else ():
+        for few in [few for few in every if len(few) == size - 1]:
+            for one in singles:
+                (k,) = one
+                if k > max(few) and all(_apart(singles[one], singles[frozenset((j,))], mode) for j in few):
+                    found = contact(every[few].mode, k)
+                    if found is not None:
+                        every[few | one] = replace(found, edges=(*every[few].edges, k))
+    return every
+
+
+def _apart(one: Contact, other: Contact, mode: Mode) -> bool:
+    """Whether resets of two edges change other states, and none that the guard of the other or its rate depend on."""
+    (j,), (k,) = one.edges, other.edges
+
+    def changed(k: int):
+        edge = mode.edges[k]
+        return {symbol(x) for x, r in zip(mode.states, edge.reset, strict=True) if r != symbol(x)}
+
+    def seen(found: Contact, k: int):
+        guard = mode.edges[k].surface.residual
+        return changed(k) | guard.free_symbols | (found.rate.free_symbols if found.order == 2 else set())
+
+    return not changed(j) & seen(other, k) and not changed(k) & seen(one, j)
 
 
 def contact(mode: Mode, k: int) -> Contact | None:
@@ -66,7 +101,7 @@ def contact(mode: Mode, k: int) -> Contact | None:
     edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *_ends_of_condition(release, edge.condition))
     held = replace(mode, flow=flow, flow_texts=tuple(map(text_of, flow)), edges=edges)
     rate = cancelled(along(edge.surface.residual, states, mode.flow))
-    return Contact(k, order, held, rate, push, landing)
+    return Contact((k,), order, held, rate, push, landing)
 
 
 def _constrained(states: list[sp.Symbol], mode: Mode, edge: Edge):

@@ -57,7 +57,8 @@ class _Writer:
 
     def add_contact(self, mode: Mode, found: Contact) -> None:
         """Add a motion along a guard, and the transition into it."""
-        edge = mode.edges[found.edge]
+        (k,) = found.edges
+        edge = mode.edges[k]
         label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
         name = self._free(re.sub(r"\W", "_", label))
         if found.order == 1:
@@ -69,8 +70,8 @@ class _Writer:
         entry = replace(edge, name=f"{mode.name}->{name}", target=name, condition=condition, reset=landing)
         self.add_transition(mode.name, _transition(replace(entry, priority=edge.priority + 1)))
         edges = list(found.mode.edges)
-        for k in (found.edge, *range(len(mode.edges), len(edges))):
-            edges[k] = replace(edges[k], name=f"{name}->{mode.name}")
+        for j in (k, *range(len(mode.edges), len(edges))):
+            edges[j] = replace(edges[j], name=f"{name}->{mode.name}")
         self.add_mode(replace(found.mode, edges=tuple(edges)), name)
 
     def _free(self, name: str) -> str:

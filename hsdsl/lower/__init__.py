@@ -13,7 +13,7 @@ import sympy as sp
 
 from hsdsl import limits
 from hsdsl import program as lowered
-from hsdsl.completion import Contact, contact
+from hsdsl.completion import contacts
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
@@ -87,22 +87,30 @@ def _lower(system: HybridSystem) -> lowered.Program:
 def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
     """The modes, and the motions along their guards."""
     modes: list[lowered.ModeProgram] = []
-    contacts: list[lowered.ModeProgram] = []
+    held: list[lowered.ModeProgram] = []
     for mode in system.modes:
-        program = LoweredMode(mode, names).program(indices)
-        edges = list(program.edges)
-        for k in range(len(edges)):
-            if (held := contact(mode, k)) is not None:
-                edges[k] = replace(edges[k], contact=len(system.modes) + len(contacts))
-                contacts.append(_contact(held, len(edges), LoweredMode(held.mode, names).program(indices)))
-        modes.append(replace(program, edges=tuple(edges)))
-    return tuple(modes), tuple(contacts)
+        found = contacts(mode)
+        numbers = {few: len(system.modes) + len(held) + i for i, few in enumerate(found)}
+        modes.append(_contact(frozenset(), 0, mode, names, indices, numbers))
+        held += [_contact(few, c.order, c.mode, names, indices, numbers, len(mode.edges)) for few, c in found.items()]
+    return tuple(modes), tuple(held)
 
 
-def _contact(held: Contact, edges: int, program: lowered.ModeProgram) -> lowered.ModeProgram:
-    """Mark the edges that release a motion along a guard: its own, and those beyond the mode's."""
-    marked = (replace(edge, releases=k == held.edge or k >= edges) for k, edge in enumerate(program.edges))
-    return replace(program, edges=tuple(marked), push_order=held.order)
+def _contact(
+    few: frozenset[int], order: int, mode: Mode, names: Names, indices: dict[str, int],
+    numbers: dict[frozenset[int], int], own: int | None = None,
+) -> lowered.ModeProgram:  # fmt: skip
+    """A mode, or a motion along the guards of a ``few`` of its edges; where each further contact leads, by number."""
+    program = LoweredMode(mode, names).program(indices)
+    edges = tuple(
+        replace(
+            edge,
+            contact=None if k in few else numbers.get(few | {k}),
+            releases=k in few or (own is not None and k >= own),
+        )
+        for k, edge in enumerate(program.edges)
+    )
+    return replace(program, edges=edges, push_order=order)
 
 
 def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:

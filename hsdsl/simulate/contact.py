@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
 from hsdsl.simulate.root_isolation import total
@@ -21,30 +22,34 @@ SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move 
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 
 
-def contact_at(run: Run, here: ModeState) -> ModeState | None:
-    """Return the place as one in contact with a guard; None where no guard holds the state."""
+def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
+    """Return the place as one in contact with every guard that holds the state; a stop where they hold it together."""
     if not here.surfaces.active or here.mode.states != here.arc.states:
-        return None
+        return here
+    held, edges = here, here.mode.edges
     for k in sorted(here.surfaces.active):
-        if k < len(here.mode.edges) and (held := presses(run, here, k)) is not None:
-            return held
-    return None
+        if k < len(edges) and presses(run, here, k):
+            contact = held.mode.edges[k].contact
+            if contact is None:
+                return run.diagnostics.accumulates(edges[k].name, here.t, here.t)
+            held = in_contact(run, held, k, contact)
+    return held
 
 
-def presses(run: Run, here: ModeState, k: int) -> ModeState | None:
-    """Return the place as one in contact with the guard of edge k, if its flow presses on it and its reset keeps it."""
-    edge = here.mode.edges[k]
-    if edge.contact is None or run.settings.completion == "none":
-        return None
+def presses(run: Run, here: ModeState, k: int) -> bool:
+    """Whether the flow presses on the guard of edge k, and its reset keeps the state there."""
+    contact = here.mode.edges[k].contact
+    if contact is None or run.settings.completion == "none":
+        return False
     try:
         if not keeps(run, here, k):
-            return None
-        held = in_contact(run, here, k, edge.contact)
+            return False
+        held = in_contact(run, here, k, contact)
         if not held.kernel.surfaces(here.t, *here.x)[k] < -held.surfaces.roundoff_bound(k, here.t, here.x):
-            return None
-        return held if held.mode.push_order == 1 or is_tangent(run, here, k) else None
+            return False
+        return held.mode.push_order == 1 or is_tangent(run, here, k)
     except DOMAIN_ERRORS:
-        return None
+        return False
 
 
 def keeps(run: Run, here: ModeState, k: int) -> bool:
@@ -74,27 +79,30 @@ def in_contact(run: Run, here: ModeState, k: int, contact: int) -> ModeState:
     return replace(here, flow=contact, mode=program, kernel=kernel, surfaces=surfaces)
 
 
-def after_contact(here: ModeState, held: ModeState, k: int, t: Number, x: State) -> ModeState:
-    """The place in the mode itself again, on the guard of edge k."""
+def after_contact(here: ModeState, held: ModeState, t: Number, x: State) -> ModeState:
+    """The place in the mode itself again, on the guards that it was in contact with."""
     edges, more = len(here.mode.edges), len(held.mode.edges) - len(here.mode.edges)
     here.surfaces.active.clear()
     here.surfaces.emerging.clear()
     here.surfaces.active.update({j if j < edges else j - more for j in held.surfaces.active if not releases(held, j)})
-    here.surfaces.active.add(k)
+    here.surfaces.active.update(in_touch(here, held))
     return here.moved(t, x)
 
 
-def condition_ends(
-    run: Run, here: ModeState, held: ModeState, k: int, t: Number, x: State
-) -> tuple[Number, State] | None:
-    """The first moment from t on, within the tie of times, at which the `if` of edge k does not hold; None for none."""
+def in_touch(here: ModeState, held: ModeState) -> list[int]:
+    """The edges of a mode that a place is in contact with."""
+    return [k for k in range(len(here.mode.edges)) if releases(held, k)]
+
+
+def condition_ends(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> tuple[Number, State] | None:
+    """The first moment from t on, within the tie of times, at which an `if` in contact does not hold; None for none."""
     later: tuple[Number, State] = (t, x)
     after = run.arithmetic.unit * run.settings.until
     try:
         slope = held.kernel.flow(t, *x)
         while after <= run.tie(t):
             later = t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
-            if not here.kernel.conditions[k](later[0], *later[1])[0]:
+            if not all(here.kernel.conditions[k](later[0], *later[1])[0] for k in in_touch(here, held)):
                 return later
             after = after * 2
     except DOMAIN_ERRORS:

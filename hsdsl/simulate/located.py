@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, releases
+from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, in_touch, releases
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
@@ -25,9 +25,8 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import close_tail, contraction
+from hsdsl.simulate.zeno import FREE, close_tail, contraction
 
-FREE = 16  # transitions within the relaxation that cost no time
 MOST_CORRECTIONS = 8
 
 
@@ -46,40 +45,43 @@ def located(run: Run, here: ModeState | Stop) -> Stop:
 
 def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     """Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go."""
-    held, limit = contact_at(run, here), here.segment.end
-    if held is None:
-        return follow(run, here, stepping(run, here), limit)
-    edge = next(k for k in here.surfaces.active if here.mode.edges[k].contact == held.flow)
-    outcome = along_guard(run, here, held, edge)
-    run.diagnostics.in_contact(here.mode.edges[edge].name, here.t, here.arc.times[-1], here.arc.values[-1] == here.x)
+    held = contact_at(run, here)
+    if isinstance(held, Stop):
+        return held
+    if held is here:
+        return follow(run, here, stepping(run, here), here.segment.end)
+    outcome = along_guards(run, here, held)
+    still = here.arc.values[-1] == here.x
+    for k in in_touch(here, held):
+        run.diagnostics.in_contact(here.mode.edges[k].name, here.t, here.arc.times[-1], still)
     return outcome
 
 
-def along_guard(run: Run, here: ModeState, held: ModeState, k: int) -> Event | ModeState | Stop:
-    """Flow along the guard of edge k until it lets go of the state."""
+def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeState | Stop:
+    """Flow along guards until one lets go of the state."""
     while True:
         outcome = follow(run, held, stepping(run, held), here.segment.end)
         if isinstance(outcome, ModeState):
-            return after_contact(here, held, k, outcome.t, outcome.x)
+            return after_contact(here, held, outcome.t, outcome.x)
         if isinstance(outcome, Stop):
             return outcome
-        crossing = outcome.crossing
+        crossing, edges = outcome.crossing, here.mode.edges
         if not releases(held, crossing.edge):
-            own = here.mode.edges[k].name
-            return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name != own))
+            ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if releases(held, k)}
+            return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name not in ends))
         t, x = crossing.time, crossing.state
-        let_go = (t, x) if crossing.edge == k else condition_ends(run, here, held, k, t, x)
+        let_go = (t, x) if crossing.edge < len(edges) else condition_ends(run, here, held, t, x)
         if let_go is not None:
-            return released(run, here, held, k, outcome, *let_go)
+            return released(run, here, held, outcome, *let_go)
         held.surfaces.active.add(crossing.edge)
         held = held.moved(t, x)
 
 
-def released(run: Run, here: ModeState, held: ModeState, k: int, event: Event, t: Number, x: State) -> ModeState:
-    """Go on in the mode itself from a point that the guard of edge k no longer holds."""
+def released(run: Run, here: ModeState, held: ModeState, event: Event, t: Number, x: State) -> ModeState:
+    """Go on in the mode itself from a point that a guard no longer holds."""
     if t > event.crossing.time:
         here.arc.append(t, x, (tuple(b - a for a, b in zip(event.crossing.state, x, strict=True)),))
-    active = after_contact(here, held, k, t, x).surfaces.active
+    active = after_contact(here, held, t, x).surfaces.active
     return run.place(here.index, here.mode.states, t, x, event.scale, active=active)
 
 
@@ -244,7 +246,8 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
     if here.t < run.settings.until:
         return go_on(run, here)
-    standing = standing_on(run, contact_at(run, here) or here)
+    held = contact_at(run, here)
+    standing = [] if isinstance(held, Stop) else standing_on(run, held)
     if not standing:
         return reached(here.t)
     chosen, alternatives = choose(here, standing, run)

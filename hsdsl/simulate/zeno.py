@@ -12,31 +12,34 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import in_contact, keeps, presses
+from hsdsl.simulate.contact import contact_at, in_contact, keeps, presses, releases
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
 
+FREE = 16  # transitions within the relaxation that cost no time; so many are remembered
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
 
 
 def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
-    """Return the last flight and the largest ratio of the last few, if one edge's flights shrink; else None."""
-    last = made[-LEAST_FLIGHTS - 1 :]
-    if len(last) <= LEAST_FLIGHTS or not all(_one_edge(t, last[0]) for t in last):
-        return None
-    flights = [b.time - a.time for a, b in pairwise(last)]
-    if not flights[-1] > 0:
-        return None
-    ratios = [b / a for a, b in pairwise(flights) if a > 0]
-    shrinking = len(ratios) == LEAST_FLIGHTS - 1 and max(ratios) < 1
-    return (flights[-1], max(ratios)) if shrinking else None
+    """Return the last flight and the largest ratio of the last few of the last edge, if they shrink; else None.
 
-
-def _one_edge(one: Transition, other: Transition) -> bool:
-    same = (one.edge, one.source) == (other.edge, other.source)
-    return same and one.source == one.target and not one.entry
+    Other edges that lead back to the same mode may fire meanwhile; :data:`FREE` transitions are looked at.
+    """
+    times: list[Number] = []
+    for one in reversed(made[-FREE:]):
+        if one.source != made[-1].source or one.source != one.target or one.entry:
+            break
+        if one.edge == made[-1].edge:
+            times.append(one.time)
+        if len(times) > LEAST_FLIGHTS:
+            break
+    flights = [a - b for a, b in pairwise(times)][::-1]
+    if len(flights) < LEAST_FLIGHTS or not min(flights) > 0:
+        return None
+    ratio = max(b / a for a, b in pairwise(flights))
+    return (flights[-1], ratio) if ratio < 1 else None
 
 
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
@@ -52,12 +55,17 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return here
     edge = here.mode.edges[k]
     try:
-        q = limit_of(run, here, k, end)
+        held = contact_at(run, here)
+        if isinstance(held, Stop):
+            return held
+        if releases(held, k):
+            return here
+        q = limit_of(run, here, held, k, end)
         if q is None or not keeps(run, limit := here.moved(end, q), k):
             return here
-        if edge.contact is None or run.settings.completion == "none":
+        if held.mode.edges[k].contact is None or run.settings.completion == "none":
             return run.diagnostics.accumulates(edge.name, end, here.t)
-        if presses(run, limit, k) is None or meets_another(here, limit, k):
+        if not presses(run, limit, k) or meets_another(here, limit, k):
             return here
     except DOMAIN_ERRORS:
         return here
@@ -69,12 +77,12 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     return rest
 
 
-def limit_of(run: Run, here: ModeState, k: int, end: Number) -> State | None:
-    """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
+def limit_of(run: Run, here: ModeState, held: ModeState, k: int, end: Number) -> State | None:
+    """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
     q = fixed_point(here, k, here.t, here.x)
-    edge = here.mode.edges[k]
-    if edge.contact is not None:
-        slope = in_contact(run, here, k, edge.contact).kernel.flow(here.t, *q)
+    contact = held.mode.edges[k].contact
+    if contact is not None:
+        slope = in_contact(run, held, k, contact).kernel.flow(here.t, *q)
         q = onto_guard(here, k, end, tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True)))
     q = fixed_point(here, k, end, q)
     far = abs(here.kernel.surfaces(end, *q)[k]) > here.surfaces.roundoff_bound(k, end, q, entry=True)

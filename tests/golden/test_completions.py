@@ -247,3 +247,41 @@ def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
     path.write_text("hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n")
     assert obey(["complete", str(path)]) == 2
     assert "nothing to complete" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("height", "count"), [("2", 46), ("1", 50), ("1.1", 46)])
+def test_two_balls_come_to_rest_one_after_the_other_or_together(height: str, count: int, engine: str) -> None:
+    text = f"""
+hsdsl: 1
+modes:
+  a:
+    flow: {{h: v, v: -1, k: w, w: -1, x: 1}}
+    transitions:
+      - {{name: one, when: h <= 0, to: a, reset: {{v: -v/2}}}}
+      - {{name: two, when: k <= 0, to: a, reset: {{w: -w/2}}}}
+initial: {{mode: a, h: 1, v: 0, k: {height}, w: 0, x: 0}}
+experiment: {{until: 10}}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "until" and len(run.transitions) == count
+    assert [run.final.state[name] for name in "hvkwx"] == pytest.approx([0, 0, 0, 0, 10], abs=1e-9)
+    for name in ("one", "two"):
+        assert any(f"motion along the guard of {name}" in reason for reason in run.verdict.reasons)
+
+
+def test_guards_that_press_on_each_other_stop_the_run_with_the_reason() -> None:
+    """A ball on a ball on the floor: what presses on the floor depends on the contact above."""
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, v: -1, y: w, w: -1}
+    transitions:
+      - {name: floor, when: x <= 0, to: a, reset: {v: -v/2}}
+      - {name: balls, when: x >= y, to: a, reset: {v: (v + w)/2, w: (v + w)/2}}
+initial: {mode: a, x: 0, v: 0, y: 1, w: 0}
+experiment: {until: 10}
+"""
+    run = hsdsl.loads(text).simulate(max_transitions=1000)
+    assert run.verdict.theorem == "left" and run.stop.reason in ("zeno", "transition_limit")

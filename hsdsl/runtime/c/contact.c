@@ -65,48 +65,79 @@ static void move_walls(int *marks, const hs_mode *from, int more) {
   for (int j = 0; j < more; j++) marks[from->edges + j] = 0;
 }
 
-/* Begin the motion along a guard that holds the state, and return its edge; -1 where none does. */
+/* Count the surfaces that the state is on. */
+static void count_active(hs_run *run) {
+  run->here.standing = 0;
+  for (int j = 0; j < run->here.table->surfaces; j++) run->here.standing += run->active_surfaces[j];
+}
+
+/* Be in contact with the guard of edge k as well, by the table of this number. */
+static void in_contact(hs_run *run, int k, int contact) {
+  const hs_mode *const before = run->here.table;
+  run->here.table = &run->model->mode[contact];
+  run->active_surfaces[k] = 0;
+  run->here.emerging = 0;
+  move_walls(run->active_surfaces, before, run->here.table->edges - before->edges);
+  count_active(run);
+}
+
+/* Be in contact with every guard that holds the state: GOES_ON, or a stop where they hold it together. */
 static int contact_at(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const own = here->table;
-  if (!here->standing || here->dimension != own->dimension || !here->dimension) return -1;
-  for (int k = 0; k < own->edges; k++)
-    if (run->active_surfaces[k] && presses(run, here->t, run->x, k)) {
-      here->table = &run->model->mode[own->edge[k].contact];
-      run->active_surfaces[k] = 0;
-      here->standing--;
-      here->emerging = 0;
-      move_walls(run->active_surfaces, own, here->table->edges - own->edges);
-      return k;
+  int count = 0;
+  if (!here->standing || here->dimension != own->dimension || !here->dimension) return GOES_ON;
+  for (int k = 0; k < own->edges; k++) {
+    run->beyond[k] = run->active_surfaces[k] && presses(run, here->t, run->x, k);
+    count += run->beyond[k];
+  }
+  for (int k = 0; count && k < own->edges; k++) {
+    if (!run->beyond[k]) continue;
+    const int contact = here->table->edge[k].contact;
+    if (contact < 0) {
+      if (here->table != own) after_contact(run);
+      note(run, HS_ACCUMULATES, k, 0, here->t, here->t);
+      return stopped(run, HS_ACCUMULATED, here->t);
     }
-  return -1;
+    in_contact(run, k, contact);
+  }
+  return GOES_ON;
 }
 
-/* End the motion along the guard of edge k. */
-static void after_contact(hs_run *run, int k) {
+/* Whether the state is in contact with the guard of edge k of its mode. */
+static int in_touch(const hs_run *run, int k) {
+  return k < run->model->mode[run->here.mode].edges && run->here.table->edge[k].releases;
+}
+
+/* End all contacts. */
+static void after_contact(hs_run *run) {
   hs_mode_state *const here = &run->here;
-  const hs_mode *const held = here->table;
-  here->table = &run->model->mode[here->mode];
-  move_walls(run->active_surfaces, held, here->table->edges - held->edges);
-  run->active_surfaces[k] = 1;
-  here->standing = 0;
-  for (int j = 0; j < here->table->surfaces; j++) here->standing += run->active_surfaces[j];
+  const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
+  for (int k = 0; k < own->edges; k++)
+    if (held->edge[k].releases) run->active_surfaces[k] = 1;
+  move_walls(run->active_surfaces, held, own->edges - held->edges);
+  here->table = own;
+  count_active(run);
 }
 
-/* Move t to the first moment from it on, within the tie of times, at which the `if` of edge k does not hold, and the
-   state run->x to run->z: 1; 0 where it holds. */
-static int condition_ends(hs_run *run, int k, hs_time *t) {
+/* Move t to the first moment from it on, within the tie of times, at which an `if` in contact does not hold, and the
+   state run->x to run->z: 1; 0 where all hold. */
+static int condition_ends(hs_run *run, hs_time *t) {
   const hs_mode_state *here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   const hs_time from = *t;
   copy(run->z, run->x, here->dimension);
   if (held->flow(here->p, from, run->x, run->end)) return 1;
   for (hs_real after = HS_UNIT * run->until; after <= tie(run, from); after = after * 2) {
+    int holds = 1;
     *t = from + after;
     for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + after * run->end[s];
-    run->here.table = own;
-    const int holds = condition(run, k, *t, run->z);
-    run->here.table = held;
+    for (int k = 0; k < own->edges && holds == 1; k++) {
+      if (!held->edge[k].releases) continue;
+      run->here.table = own;
+      holds = condition(run, k, *t, run->z);
+      run->here.table = held;
+    }
     if (holds != 1) return 1;
   }
   *t = from;

@@ -199,9 +199,11 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 /* contact.c */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
 static int presses(hs_run *run, hs_time t, const hs_real *x, int k);
+static void in_contact(hs_run *run, int k, int contact);
 static int contact_at(hs_run *run);
-static void after_contact(hs_run *run, int k);
-static int condition_ends(hs_run *run, int k, hs_time *t);
+static int in_touch(const hs_run *run, int k);
+static void after_contact(hs_run *run);
+static int condition_ends(hs_run *run, hs_time *t);
 
 /* zeno.c */
 static const hs_made *made_before(const hs_run *run, int back);

@@ -201,20 +201,18 @@ static int follow(hs_run *run, hs_time limit) {
   return AT_BOUNDARY;
 }
 
-/* Forget the ends of a motion along the guard of edge k among what else might have been. */
-static void drop_releases(hs_run *run, int k) {
+/* Forget the ends of contacts among what else might have been. */
+static void drop_releases(hs_run *run) {
   int kept = 0;
-  for (int i = 0; i < run->alternatives_count; i++) {
-    const int other = run->alternatives[i];
-    if (other != k && !run->here.table->edge[other].releases) run->alternatives[kept++] = other;
-  }
+  for (int i = 0; i < run->alternatives_count; i++)
+    if (!run->here.table->edge[run->alternatives[i]].releases) run->alternatives[kept++] = run->alternatives[i];
   run->alternatives_count = kept;
 }
 
-/* Go on in the mode itself from run->x, which the guard of edge k no longer holds. */
-static int released(hs_run *run, int k, hs_time t) {
+/* Go on in the mode itself from run->x, which a guard no longer holds. */
+static int released(hs_run *run, hs_time t) {
   hs_mode_state *const here = &run->here;
-  after_contact(run, k);
+  after_contact(run);
   const int standing_before = here->standing;
   copy(run->scale, run->landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
@@ -222,41 +220,45 @@ static int released(hs_run *run, int k, hs_time t) {
   return GOES_ON;
 }
 
-/* Flow along the guard of edge k until it lets go of the state. */
-static int along_guard(hs_run *run, int k, hs_time limit) {
+/* Flow along guards until one lets go of the state. */
+static int along_guards(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
   for (;;) {
     const int outcome = follow(run, limit), end = run->chosen.edge;
     if (outcome == LANDED && here->table->edge[end].releases) {
       hs_time t = run->chosen.time;
       copy(run->x, run->chosen.state, here->dimension);
-      if (end == k) return released(run, k, t);
-      if (condition_ends(run, k, &t)) {
+      if (in_touch(run, end)) return released(run, t);
+      if (condition_ends(run, &t)) {
         secant(run, &run->cubic);
         append(run, t, run->z, &run->cubic);
         swap(&run->x, &run->z);
-        return released(run, k, t);
+        return released(run, t);
       }
       run->active_surfaces[end] = 1;
       here->standing++;
       here->t = t;
       continue;
     }
-    if (outcome == LANDED) drop_releases(run, k);
-    after_contact(run, k);
+    if (outcome == LANDED) drop_releases(run);
+    after_contact(run);
     return outcome;
   }
 }
 
-/* Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go. */
+/* Flow until a surface is crossed or to the segment's end; along guards that hold the state until one lets go. */
 static int located_flow(hs_run *run) {
-  const hs_time limit = segment_end(run), from = run->here.t;
-  const int k = contact_at(run), n = run->here.dimension;
-  if (k < 0) return follow(run, limit);
+  const hs_time limit = run->task->timeline->end[run->here.segment], from = run->here.t;
+  const hs_mode *const own = run->here.table;
+  const int n = run->here.dimension, held = contact_at(run);
+  if (held != GOES_ON) return held;
+  const hs_mode *const contact = run->here.table;
+  if (contact == own) return follow(run, limit);
   copy(run->began, run->x, n);
-  const int outcome = along_guard(run, k, limit);
+  const int outcome = along_guards(run, limit);
   const int still = same_state(run->began, outcome == LANDED ? run->chosen.state : run->x, n);
-  note(run, HS_IN_CONTACT, k, still, from, run->task->now);
+  for (int k = 0; k < own->edges; k++)
+    if (contact->edge[k].releases) note(run, HS_IN_CONTACT, k, still, from, run->task->now);
   return outcome;
 }
 
@@ -321,12 +323,13 @@ static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t >= run->pause) return PAUSED;
   if (t < run->until) return go_on(run);
-  const int held = contact_at(run), count = standing_on(run);
+  const hs_mode *const own = run->here.table;
+  const int count = contact_at(run) == GOES_ON ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
     sizes(run, run->x, run->x);
   }
-  if (held >= 0) after_contact(run, held);
+  if (run->here.table != own) after_contact(run);
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);
 }
 

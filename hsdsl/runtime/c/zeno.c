@@ -10,24 +10,24 @@
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
 
-/* Whether the flights of one edge shrink: the last one, and the largest ratio of the last few. */
+/* Whether the flights of the last edge shrink: the last one, and the largest ratio of the last few. */
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
-  hs_real flights[LEAST_FLIGHTS];
-  if (run->jump <= LEAST_FLIGHTS) return 0;
-  const hs_made *first = made_before(run, LEAST_FLIGHTS);
-  for (int i = 0; i <= LEAST_FLIGHTS; i++) {
-    const hs_made *made = made_before(run, i);
-    if (made->edge != first->edge || made->mode != first->mode || made->mode != made->target || made->entry) return 0;
-    if (i > 0) flights[LEAST_FLIGHTS - i] = made_before(run, i - 1)->time - made->time;
+  const hs_made *const last = made_before(run, 0);
+  hs_time later = last->time;
+  hs_real after = 0.0;
+  int flights = 0;
+  for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
+    const hs_made *const made = made_before(run, i);
+    if (made->mode != last->mode || made->mode != made->target || made->entry) break;
+    if (made->edge != last->edge) continue;
+    const hs_real one = later - made->time;
+    if (!(one > 0)) return 0;
+    if (!flights) *flight = one, *ratio = 0.0;
+    if (flights) *ratio = hs_max(*ratio, after / one);
+    after = one, later = made->time;
+    flights++;
   }
-  *flight = flights[LEAST_FLIGHTS - 1];
-  if (!(*flight > 0)) return 0;
-  for (int i = 1; i < LEAST_FLIGHTS; i++) {
-    if (!(flights[i - 1] > 0)) return 0;
-    const hs_real shrunk = flights[i] / flights[i - 1];
-    *ratio = i > 1 ? hs_max(*ratio, shrunk) : shrunk;
-  }
-  return *ratio < 1;
+  return flights == LEAST_FLIGHTS && last->mode == last->target && !last->entry && *ratio < 1;
 }
 
 static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
@@ -70,10 +70,10 @@ static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
   return 0;
 }
 
-/* The point that a tail of edge k runs to at its end, to run->z: 1; 0 where it is not on the guard. */
-static int limit_of(hs_run *run, int k, hs_time end) {
+/* The point that a tail of edge k, with this contact, runs to at its end, to run->z: 1; 0 where it is not on the guard. */
+static int limit_of(hs_run *run, int k, int contact, hs_time end) {
   const hs_mode_state *here = &run->here;
-  const int n = here->dimension, contact = here->table->edge[k].contact;
+  const int n = here->dimension;
   hs_real r, noise, *const q = run->z;
   copy(q, run->x, n);
   if (fixed_point(run, k, here->t)) return RAISED;
@@ -111,9 +111,13 @@ static int close_tail(hs_run *run, int k) {
   const hs_real left = flight * ratio / (1 - ratio);
   const hs_time end = here->t + left;
   if (left > run->epsilon || end > segment_end(run)) return GOES_ON;
+  const hs_mode *const own = here->table;
+  if (contact_at(run) != GOES_ON) return HS_ACCUMULATED;
+  const int contact = here->table->edge[k].contact, touches = in_touch(run, k);
+  if (here->table != own) after_contact(run);
   hs_real *const q = run->z;
-  if (limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
-  if (here->table->edge[k].contact < 0 || !run->task->settings.contacts) {
+  if (touches || limit_of(run, k, contact, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
+  if (contact < 0 || !run->task->settings.contacts) {
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
