@@ -18,11 +18,12 @@ from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
 from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
+from hsdsl.simulate.verdict.agreement import SAFE
 
 if TYPE_CHECKING:
     from hsdsl.sensitivity.overrides import Overridden
 
-FINEST = 1e-12  # the tolerance of methods of high order: finer than that of most runs, and cheap
+FINEST = 1e-13  # the tolerance of methods of high order, to which it costs little
 SERIES, FINE = "taylor", "dop853"  # these methods; the latter where `auto` is the method of kinked flows
 REFUSED = ("step", "scheme")
 
@@ -99,8 +100,8 @@ class Differentiator:
                 lambda: preferring(augmented(ready.change, ready.by, ready.entries), ready.firsts),
             )
         settings, arithmetic = ready.setting.plain.settings, ready.setting.plain.arithmetic
-        tolerance = settings.tolerance
-        assert settings.method is not None and tolerance is not None
+        allowed = tolerance = settings.tolerance
+        assert settings.method is not None and allowed is not None and tolerance is not None
         method = settings.method.name
         if method == AUTO and settings.method_chosen is not None and arithmetic.digits is None:
             method = FINE
@@ -109,7 +110,7 @@ class Differentiator:
         numbers: dict[str, Number] = {
             UNIT: arithmetic.unit,
             SPAN: settings.until,
-            ERROR: ROUNDOFF_UNITS * arithmetic.unit + 10 * tolerance,
+            ERROR: ROUNDOFF_UNITS * arithmetic.unit + SAFE * allowed,
         }
         arguments = {
             "until": settings.until,

@@ -11,6 +11,7 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
+from hsdsl.model.differentiate import FINEST
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.pipeline import Pipeline
 from hsdsl.model.settings import whole
@@ -57,6 +58,7 @@ class Orbits:
         self._phase = PHASE if self.forced else None
         self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
         self._parameters = overrides_of(arguments, "parameters")
+        self._stiff = False
 
     def forcing(self, parameters: Mapping[str, Any]) -> float | None:
         """The period of the forcing with these parameters."""
@@ -79,6 +81,8 @@ class Orbits:
         arguments = {k: v for k, v in self.arguments.items() if k not in ("until", "initial", "parameters")}
         if tolerance is not None:
             arguments["tolerance"] = tolerance
+        elif arguments.get("tolerance") is None and not self._stiff:
+            arguments["tolerance"] = FINEST
 
         def run(start: Mapping[str, float], phase: float, until: float, wrt: Sequence[str]) -> Sensitivity:
             given = dict(parameters) | ({self._phase: phase} if self._phase else {})
@@ -127,6 +131,7 @@ class Orbits:
         Raises UsageError: the run does not pass the section, or no orbit is found.
         """
         run = self.model.simulate(scheme="located", **self._run_arguments())
+        self._stiff = run.method == "radau"
         guesses = self.guesses(run)
         if not guesses:
             raise UsageError(

@@ -26,7 +26,7 @@ class Derivatives:
         self.columns = range(len(by))
         self._by = by
         self._known = parameter_slopes(given, by)
-        self._linear = [i.name for i in given.system.inputs if i.hold == "linear"]
+        self._rises: dict[str, sp.Expr] = {}  # of linear inputs
         self.moving = [p for p, row in self._known.items() if any(slope != 0 for slope in row)]
         self.inputs: list[SampledInput] = [*given.system.inputs]
         for sampled in given.system.inputs:
@@ -35,7 +35,7 @@ class Derivatives:
 
     def rows(self, expressions: Sequence[sp.Expr], states: Sequence[str]) -> list[Slopes]:
         """The derivatives of each expression of states, by all that it depends on."""
-        return slopes(expressions, [*{TIME: 0, **{symbol(n): 0 for n in (*states, *self._linear)}, **self._known}])
+        return slopes(expressions, [*{TIME: 0, **{symbol(n): 0 for n in (*states, *self._rises)}, **self._known}])
 
     def by(self, row: Slopes, k: int) -> sp.Expr:
         """A derivative by target k, through parameters and inputs."""
@@ -43,7 +43,7 @@ class Derivatives:
 
     def by_time(self, row: Slopes) -> sp.Expr:
         """The derivative by time, through linear inputs as well."""
-        through = (row.get(symbol(name), sp.S.Zero) * symbol(derivative_name(name, "t")) for name in self._linear)
+        through = (row.get(symbol(name), sp.S.Zero) * rise for name, rise in self._rises.items())
         return sp.Add(row.get(TIME, sp.S.Zero), *through)
 
     def along(self, row: Slopes, mode: Mode) -> sp.Expr:
@@ -53,31 +53,53 @@ class Derivatives:
 
     def _differentiate(self, given: SampledInput) -> None:
         """Add the derivatives of an input: by time along its pieces, and by each target where its samples move."""
-        exact = [sp.sympify(v) for v in given.values]
+        times, values = ([sp.sympify(v) for v in column] for column in (given.times, given.values))
+        rises = [(b - a) / (t - s) for a, b, s, t in zip(values, values[1:], times, times[1:], strict=False)]
         if given.hold == "linear":
-            pairs = zip(exact, exact[1:], given.times, given.times[1:], strict=False)
-            rises = [(b - a) / sp.sympify(t - s) for a, b, s, t in pairs]
-            times = (given.times[0] - 1, *given.times)
-            self._add(derivative_name(given.name, "t"), "zero", times, [sp.S.Zero, *rises, sp.S.Zero])
-        rows = slopes(exact, self.moving)
-        if any(rows):
-            self._known[symbol(given.name)] = [
-                self._add(derivative_name(given.name, t.label), given.hold, given.times, [self.by(r, k) for r in rows])
-                for k, t in enumerate(self._by)
-            ]
+            name = derivative_name(given.name, "t")
+            self._rises[given.name] = self._pieces(name, times, [sp.S.Zero, *rises, sp.S.Zero])
+        by_times, by_values = slopes(times, self.moving), slopes(values, self.moving)
+        if not any(by_times) and not any(by_values):
+            return
+        found: list[sp.Expr] = []
+        for k, target in enumerate(self._by):
+            name = derivative_name(given.name, target.label)
+            shifts, lifts = ([self.by(row, k) for row in rows] for rows in (by_times, by_values))
+            if given.hold == "linear" and any(shifts):
+                found.append(self._moving_line(name, times, rises, shifts, lifts))
+            else:
+                found.append(self._add(name, given.hold, times, lifts))
+        self._known[symbol(given.name)] = found
+
+    def _moving_line(self, name: str, times, rises, shifts, lifts) -> sp.Expr:
+        """The derivative, by a target, of straight lines between samples whose times move: lines that jump."""
+        bends = [
+            ((b - a) - rise * (d - c)) / (t - s)
+            for a, b, c, d, s, t, rise in zip(
+                lifts, lifts[1:], shifts, shifts[1:], times, times[1:], rises, strict=False
+            )
+        ]
+        levels = [v - r * h - bend * t for v, r, h, bend, t in zip(lifts, rises, shifts, bends, times, strict=False)]
+        level = self._pieces(f"{name} at 0", times, [lifts[0], *levels, lifts[-1]])
+        return level + TIME * self._pieces(f"{name} and t", times, [sp.S.Zero, *bends, sp.S.Zero])
+
+    def _pieces(self, name: str, times, values) -> sp.Expr:
+        """A number that stays the same between times: one value before the first, one from each of them on."""
+        return self._add(name, "zero", [times[0] - 1, *times], values)
 
     def _add(self, name: str, hold, times, values) -> sp.Expr:
         if not any(values):
             return sp.S.Zero
-        if all(v.is_Rational for v in values) and not any(isinstance(t, sp.Basic) for t in times):
-            values = [Fraction(int(v.p), int(v.q)) for v in values]
-        self.inputs.append(SampledInput(name, hold, tuple(times), tuple(values)))
+        both = [list(times), list(values)]
+        if all(v.is_Rational for column in both for v in column):
+            both = [[Fraction(int(v.p), int(v.q)) for v in column] for column in both]
+        self.inputs.append(SampledInput(name, hold, *map(tuple, both)))
         return symbol(name)
 
     def _check_jumps(self) -> None:
         """Refuse jumps of time whose times move with a target."""
         for given in self.system.inputs:
-            if any(slopes(map(sp.sympify, given.times), self.moving)):
+            if given.hold == "zero" and any(slopes(map(sp.sympify, given.times), self.moving)):
                 raise _refusal(f"the sample times of input {given.name}")
         _, switches = with_switches(self.system)
         meaning = {name: argument for (_, argument), name in switches.arguments.items()}

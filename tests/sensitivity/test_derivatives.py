@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import yaml
 import hsdsl
 from hsdsl import UsageError
 from hsdsl.arithmetic import multiprecision
+from hsdsl.cli.verbs import obey
 from hsdsl.model.values import with_parameters
 from hsdsl.store.npz import load
 
@@ -272,3 +274,16 @@ def test_a_run_from_a_file_has_no_model(tmp_path: Path) -> None:
     run.save(tmp_path / "run.npz")
     with pytest.raises(UsageError, match="no model"):
         load(tmp_path / "run.npz").sensitivity("c")
+
+
+def test_command(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sensitivity", OSCILLATOR, "--wrt", "c,initial.v", "--until", "3"]
+    assert obey(words) == 0
+    text = capsys.readouterr().out
+    assert "they exist: yes" in text and "d/d initial.v" in text
+    assert obey([*words, "--json", "--at", "outputs", "--set", "experiment.samples=4"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["samples"]["times"] == [0, 1, 2, 3]
+    assert len(found["samples"]["values"]["x"]["c"]) == 4
+    assert obey([*words[:3], "C"]) == 2
+    assert "did you mean 'c'?" in capsys.readouterr().err
