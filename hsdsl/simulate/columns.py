@@ -14,7 +14,9 @@ from hsdsl.runtime import structures
 
 NUMBER = 8  # bytes
 RECORDS = {"arc": structures.ARC, "transition": structures.TRANSITION, "note": structures.NOTE}
-RECORD_NUMBERS = {name: record.itemsize // 8 for name, record in RECORDS.items()}  # as long as so many numbers
+ARC_NUMBERS, TRANSITION_NUMBERS, NOTE_NUMBERS = (
+    record.itemsize // 8 for record in RECORDS.values()
+)  # as long as so many
 ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
@@ -103,7 +105,9 @@ class Packed:
         self._memory = np.empty(
             rows * by_row
             + transitions * 2 * shape.width
-            + sum(RECORD_NUMBERS[name] * count for name, count in zip(RECORDS, (arcs, transitions, notes), strict=True))
+            + ARC_NUMBERS * arcs
+            + TRANSITION_NUMBERS * transitions
+            + NOTE_NUMBERS * notes
             + (alternatives + 1) // 2
         )
         self._start = self._memory.ctypes.data
@@ -114,8 +118,8 @@ class Packed:
         """How many numbers each column takes, in the order of `ORDER`."""
         (n, arcs, k, notes, alternatives), w, there = self._counts, self._width, self._shape.width
         by_row = n, n * w, n * self._shape.outputs, n, n * self._shape.degree * w
-        arc, transition, note = (RECORD_NUMBERS[name] for name in RECORDS)
-        return (*by_row, arc * arcs, transition * k, k * there, k * there, note * notes, (alternatives + 1) // 2)
+        records = ARC_NUMBERS * arcs, TRANSITION_NUMBERS * k, k * there, k * there, NOTE_NUMBERS * notes
+        return (*by_row, *records, (alternatives + 1) // 2)
 
     def __getitem__(self, name: str) -> Array:
         place = ORDER.index(name)
