@@ -155,6 +155,7 @@ def close_tail(model, config, p, lane, record, mask):
     left = flight * ratio / (1 - jnp.where(ratio < 1, ratio, 0.0))
     end = still.t + left
     near = mask & shrinks & model.of(model.loops, lane.mode)[k] & (left <= config.relaxation) & (end <= bound.end)
+    left, end = jnp.where(near, left, 0.0), jnp.where(near, end, still.t)  # elsewhere derivatives must exist, too
     q = limit_of(model, p, lane, k, end, left, near)
     limit = frozen(q)
     r, noise = bound.surfaces(lane.mode, end, limit), bound.noise(lane.mode, end, limit, still.scale)
@@ -165,9 +166,10 @@ def close_tail(model, config, p, lane, record, mask):
     none = near & (model.of(model.contact, lane.mode)[k] < 0)
     pressed = when(near, lambda: presses(model, bound, still, k, end, limit), jnp.asarray(False))
     goes = near & ~none & pressed & ~others.any()
+    length = jnp.where(goes, left, 1.0)
     record = sampled(
         record, config, goes, lane.mode, lane.t, end,
-        lambda times: jax.vmap(lambda time: at(lane.x, (q - lane.x)[None], (time - lane.t) / left))(times),
+        lambda times: jax.vmap(lambda time: at(lane.x, (q - lane.x)[None], (time - lane.t) / length))(times),
     )  # fmt: skip
     lane = stopped(lane, none, ZENO)
     active = (jnp.abs(r) <= noise) | (jnp.arange(model.M) == k)
