@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -61,6 +62,17 @@ def test_models_are_documents(path: Path) -> None:
     model = hsdsl.load(path)
     assert document.count(rb"\subsection*{Mode ") == len(model.system.modes)
     assert document.count(b"\\item ") == sum(len(mode.edges) for mode in model.system.modes)
+
+
+@pytest.mark.parametrize("target", ["latex", "mermaid"])
+def test_text_of_the_document_stays(target: str) -> None:
+    (content,) = files_of(source_of(hsdsl.load(MODELS[-1]), {}), target).values()
+    lines = content.decode().splitlines(keepends=True)
+    found = "".join(line for line in lines if not re.match(r"%+ (Generated|model)", line))
+    golden = Path(__file__).parent / "golden" / f"thermostat.{target}.txt"
+    if os.environ.get("HSDSL_WRITE_GOLDEN"):
+        golden.write_text(found)
+    assert found == golden.read_text()
 
 
 def test_text_of_a_model_is_no_command() -> None:

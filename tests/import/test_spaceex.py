@@ -28,7 +28,7 @@ def test_switches_at_the_exact_times(name: str) -> None:
     expected = [entry for entry in BY_NAME[name]() if entry[0] <= run.time_span[1]]
     assert found == [entry[1:] for entry in expected] and len(found) >= 3
     for transition, (time, *_) in zip(run.transitions, expected, strict=True):
-        assert transition.time == pytest.approx(float(time), abs=1e-11)
+        assert transition.time == pytest.approx(float(time), abs=1e-13)
 
 
 @pytest.mark.parametrize("name", BY_NAME)
