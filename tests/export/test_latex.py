@@ -75,6 +75,20 @@ def test_text_of_the_document_stays(target: str) -> None:
     assert found == golden.read_text()
 
 
+def test_labels_of_a_mode_graph_are_no_markdown() -> None:
+    text = """
+hsdsl: 1
+parameters: {_a_: 1, x_max: 2}
+modes: {"`m`~~": {flow: {x: 2*_a_*x**2}, transitions: [{name: "**b**", when: x >= x_max, to: "`m`~~"}]}}
+initial: {mode: "`m`~~", x: 0}
+experiment: {until: 1}
+"""
+    (content,) = files_of(source_of(hsdsl.loads(text), {}), "mermaid").values()
+    graph = content.decode().partition("stateDiagram-v2")[2].replace("[*]", "")
+    assert not set("*`~") & set(graph) and "x_max" in graph and "_a" not in graph
+    assert not {"#42;", "#96;", "#126;", "#95;"} & set(re.findall(r"#\d+;", graph))
+
+
 def test_text_of_a_model_is_no_command() -> None:
     check(latex(HOSTILE))
 

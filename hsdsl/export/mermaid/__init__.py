@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from hsdsl.export.source import Source
 from hsdsl.names import visible
 from hsdsl.system import Edge, Mode
+
+_ALIKE = str.maketrans({"*": "\u2217", "`": "\u02cb", "~": "\u223c"})
+_OUTER = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # underscores that are not inside a word
 
 
 def files(source: Source) -> dict[str, bytes]:
@@ -41,12 +46,16 @@ def _edge_lines(edge: Edge) -> list[str]:
 
 
 def _label(lines: list[str]) -> str:
-    """Lines of a label: every sign but letters, digits and a few others is an entity, so that no text is syntax."""
-    return "<br/>".join("".join(map(_entity, visible(line))) for line in lines)
+    """Lines of a label: every sign but letters, digits and a few others is an entity, so that no text is syntax.
+
+    Labels are Markdown besides, also where a sign is an entity: a sign of emphasis gives way to one that looks like it.
+    """
+    texts = (_OUTER.sub("\u02cd", visible(line)).translate(_ALIKE) for line in lines)
+    return "<br/>".join("".join(map(_entity, text)) for text in texts)
 
 
 def _entity(sign: str) -> str:
-    return sign if sign.isascii() and (sign.isalnum() or sign in " _.,+-*/()") else f"#{ord(sign)};"
+    return sign if sign.isascii() and (sign.isalnum() or sign in " _.,+-/()") else f"#{ord(sign)};"
 
 
 def _comment(text: str) -> str:
