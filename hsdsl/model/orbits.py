@@ -208,7 +208,7 @@ class Orbits:
         sensitivity = passage.sensitivity
         multipliers = multipliers_of(found, passage.slopes, forced)
         verdict, reason = judged(multipliers, self._error(found, parameters, multipliers, forced))
-        broken = sensitivity.reasons if sensitivity.exists is False else ()
+        broken = tuple(why for _, why in sensitivity.breaks)
         verdict, reasons = "undecided" if broken else verdict, (reason, *broken)
         states = self._entered()[1]
         return Orbit(

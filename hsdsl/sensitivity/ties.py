@@ -51,8 +51,9 @@ def ties(run: RunView, wrt: Sequence[str]) -> Iterator[Tie]:
     tied_at: Number | None = None
     for made in run.transitions:
         tie = run.tie(made.time)
-        if made.alternatives and not made.entry:
-            yield _tie(run, made, wrt)
+        others = () if made.entry else _others(run, made)
+        if others:
+            yield _tie(run, made, others, wrt)
             tied_at = made.time
         elif tied_at is not None and made.time - tied_at <= tie:
             pass  # a part of what the tie leads to
@@ -62,18 +63,34 @@ def ties(run: RunView, wrt: Sequence[str]) -> Iterator[Tie]:
         last = made
 
 
-def _tie(run: RunView, made: Transition, wrt: Sequence[str]) -> Tie:
+def _others(run: RunView, made: Transition) -> tuple[str, ...]:
+    """The edges tied with a transition but those with the same guard, which are reached with it from everywhere."""
+    if not made.alternatives:
+        return ()
+    place, own = run.before(made)
+    names = run.edges(made.source)
+    slopes = [gradient(place.t, *place.x) for gradient in place.kernel.gradients]
+    least = run.arithmetic.sqrt(run.arithmetic.unit)
+
+    def same(k: int) -> bool:
+        pairs = zip(slopes[own], slopes[k], strict=True)
+        return all(abs(a - b) <= least * max(abs(a), abs(b)) for a, b in pairs)
+
+    return tuple(edge for edge in made.alternatives if not same(names.index(edge)))
+
+
+def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[str]) -> Tie:
     place, _ = run.before(made)
     since, names = 2 * run.tie(made.time), run.edges(made.source)
     orders: list[Order] = []
-    for edge in (made.edge, *made.alternatives):
+    for edge in (made.edge, *others):
         try:
             landed = settle(run, place, names.index(edge), since)
         except DOMAIN_ERRORS:
             landed = None
         if landed is not None:
             orders.append(_order(run, edge, *landed, wrt))
-    return Tie(made.time, made.index, tuple(orders), _disagreement(run, made, orders))
+    return Tie(made.time, made.index, tuple(orders), _disagreement(run, made, others, orders))
 
 
 def _order(run: RunView, edge: str, mode: str, values: Sequence[Number], wrt: Sequence[str]) -> Order:
@@ -84,10 +101,10 @@ def _order(run: RunView, edge: str, mode: str, values: Sequence[Number], wrt: Se
     return Order(edge, mode, {x: named[x] for x in slopes}, slopes)
 
 
-def _disagreement(run: RunView, made: Transition, orders: Sequence[Order]) -> str | None:
-    tied = " and ".join((made.edge, *made.alternatives))
+def _disagreement(run: RunView, made: Transition, others: Sequence[str], orders: Sequence[Order]) -> str | None:
+    tied = " and ".join((made.edge, *others))
     together = f"at t = {show(made.time)} {tied} are reached together"
-    if len(orders) <= len(made.alternatives):
+    if len(orders) <= len(others):
         return f"{together}, and not every order of them has an end"
     first = orders[0]
     if any(other.mode != first.mode for other in orders):

@@ -79,6 +79,30 @@ def test_differences_of_fifty_digits(name: str) -> None:
     assert_agree(model.sensitivity(case["wrt"]), model)
 
 
+GALLERY = (
+    "event-before-end", "grazing-hit", "grazing-miss", "kinked-input", "moving-guard", "narrow-hole", "restart-on-guard",
+    "two-crossings", "zeno-ball",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", GALLERY)
+def test_gallery(name: str) -> None:
+    """Scenes whose verdict is `holds`, by all parameters; each number relative to the largest of its kind."""
+    model = hsdsl.load(f"models/gallery/{name}.yaml")
+    states = model.program.modes[model.program.initial_mode].states
+    found = model.sensitivity([*model.program.parameters, *(f"initial.{x}" for x in states)])
+    assert found.exists
+    for by in found.wrt:
+        exact, mine = difference(model, by, tolerance="1e-36"), derivatives(found, by)
+        sizes: dict[str, float] = {}
+        for kind, value in ((key.split()[-1 if "after" in key else 0], value) for key, value in exact.items()):
+            sizes[kind] = max(sizes.get(kind, 0.0), abs(float(value)))
+        for key, value in exact.items():
+            size = sizes[key.split()[-1 if "after" in key else 0]]
+            assert abs(mine[key] - float(value)) <= 1e-9 * size + 1e-15, (by, key)
+
+
 def test_oscillator() -> None:
     model = hsdsl.load(OSCILLATOR)
     found = model.simulate(until=3).sensitivity("c,a,omega,x_max,initial.x,initial.v")  # of a relaxed run

@@ -181,3 +181,12 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert found["verdict"] == "stable"
     assert found["multipliers"][0]["size"] == pytest.approx(0.7937202404684, rel=1e-9)
     assert obey(["orbit", OSCILLATOR, "--section", "impct"]) == 2
+
+
+def test_stick_slip_on_a_belt() -> None:
+    """Sticking puts nearby executions on one line: a multiplier is zero. The period is that of two integrators."""
+    text = hsdsl.load("models/gallery/stick-slip.yaml").completed()
+    orbit = hsdsl.loads(text).orbit("sliding_slower_faster->slower")
+    assert orbit.period == pytest.approx(6.608448370445725, abs=1e-12)
+    assert orbit.verdict == "stable"
+    assert np.allclose(orbit.multipliers, 0, atol=1e-12)
