@@ -36,7 +36,8 @@ class Contact:
 
     ``mode`` is the mode with the constrained flow. The first of its edges are those of the mode itself, but those in
     contact release the state: their surfaces are the pushes with which the flow presses on the guards, negative. Edges
-    beyond the mode's own are where an `if` may end. What follows is of the last edge.
+    beyond the mode's own are where an `if` may end. What follows is of the last edge: ``ends`` says of each of its ends
+    of an `if` under which condition it is one.
     ``push`` is the derivative of the guard along the flow that presses, of this ``order``: 1, or 2 where the first one,
     ``rate``, is zero on it. ``landing`` is the state that repeated resets take a state near the guard to.
     """
@@ -47,6 +48,7 @@ class Contact:
     rate: sp.Expr
     push: sp.Expr
     landing: tuple[sp.Expr, ...]
+    ends: tuple[sp.Basic, ...]
 
 
 def contacts(mode: Mode) -> dict[frozenset[int], Contact]:
@@ -98,10 +100,11 @@ def contact(mode: Mode, k: int) -> Contact | None:
         return None
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
                       reset=tuple(states), reset_texts=mode.states)  # fmt: skip
-    edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *_ends_of_condition(release, edge.condition))
+    further, ends = _ends_of_condition(release, edge.condition)
+    edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *further)
     held = replace(mode, flow=flow, flow_texts=tuple(map(text_of, flow)), edges=edges)
     rate = cancelled(along(edge.surface.residual, states, mode.flow))
-    return Contact((k,), order, held, rate, push, landing)
+    return Contact((k,), order, held, rate, push, landing, tuple(ends))
 
 
 def _constrained(states: list[sp.Symbol], mode: Mode, edge: Edge):
@@ -146,19 +149,20 @@ def along(value: sp.Expr, states: list[sp.Symbol], flow: Sequence[sp.Expr]) -> s
     return sp.diff(value, TIME) + sum(sp.diff(value, x) * f for x, f in zip(states, flow, strict=True))
 
 
-def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> list[Edge]:
-    """Edges where an `if` may end: one for each inequality in it, and each way that counts."""
+def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> tuple[list[Edge], list[sp.Basic]]:
+    """Edges where an `if` may end, one for each inequality in it and each way that counts, and when it does there."""
+    edges: list[Edge] = []
+    ends: list[sp.Basic] = []
     if condition is None:
-        return []
+        return edges, ends
     atoms = sorted(condition.atoms(Relational), key=str)
     plain = isinstance(condition, Relational) or (isinstance(condition, sp.And) and set(condition.args) == set(atoms))
-    ends: list[Edge] = []
     for atom in atoms:
         falling = atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
-        for residual in (-falling,) if plain else (-falling, falling):
-            surface = zero_surface(residual)
-            ends.append(replace(release, surface=surface))
-    return ends
+        for residual, beyond in ((-falling, sp.false),) if plain else ((-falling, sp.false), (falling, sp.true)):
+            edges.append(replace(release, surface=zero_surface(residual)))
+            ends.append(sp.Not(condition.xreplace({atom: beyond})))
+    return edges, ends
 
 
 def zero_surface(residual: sp.Expr) -> Surface:

@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
+from hsdsl.expression.tokens import LARGEST_INTEGER
 from hsdsl.functions import FUNCTIONS
 from hsdsl.system import Surface
 
@@ -25,12 +26,18 @@ class _Printer(StrPrinter):
     def _print_Exp1(self, expr: Any) -> str:
         return "exp(1)"
 
+    def _print_Abs(self, expr: Any) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_Integer(self, expr: Any) -> str:
+        return f"{expr.p}e0" if abs(expr.p) > LARGEST_INTEGER else str(expr.p)
+
     def _print_Rational(self, expr: Any) -> str:
         for places in range(1, _MOST_PLACES):
             if 10**places % expr.q == 0:
                 whole, part = divmod(abs(expr.p) * 10**places // expr.q, 10**places)
                 return f"{'-' * (expr.p < 0)}{whole}.{part:0{places}d}"
-        return f"{expr.p}/{expr.q}"
+        return f"{self._print(sp.Integer(expr.p))}/{self._print(sp.Integer(expr.q))}"
 
     def _print_And(self, expr: Any) -> str:
         return " and ".join(self._part(a) for a in expr.args)

@@ -5,8 +5,8 @@
 Mode a has an edge to b where r >= 0, b one back where r <= 0, and neither changes a state. Where r grows along the flow
 of a and falls along that of b, a state can follow neither. It stays on the surface and follows s b + (1 - s) a with
 the share s for which r does not change. A method keeps a surface that is affine. Off one that is curved s brings the
-state back, in the time that the size of r takes at its rates, and leaving takes it onto the surface: errors of steps do
-not add up.
+state back, in the time that the size of r takes at its rates but not faster than within a part of the run, and leaving
+takes it onto the surface along the difference of the flows: errors of steps do not add up.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from hsdsl.completion.contact import along, cancelled, zero_surface
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
+
+PART = sp.Rational(1, 1024)  # of the run: a surface's size alone, zero where all states in it are, bounds no rate
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ def slidings(system: HybridSystem) -> list[Sliding]:
         while name in names:
             name, number = f"{base}_{number}", number + 1
         names.add(name)
-        found.append(_sliding(name, a, out, b, back))
+        found.append(_sliding(name, a, out, b, back, system.experiment.until))
     return found
 
 
@@ -75,17 +77,26 @@ def _opposite(out: Edge, back: Edge) -> bool:
     return plain and sp.expand(out.surface.residual + back.surface.residual) == 0
 
 
-def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
+def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
     states = [symbol(state) for state in a.states]
     r = out.surface.residual
     outwards, inwards = (cancelled(along(r, states, mode.flow)) for mode in (a, b))
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
-    size = sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
-    share = outwards / (outwards - inwards) + (r / sp.sqrt(size) if curved else 0)
-    flow = tuple(cancelled(f + share * (g - f)) for f, g in zip(a.flow, b.flow, strict=True))
+    pressing = cancelled(outwards - inwards)
+    size = (PART * until * pressing) ** 2 + sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
+    share, back_to = outwards / pressing, r / sp.sqrt(size) if curved else sp.S.Zero
+
+    def blended(f: sp.Expr | None, g: sp.Expr | None) -> sp.Expr | None:
+        """A flow or an output in between."""
+        if f is None or g is None or f == g:
+            return f if f == g else None
+        return cancelled(f + share * (g - f)) + back_to * (g - f)
+
+    flow = tuple(map(blended, a.flow, b.flow))
     stay = {"target_states": a.states, "reset": tuple(states), "reset_texts": a.states, "condition": None}
-    onto = tuple(x - r * slope * x**2 / size if curved else x for slope, x in zip(slopes, states, strict=True))
+    pairs = zip(states, a.flow, b.flow, strict=True)
+    onto = tuple(x + r * (g - f) / pressing if curved else x for x, f, g in pairs)
     leave = {**stay, "reset": onto, "reset_texts": tuple(map(text_of, onto))}
     leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **leave)
     leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **leave)
@@ -96,8 +107,8 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
         flow_texts=tuple(map(text_of, flow)),
         edges=(leave_a, leave_b, *_others(name, a, out, b, back)),
         walls=tuple(dict.fromkeys((*a.walls, *b.walls))),
-        outputs=tuple(_blended(f, g, share) for f, g in zip(a.outputs, b.outputs, strict=True)),
-        scene=tuple(_blended(f, g, share) for f, g in zip(a.scene, b.scene, strict=True)),
+        outputs=tuple(map(blended, a.outputs, b.outputs)),
+        scene=tuple(map(blended, a.scene, b.scene)),
         slides=(a.name, b.name),
     )
     enter = {**stay, "target": name}
@@ -121,10 +132,3 @@ def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
             label = edge.name if edge.name not in taken else f"{edge.name}_{mode.name}"
             found.append(replace(edge, name=label, source=name))
     return found
-
-
-def _blended(f: sp.Expr | None, g: sp.Expr | None, share: sp.Expr) -> sp.Expr | None:
-    """An output in between, as the flow is."""
-    if f is None or g is None or f == g:
-        return f if f == g else None
-    return cancelled(f + share * (g - f))

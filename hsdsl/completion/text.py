@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.contact import Contact, cancelled, contact
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import slidings
 from hsdsl.expression.scope import symbol
@@ -22,7 +22,7 @@ TIME_OF_CONTACT = "1e-6"
 def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     """The text of a model with a mode for each motion along a guard, and for each sliding.
 
-    A transition to the same mode enters the motion along its guard where the flights that follow it would last less
+    A transition to the same mode enters the motion along its guard where the flight that follows it would last less
     than the parameter ``contact_time``. None where nothing can be completed.
     """
     contacts = [(mode, found) for mode in system.modes for k in range(len(mode.edges)) if (found := contact(mode, k))]
@@ -33,9 +33,8 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     for sliding in surfaces:
         for entry in sliding.entries:
             writer.add_transition(entry.source, _transition(entry))
-        writer.add_mode(sliding.mode, sliding.mode.name)
-    for mode, found in contacts:
-        writer.add_contact(mode, found)
+    for mode, name in [(s.mode, s.mode.name) for s in surfaces] + [writer.add_contact(*found) for found in contacts]:
+        writer.add_mode(mode, name)
     return writer.result()
 
 
@@ -55,24 +54,33 @@ class _Writer:
             content = content[:index] + "".join(self._insertions[index]) + content[index:]
         return content
 
-    def add_contact(self, mode: Mode, found: Contact) -> None:
-        """Add a motion along a guard, and the transition into it."""
+    def add_contact(self, mode: Mode, found: Contact) -> tuple[Mode, str]:
+        """Add the transition into a motion along a guard; return its mode and the name of that."""
         (k,) = found.edges
         edge = mode.edges[k]
         label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
         name = self._free(re.sub(r"\W", "_", label))
+        reset = list(zip(map(symbol, mode.states), edge.reset, strict=True))
+
+        def after(value: sp.Expr) -> sp.Expr:
+            return value.subs(reset, simultaneous=True)
+
         if found.order == 1:
             soon = sp.Gt(found.push, 0)
         else:
-            soon = sp.Le(2 * found.rate, symbol(self._contact_time()) * found.push)
+            soon = sp.Le(cancelled(-2 * after(found.rate)), symbol(self._contact_time()) * found.push)
         condition = soon if edge.condition is None else sp.And(edge.condition, soon)
-        landing = edge.reset if found.order == 1 else found.landing
+        landing = edge.reset if found.order == 1 else tuple(cancelled(after(value)) for value in found.landing)
         entry = replace(edge, name=f"{mode.name}->{name}", target=name, condition=condition, reset=landing)
         self.add_transition(mode.name, _transition(replace(entry, priority=edge.priority + 1)))
         edges = list(found.mode.edges)
         for j in (k, *range(len(mode.edges), len(edges))):
-            edges[j] = replace(edges[j], name=f"{name}->{mode.name}")
-        self.add_mode(replace(found.mode, edges=tuple(edges)), name)
+            edges[j] = replace(edges[j], name=f"{name}->{mode.name}", reset=_onto_guard(mode, found))
+        for j, end in enumerate(found.ends, len(mode.edges)):
+            time = symbol(self._contact_time())
+            depth = time * found.push if found.order == 1 else time**2 * found.push / 2
+            edges[j] = replace(edges[j], condition=end, reset=_onto_guard(mode, found, depth))
+        return replace(found.mode, edges=tuple(edges)), name
 
     def _free(self, name: str) -> str:
         while name in self._names:
@@ -126,11 +134,23 @@ class _Writer:
         self._insertions.setdefault(index, []).append(text)
 
 
+def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple[sp.Expr, ...]:
+    """The point near a state, that errors of steps have moved off a guard, from where the mode itself can go on.
+
+    It is on the guard, or beyond it by a depth: where the `if` ends, the guard is one that the state has passed.
+    """
+    r = mode.edges[found.edges[-1]].surface.residual
+    off = (r if found.order == 2 else sp.S.Zero) - depth
+    slopes = [sp.diff(r, symbol(name)) for name in mode.states]
+    size = sum(slope**2 for slope in slopes)
+    return tuple(cancelled(x - off * slope / size) for x, slope in zip(found.landing, slopes, strict=True))
+
+
 def _transition(edge: Edge) -> dict[str, str]:
     """The fields of a transition; one with the name that it would have anyway gets none."""
     fields = {} if "->" in edge.name else {"name": edge.name}
     fields["when"] = inequality(edge.surface)
-    if edge.condition is not None:
+    if edge.condition not in (None, sp.true):
         fields["if"] = text_of(edge.condition)
     fields["to"] = edge.target
     changes = {name: text_of(r) for name, r in zip(edge.target_states, edge.reset, strict=True) if r != symbol(name)}

@@ -412,7 +412,7 @@ class Model:
         """The text of the model with modes for motion along guards and for sliding; None where there are none.
 
         It is an ordinary model, for every engine and export. A transition enters the motion along its guard where the
-        flights that follow it would last less than the parameter ``contact_time``.
+        flight that follows it would last less than the parameter ``contact_time``.
         """
         from hsdsl.completion.text import completed_text
         from hsdsl.elaborate import elaborate_files
