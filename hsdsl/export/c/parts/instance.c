@@ -164,6 +164,17 @@ const hs_real *hs_state(const hs_instance *instance, int *dimension) {
   return instance->pause_numbers;
 }
 
+/* Why no step leads on: where a state changes faster than time can tell, it grows beyond all numbers. */
+static const char *stuck_word(const hs_stop *stop) {
+  const hs_real instant = sqrt((hs_real)HS_UNIT) * (hs_real)stop->time;
+  const int failure = stop->failure;
+  int grows = failure == HS_NOT_FINITE;
+  if (failure == HS_WALL) return "left_domain";
+  for (int s = 0; s < stop->dimension && (failure == HS_ERROR || failure == HS_UNSOLVED || failure == HS_CREEPING); s++)
+    grows |= 0 < stop->scales[s] && stop->scales[s] < instant * fabs(stop->slope[s]);
+  return grows ? "not_finite" : "step_underflow";
+}
+
 const char *hs_stop_word(const hs_stop *stop) {
   switch (stop->reason) {
     case HS_UNTIL:
@@ -179,6 +190,6 @@ const char *hs_stop_word(const hs_stop *stop) {
     case HS_ENTERED_OUTSIDE:
     case HS_LEFT: return "left_domain";
     case HS_INTERRUPTED: return "interrupted";
-    default: return stop->failure == HS_WALL ? "left_domain" : "step_underflow";
+    default: return stuck_word(stop);
   }
 }
