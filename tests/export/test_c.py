@@ -108,6 +108,12 @@ SINGLE_TOLERANCE = 32 * 2.0**-24  # of a step in 32-bit floats, relative to size
 STUCK = {"oscillator-with-stop-2"}  # how often a relaxed run hits while a mass is stuck is a matter of rounding
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted((MODELS / "gallery").glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_scene_of_the_gallery_prints_the_transitions_of_its_run(path: Path, tmp_path: Path) -> None:
+    same(tmp_path, hsdsl.load(path), next(iter(COMPILERS.values())))
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_model_in_single_precision(name: str, compiler: str, tmp_path: Path) -> None:

@@ -256,6 +256,31 @@ def test_every_model_agrees_with_its_run(name: str, version: int, made: Any) -> 
     assert final or result["time"][-1] == pytest.approx(until)
 
 
+# where a run ends in a transition, stops, or passes over something that shorter steps see
+OTHERWISE = {"event-at-end", "blow-up", "narrow-pulse"}
+# further ones that a solver steps over, that have no one answer, or that enlarge each error
+SOLVER = {"grazing-hit", "two-ways", "lorenz-section"}
+GALLERY = [
+    (path.stem, kind)
+    for path in sorted((MODELS / "gallery").glob("*.yaml"))
+    for kind in ("ModelExchange", "CoSimulation")
+    if path.stem not in OTHERWISE and (kind == "CoSimulation" or path.stem not in SOLVER)
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kind"), GALLERY)
+def test_scenes_of_the_gallery_end_where_their_runs_do(name: str, kind: str, made: Any) -> None:
+    run = loaded(f"gallery/{name}").simulate()
+    until = run.final.time
+    result = fmpy.simulate_fmu(
+        made(f"gallery/{name}", 3), fmi_type=kind, stop_time=until, output_interval=until / 50, relative_tolerance=1e-9
+    )
+    for state, value in run.final.state.items():
+        size = np.nanmax(np.abs(run.sample(np.linspace(0, until, 201))[state])) or 1.0
+        assert result[state][-1] == pytest.approx(value, abs=1e-3 * size)
+
+
 class Stepped:
     """A unit of FMI 3 in co-simulation, function by function."""
 

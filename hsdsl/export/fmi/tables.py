@@ -5,7 +5,7 @@ from __future__ import annotations
 from hsdsl.backends.c import routine_functions
 from hsdsl.backends.c.printer import literal
 from hsdsl.export.c.text import array, comment, string
-from hsdsl.export.fmi.variables import Unit, nominals, switched
+from hsdsl.export.fmi.variables import Unit, switched
 from hsdsl.lower.slopes import lower_given
 
 _HEADER = """
@@ -71,7 +71,7 @@ def header(unit: Unit, token: str) -> str:
 
 def numbers(unit: Unit) -> str:
     """The text of ``variables.c``."""
-    system, problem = unit.source.system, unit.problem
+    system = unit.source.system
     off = switched(unit.source)
     inputs = [variable for variable in unit.variables if variable.kind == "input"]
     variables = (f"{{FMU_{variable.kind.upper()}, {variable.index}}}" for variable in unit.variables)
@@ -82,7 +82,7 @@ def numbers(unit: Unit) -> str:
         array("const fmu_variable", "fmu_variables", variables),
         array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0}"]),
         array("const double", "fmu_input_start", (literal(variable.start or 0.0) for variable in inputs)),
-        array("const double", "fmu_nominal", map(literal, nominals(problem))),
+        array("const double", "fmu_nominal", map(literal, unit.nominals)),
         _slopes(unit),
         _given(unit),
     ]

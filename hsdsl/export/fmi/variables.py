@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
+
+import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.text import compile_routines
@@ -71,6 +74,11 @@ class Unit:
         listed = "; ".join(f"{k} {mode.name}" for k, mode in enumerate(system.modes))
         return (*_inputs(self.source), *outputs, Variable("mode", 0, "mode", about=f"the mode: {listed}"), *indicators)
 
+    @property
+    def nominals(self) -> list[float]:
+        """A size for each state."""
+        return [variable.nominal or 1.0 for variable in self.variables if variable.kind == "state"]
+
     def references(self, *kinds: Kind) -> list[int]:
         """The references of the variables of some kinds."""
         return [i for i, variable in enumerate(self.variables) if variable.kind in kinds]
@@ -94,7 +102,7 @@ def _states(source: Source) -> tuple[Variable, ...]:
     problem, units = source.problem, source.system.units
     start = dict(zip(problem.states, problem.x, strict=True))
     names = problem.program.all_states
-    scale = nominals(problem)
+    scale = nominals(source)
     states = (
         Variable("state", i, name, units.get(name), float(start.get(name, 0.0)), nominal=scale[i])
         for i, name in enumerate(names)
@@ -102,11 +110,21 @@ def _states(source: Source) -> tuple[Variable, ...]:
     return (*states, *(Variable("derivative", i, f"der({name})", units.get(name)) for i, name in enumerate(names)))
 
 
-def nominals(problem: Problem) -> list[float]:
-    """A size for each state: as given, else that of its initial value, else 1."""
-    start = dict(zip(problem.states, problem.x, strict=True))
-    given = problem.settings.scale
-    return [float(given.get(name) or abs(start.get(name, 0.0)) or 1.0) for name in problem.program.all_states]
+def nominals(source: Source) -> list[float]:
+    """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
+    run = source.model.simulate(**source.arguments)
+    sizes: dict[str, float] = {}
+    for arc in run.arcs:
+        rows = np.abs(run.values[arc.first : arc.last + 1, : len(arc.states)])
+        for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
+            sizes[name] = max(size, sizes.get(name, 0.0))
+    given = source.problem.settings.scale
+    return [float(given.get(name) or _power(sizes.get(name, 0.0))) for name in source.problem.program.all_states]
+
+
+def _power(size: float) -> float:
+    """A power of two, so that the last digits of a run do not matter; 1 for nothing."""
+    return 2.0 ** math.ceil(math.log2(size)) if 0 < size < math.inf else 1.0
 
 
 def switched(source: Source) -> dict[str, int]:

@@ -82,7 +82,10 @@ static int push_of(const hs_mode *mode, int k, const double *p, double t, const 
 static int indicator(const fmu *unit, int k, const double *p, const double *x, const double *r, double *z) {
   const fmu_data *now = &unit->now;
   double rate;
-  if (rate_of(fmu_table(unit), k, p, now->time, x, &rate)) return 1;
+  if (rate_of(fmu_table(unit), k, p, now->time, x, &rate)) {
+    *z = now->margin[k] - r[k]; /* the flow may end at the surface */
+    return !hs_finite(*z);
+  }
   *z = hs_max(now->margin[k] - r[k], -length_of() * rate);
   return !hs_finite(*z);
 }
@@ -101,15 +104,42 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
   return FMU_OK;
 }
 
-/* Where the flow through x crossed surface k: time and state, to round-off. */
-static int taken_back(const hs_mode *mode, int k, const double *p, double *t, double *x) {
+/* The point of surface k that is nearest to x, relative to the sizes of states. */
+static int projected(const fmu *unit, const hs_mode *mode, int k, const double *p, double t, double *x) {
+  double g[PROBLEM_WIDTH + 2], r[PROBLEM_SURFACES + 1], total = 0.0;
+  if (mode->values(p, t, x, r) || mode->gradients[k](p, t, x, g)) return 1;
+  for (int s = 0; s < mode->dimension; s++) {
+    const double size = unit->now.scale[mode->state[s]];
+    total = total + g[s + 1] * size * g[s + 1] * size;
+  }
+  if (!(total > 0)) return 0;
+  for (int s = 0; s < mode->dimension; s++) {
+    const double size = unit->now.scale[mode->state[s]];
+    x[s] = x[s] - r[k] / total * g[s + 1] * size * size;
+  }
+  return 0;
+}
+
+/* Where the flow through x crossed surface k: time and state, to round-off; 1 where it has no value or turns before. */
+static int crossed(const hs_mode *mode, int k, const double *p, double *t, double *x) {
   double f[PROBLEM_WIDTH + 1], r[PROBLEM_SURFACES + 1], rate;
   for (int i = 0; i < 4; i++) {
     if (mode->values(p, *t, x, r) || rate_of(mode, k, p, *t, x, &rate) || mode->flow(p, *t, x, f)) return 1;
-    if (!(rate > 0) || r[k] == 0) return 0;
+    if (!(rate > 0)) return 1;
+    if (r[k] == 0) return 0;
     for (int s = 0; s < mode->dimension; s++) x[s] = x[s] - r[k] / rate * f[s];
     *t = *t - r[k] / rate;
   }
+  return rate_of(mode, k, p, *t, x, &rate) || !(rate > 0);
+}
+
+/* Take a state that is beyond surface k back onto it: along the flow, else straight. */
+static int taken_back(const fmu *unit, const hs_mode *mode, int k, const double *p, double *t, double *x) {
+  double q[PROBLEM_WIDTH + 1], at = *t;
+  memcpy(q, x, sizeof q);
+  if (crossed(mode, k, p, &at, q)) return projected(unit, mode, k, p, *t, x);
+  memcpy(x, q, sizeof q);
+  *t = at;
   return 0;
 }
 
@@ -120,28 +150,34 @@ static int holds(const hs_mode *mode, int k, const double *p, double t, const do
   return 1;
 }
 
-/* Whether surface k fires: crossed since the last event, or beyond on `entry`. */
-static int fires(const fmu *unit, int k, const double *p, const double *x, const double *r, int entry) {
+/* Whether surface k fires: crossed since the last event and above a level, or beyond on `entry`. A flow that has no
+   value beyond a surface counts as leading out. */
+static int fires(const fmu *unit, int k, const double *p, const double *x, const double *r, double level, int entry) {
   const fmu_data *now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   const int wall = k >= mode->edges;
   double rate, t = now->time, q[PROBLEM_WIDTH + 1];
   if (entry && (wall || !mode->edge[k].conditional) && r[k] > now->margin[k]) return 1;
-  if (now->outside[k] || !(r[k] > now->margin[k] / 2)) return 0;
-  if (rate_of(mode, k, p, t, x, &rate) || !(rate > 0)) return 0;
+  if (now->outside[k] || !(r[k] > level)) return 0;
+  if (!rate_of(mode, k, p, t, x, &rate) && !(rate > 0)) return 0;
   if (wall) return 1;
   memcpy(q, x, sizeof q);
-  return !taken_back(mode, k, p, &t, q) && holds(mode, k, p, t, q);
+  return !taken_back(unit, mode, k, p, &t, q) && holds(mode, k, p, t, q);
 }
 
-/* What fires: the edge of highest priority, the first of them in the file; else a wall; else -1. */
+/* What fires: of the edges crossed, and of those within the margin then, the one of highest priority, the first of them
+   in the file; else a wall; else -1. */
 static int first_of(const fmu *unit, const double *p, const double *x, const double *r, int entry) {
   const hs_mode *mode = fmu_table(unit);
+  const double *const margin = unit->now.margin;
   int chosen = -1;
-  for (int k = 0; k < mode->surfaces; k++) {
-    if (k >= mode->edges && chosen >= 0 && chosen < mode->edges) break;
-    if (!fires(unit, k, p, x, r, entry)) continue;
-    if (chosen < 0 || (k < mode->edges && mode->edge[k].priority > mode->edge[chosen].priority)) chosen = k;
+  for (int k = 0; k < mode->surfaces && chosen < 0; k++)
+    if (fires(unit, k, p, x, r, margin[k] / 2, entry)) chosen = k;
+  if (chosen < 0 || entry) return chosen;
+  for (int k = 0; k < mode->edges; k++) {
+    const int later = chosen < mode->edges && mode->edge[k].priority <= mode->edge[chosen].priority && k > chosen;
+    if (k != chosen && !later && fires(unit, k, p, x, r, -margin[k], 0))
+      if (chosen >= mode->edges || mode->edge[k].priority >= mode->edge[chosen].priority) chosen = k;
   }
   return chosen;
 }
@@ -187,7 +223,7 @@ static const char *make(fmu *unit, int k, const double *p, double *x, int entry)
   const hs_mode *mode = fmu_table(unit);
   double after[PROBLEM_WIDTH + 1], t = now->time;
   const int source = now->mode;
-  if (!entry && taken_back(mode, k, p, &t, x)) return "not_finite";
+  if (!entry && taken_back(unit, mode, k, p, &t, x)) return "not_finite";
   if (mode->edge[k].reset(p, t, x, after)) return "not_finite";
   for (int s = 0; s < mode->edge[k].target_dimension; s++)
     if (!hs_finite(after[s])) return "not_finite";

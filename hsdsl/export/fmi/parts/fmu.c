@@ -176,6 +176,15 @@ void fmu_get_nominals(const fmu *unit, double *x) {
   memcpy(x, fmu_nominal, PROBLEM_STATES * sizeof *x);
 }
 
+/* Whether a state is beyond a surface: a flow that has no value there goes on as it was, until the event is found. */
+static int is_beyond(const hs_mode *mode, const double *p, double t, const double *x) {
+  double r[PROBLEM_SURFACES + 1];
+  if (mode->values(p, t, x, r)) return 0;
+  for (int k = 0; k < mode->surfaces; k++)
+    if (r[k] > 0) return 1;
+  return 0;
+}
+
 fmu_status fmu_get_derivatives(fmu *unit, double *slopes) {
   double x[PROBLEM_WIDTH + 1], out[PROBLEM_WIDTH + 1];
   const hs_mode *mode = fmu_table(unit);
@@ -184,10 +193,12 @@ fmu_status fmu_get_derivatives(fmu *unit, double *slopes) {
   if (!p) return FMU_NO_VALUE;
   if (unit->now.ended || !mode->dimension) return FMU_OK;
   fmu_local(unit, x);
-  if (mode->flow(p, unit->now.time, x, out)) return FMU_NO_VALUE;
+  int none = mode->flow(p, unit->now.time, x, out);
+  for (int s = 0; s < mode->dimension && !none; s++) none = !hs_finite(out[s]);
+  if (none && !is_beyond(mode, p, unit->now.time, x)) return FMU_NO_VALUE;
   for (int s = 0; s < mode->dimension; s++) {
-    if (!hs_finite(out[s])) return FMU_NO_VALUE;
-    slopes[mode->state[s]] = out[s];
+    const int state = mode->state[s];
+    slopes[state] = unit->slopes[state] = none ? unit->slopes[state] : out[s];
   }
   return FMU_OK;
 }
