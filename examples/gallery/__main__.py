@@ -12,7 +12,7 @@ sys.path[:0] = [str(EXAMPLES), str(EXAMPLES.parent / "models")]
 
 from gallery.outcomes import outcomes  # noqa: E402
 from gallery.page import page  # noqa: E402
-from gallery.pictures import draw  # noqa: E402
+from gallery.pictures import DRAWN_AT, draw  # noqa: E402
 from gallery.records import Record, Records, joined, read, save, versions  # noqa: E402
 from gallery.scenes import Entry, entries  # noqa: E402
 from gallery.settings import Setting, own_settings, peer_settings  # noqa: E402
@@ -36,7 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         (asked.out / "images" / "gallery").mkdir(parents=True, exist_ok=True)
         for entry in chosen:
             _say(f"{entry.name}: picture")
-            draw(entry, asked.out / "images" / "gallery" / f"{entry.name}.svg")
+            scipy = [r for r in read(file).of(entry.name, "scipy") if r.setting.tolerance == DRAWN_AT]
+            wrong = any(r.outcome.word == "wrong" for r in scipy)
+            draw(entry, asked.out / "images" / "gallery" / f"{entry.name}.svg", wrong)
     (asked.out / "gallery.md").write_text(page(read(file), list(known.values())), encoding="utf-8")
     return 0
 

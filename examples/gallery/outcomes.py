@@ -12,17 +12,19 @@ from hsdsl.chart.outcome import Outcome
 from hsdsl.chart.processes import HANGS, Lost, in_processes
 
 LIMIT = 30.0  # processor seconds of a run
+SHORTER = {"stiff-switch": 8.0}  # most explicit runs would take all of it
 MEMORY = 12 << 30  # bytes of address space
-REASONS = {HANGS: f"no result in {LIMIT:.0f} s"}
 
 
 def outcomes(entry: Entry, settings: Sequence[Setting], processes: int = 1) -> Iterator[tuple[Setting, Outcome]]:
     """Run a scene with each setting, in processes that last as long as nothing hangs or crashes."""
-    found = dict(in_processes(partial(_run, entry), settings, processes, LIMIT))
+    limit = SHORTER.get(entry.name, LIMIT)
+    reasons = {HANGS: f"no result in {limit:.0f} s of the processor"}
+    found = dict(in_processes(partial(_run, entry), settings, processes, limit))
     for index, setting in enumerate(settings):
         answer = found[index]
         lost = isinstance(answer, Lost)
-        yield setting, Outcome(answer.word, REASONS.get(answer.word, "the process died")) if lost else answer
+        yield setting, Outcome(answer.word, reasons.get(answer.word, "the process died")) if lost else answer
 
 
 def _run(entry: Entry, setting: Setting) -> Outcome:

@@ -41,7 +41,7 @@ Each cell counts outcomes: of ours over all methods and sizes and both engines, 
 | stops | the run ends before the end, with a reason |
 | refuses | the tool or its translation does not take the model, with a reason |
 | **wrong** | another execution, without a word |
-| **hangs** | no result within 30 seconds of the processor |
+| **hangs** | no result within 30 seconds of the processor, or 8 in `stiff-switch` |
 | **crashes** | the process dies |
 
 {table}
@@ -52,7 +52,8 @@ Tools other than ours run as their documentation shows (`hsdsl/chart/peers`), wi
 transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
 methods of every order, explicit ones on stiff scenes too, tolerances of 1e-6 and 1e-9, steps of a thousandth and a
 ten-thousandth of the run, and at most {most:,} transitions; fixed steps are estimated (`--estimate`). The Python
-engine, which agrees with the compiled one to the last bit, runs three methods at the looser size.
+engine, which agrees with the compiled one to the last bit, runs three methods at the looser size, and
+`paoli-schatzman`, which has no compiled loop.
 
 """
 

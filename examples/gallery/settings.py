@@ -53,9 +53,9 @@ def own_settings(engines: tuple[str, ...] = ENGINES) -> Iterator[Setting]:
         for method in ("",) if scheme in OWN_FORMULA else METHODS:
             for engine in engines:
                 base = Setting(f"hsdsl {engine}", scheme, method)
-                if engine == "python" and method not in SAMPLED:
-                    continue
-                sizes = slice(None) if engine == "c" else slice(1)
+                if (engine == "python" and method not in SAMPLED) or (engine == "c" and not method):
+                    continue  # no compiled loop has the schemes with their own formula
+                sizes = slice(1) if engine == "python" and method else slice(None)
                 if method and METHODS[method].adaptive:
                     yield from (replace(base, tolerance=value) for value in TOLERANCES[sizes])
                 else:

@@ -125,7 +125,7 @@ def _difference(scene: Scene, result: Result, others: int, error: float, within:
     """How a result differs from the exact execution; empty where it does not."""
     fewest, most = scene.countable
     if not result.problem and result.transitions is not None and not fewest <= result.transitions <= most:
-        return f"{result.transitions} transitions instead of {most:g}"
+        return f"{result.transitions} transition{'s' * (result.transitions != 1)} instead of {most:g}"
     if others:
         return f"another mode at {others} of {len(scene.grid)} samples"
     missing = ~np.isfinite(result.values[scene.clear]) & np.isfinite(scene.exact_values[scene.clear])

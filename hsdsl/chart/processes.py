@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -52,8 +53,12 @@ class _Worker(Generic[Task, Answer]):
 
     def _serve(self, there: Connection) -> None:
         self.here.close()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, which ends its children
         while True:
-            index: int = there.recv()
+            try:
+                index: int = there.recv()
+            except EOFError:  # the parent is gone
+                return
             try:
                 there.send(self.work(self.tasks[index]))
             except Exception as error:  # raised again where the answer is read

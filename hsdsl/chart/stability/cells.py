@@ -155,7 +155,7 @@ def _cell(scene: Scene, found: Outcome, reason: str) -> Cell:
         word = BLOWN_UP
     else:
         counted = found.transitions is not None
-        word = OTHER if "transitions" in found.why or ("mode" in found.why and not counted) else INACCURATE
+        word = OTHER if "transition" in found.why or ("mode" in found.why and not counted) else INACCURATE
     return Cell(word, nan, found.error, found.transitions, found.why)
 
 
