@@ -52,8 +52,8 @@ Tools other than ours run as their documentation shows (`hsdsl/chart/peers`), wi
 transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
 methods of every order, explicit ones on stiff scenes too, tolerances of 1e-6 and 1e-9, steps of a thousandth and a
 ten-thousandth of the run, and at most {most:,} transitions; fixed steps are estimated (`--estimate`). The Python
-engine, which agrees with the compiled one to the last bit, runs three methods at the looser size, and
-`paoli-schatzman`, which has no compiled loop.
+engine, which agrees with the compiled one to the last bit, runs `paoli-schatzman`, and three methods in some scenes.
+A dash stands for a tool that has not been run.
 
 """
 
