@@ -24,6 +24,7 @@ SETTINGS: list[tuple[str, dict[str, Any]]] = [
     ("pronking-runner", {"method": "rk4", "step": 1e-3}),
     ("thermostat", {"method": "dop853", "tolerance": 1e-7}),
 ]
+GALLERY = [path.stem for path in sorted((MODELS / "gallery").glob("*.yaml"))]
 MEANING = [path.stem for path in sorted(CASES.glob("*.yaml")) if not path.stem.endswith(".expect")]
 HOSTILE = """
 hsdsl: 1
@@ -75,6 +76,12 @@ def test_the_crates_own_test(name: str, settings: Any, tmp_path: Path) -> None:
     model = hsdsl.load(MODELS / f"{name}.yaml")
     assert_same(model, tmp_path, **settings)
     assert "1 passed" in cargo(tmp_path, "test", "-q")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_cargo) for name in GALLERY])
+def test_every_scene_of_the_gallery(name: str, tmp_path: Path) -> None:
+    assert_same(hsdsl.load(MODELS / "gallery" / f"{name}.yaml"), tmp_path, method="dopri5")
 
 
 @pytest.mark.slow
