@@ -16,6 +16,8 @@ import hsdsl
 from hsdsl.cli.verbs import obey
 from hsdsl.export import files_of, source_of
 
+# a product and a sum in one instruction round once: how deep a relaxed step ends in a strip may turn on that
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_max_isa=AVX")
 jax: Any = pytest.importorskip("jax")
 from export.jax_modules import SETTINGS, assert_same, imported  # noqa: E402
 
