@@ -50,8 +50,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return here
     flight, ratio = found
     left = flight * ratio / (1 - ratio)
-    end = here.t + left
-    if left > run.settings.relaxation or end > here.segment.end:
+    end = min(here.t + left, here.segment.end)
+    if left > run.settings.relaxation or not end > here.t:
         return here
     edge = here.mode.edges[k]
     try:

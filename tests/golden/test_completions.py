@@ -341,3 +341,22 @@ experiment: {until: 10}
 """
     run = hsdsl.loads(text).simulate(max_transitions=1000)
     assert run.verdict.theorem == "left" and run.stop.reason in ("zeno", "transition_limit")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("before", [0, 1e-8, 3e-7, 9e-7])
+def test_zeno_point_just_behind_the_end(before: float, engine: str) -> None:
+    """Flights of 1, 1/2, 1/4, ... end at t = 3."""
+    run = hsdsl.loads(ROLLING).simulate(until=3 - before, engine=engine)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    assert run.final.state["x"] == pytest.approx(3 - before, abs=1e-9)
+    assert abs(run.final.state["h"]) < 1e-11
+
+
+ROLLING = """
+hsdsl: 1
+modes:
+  fly: {flow: {x: 1, h: v, v: -2}, transitions: [{when: h <= 0, to: fly, reset: {v: -v/2}}]}
+initial: {mode: fly, x: 0, h: 1, v: 0}
+experiment: {until: 3}
+"""

@@ -248,7 +248,7 @@ static int along_guards(hs_run *run, hs_time limit) {
 
 /* Flow until a surface is crossed or to the segment's end; along guards that hold the state until one lets go. */
 static int located_flow(hs_run *run) {
-  const hs_time limit = run->task->timeline->end[run->here.segment], from = run->here.t;
+  const hs_time limit = segment_end(run), from = run->here.t;
   const hs_mode *const own = run->here.table;
   const int n = run->here.dimension, held = contact_at(run);
   if (held != GOES_ON) return held;

@@ -109,8 +109,8 @@ static int close_tail(hs_run *run, int k) {
   if (!contraction(run, &flight, &ratio) || here->dimension != here->table->dimension || !here->dimension)
     return GOES_ON;
   const hs_real left = flight * ratio / (1 - ratio);
-  const hs_time end = here->t + left;
-  if (left > run->epsilon || end > segment_end(run)) return GOES_ON;
+  const hs_time whole = here->t + left, end = earlier(whole, segment_end(run));
+  if (left > run->epsilon || whole > run->pause || !(end > here->t)) return GOES_ON;
   const hs_mode *const own = here->table;
   if (contact_at(run) != GOES_ON) return HS_ACCUMULATED;
   const int contact = here->table->edge[k].contact, touches = in_touch(run, k);
