@@ -100,7 +100,7 @@ def test_no_run_is_silently_wrong(entry: Entry, setting: Setting) -> None:
         assert found.verdict in ("left", "unknown"), found
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("setting", [*own_settings(("c",))], ids=lambda setting: f"{setting.label} {setting.size}")
 def test_no_method_is_silently_wrong(entry: Entry, setting: Setting) -> None:
     if (entry.name, setting.label) in INEXACT:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from references import BY_NAME
+from switch_times import BY_NAME
 
 import hsdsl
 from hsdsl.cli.verbs import obey
