@@ -181,7 +181,14 @@ class Model:
         return run
 
     def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
-        return self._differentiator.of_run(dict(zip(ARGUMENTS, arguments, strict=True)), wrt)
+        call = dict(zip(ARGUMENTS, arguments, strict=True))
+        return self._sliding_for(call)._differentiator.of_run(call, wrt)
+
+    def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
+        """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
+        given = {"completion": arguments.get("completion")}
+        options = self.resolve(arguments.get("settings"), given)
+        return self.sliding if options.values["completion"].value == "auto" else self
 
     def _reduced_run(
         self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
@@ -210,7 +217,7 @@ class Model:
 
         Raises UsageError: an unknown name, or an argument that cannot be served.
         """
-        return self._differentiator.sensitivity(wrt, arguments)
+        return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
 
     def orbit(self, section: str, *, laps: int = 1, period: Any = None, **arguments: Any) -> Orbit:
         """Find a periodic orbit by shooting on a section, with its Floquet multipliers.
@@ -232,7 +239,7 @@ class Model:
         """
         from hsdsl.model.orbits import Orbits
 
-        return Orbits(self, section, laps, period, arguments).find()
+        return Orbits(self._sliding_for(arguments), section, laps, period, arguments).find()
 
     def continuation(
         self,
@@ -261,7 +268,7 @@ class Model:
         """
         from hsdsl.model.orbits import Orbits
 
-        return Orbits(self, section, laps, period, arguments).continued(parameter, start, end)
+        return Orbits(self._sliding_for(arguments), section, laps, period, arguments).continued(parameter, start, end)
 
     def orbital_stability(
         self,
@@ -295,7 +302,7 @@ class Model:
         """
         from hsdsl.model.nearby import orbital_stability
 
-        return orbital_stability(self, wrt, radii, samples, seed, progress, arguments)
+        return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
 
     def fit(
         self,
@@ -329,7 +336,7 @@ class Model:
         """
         from hsdsl.model.fits import fit
 
-        return fit(self, data, wrt, sigma, weights, progress, arguments)
+        return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
 
     def stream(
         self,
@@ -403,7 +410,7 @@ class Model:
         call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
         return run_ensemble(self, call, samples, transition_times, threads, progress)
 
-    @property
+    @cached_property
     def sliding(self) -> Model:
         """The model with a mode for each surface that two modes press on; this one where there is none."""
         return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)

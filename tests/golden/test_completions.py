@@ -360,3 +360,16 @@ modes:
 initial: {mode: fly, x: 0, h: 1, v: 0}
 experiment: {until: 3}
 """
+
+
+def test_derivatives_go_through_sliding() -> None:
+    text = f"hsdsl: 1\nparameters: {{mu: 1}}\nmodes:\n{FRICTION.replace('1}', 'mu}')}\n"
+    text += "initial: {mode: a, x: 12, v: 6}\nexperiment: {until: 30, completion: auto}"
+    model, small = hsdsl.loads(text), 1e-5
+    slopes = model.sensitivity("mu,initial.x").final.state["x"]
+    for name, group, at in (("mu", "parameters", {"mu": 1.0}), ("initial.x", "initial", {"x": 12.0})):
+        (key, value), ends = next(iter(at.items())), []
+        for sign in (1, -1):
+            arguments: Any = {group: {key: value + sign * small}, "tolerance": 1e-13}
+            ends.append(model.simulate(**arguments).final.state["x"])
+        assert slopes[name] == pytest.approx((ends[0] - ends[1]) / (2 * small), abs=1e-8)
