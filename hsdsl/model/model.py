@@ -181,7 +181,7 @@ class Model:
         return run
 
     def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
-        call = dict(zip(ARGUMENTS, arguments, strict=True))
+        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
         return self._sliding_for(call)._differentiator.of_run(call, wrt)
 
     def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:

@@ -366,7 +366,7 @@ def test_derivatives_go_through_sliding() -> None:
     text = f"hsdsl: 1\nparameters: {{mu: 1}}\nmodes:\n{FRICTION.replace('1}', 'mu}')}\n"
     text += "initial: {mode: a, x: 12, v: 6}\nexperiment: {until: 30, completion: auto}"
     model, small = hsdsl.loads(text), 1e-5
-    slopes = model.sensitivity("mu,initial.x").final.state["x"]
+    slopes: Any = model.sensitivity("mu,initial.x").final.state["x"]
     for name, group, at in (("mu", "parameters", {"mu": 1.0}), ("initial.x", "initial", {"x": 12.0})):
         (key, value), ends = next(iter(at.items())), []
         for sign in (1, -1):
