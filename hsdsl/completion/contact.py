@@ -26,6 +26,7 @@ MOST_TOGETHER = 3  # edges whose motions along several guards at once are derive
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
+MOST_NODES = 2_000  # of a mode's flow, reset and guard, written out: beyond, no motion along a guard is derived
 LONG = 200  # operations, from which on a term is not simplified
 Point = dict[sp.Symbol, float]
 
@@ -91,6 +92,8 @@ def contact(mode: Mode, k: int) -> Contact | None:
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived:
         return None
     states = [symbol(name) for name in mode.states]
+    if not _is_small((*mode.flow, *edge.reset, edge.surface.residual)):
+        return None
     constrained = _constrained(states, mode, edge)
     if constrained is None:
         return None
@@ -171,9 +174,25 @@ def zero_surface(residual: sp.Expr) -> Surface:
 
 
 def cancelled(value: sp.Expr) -> sp.Expr:
-    """The same expression, cancelled where that is cheap."""
-    value = sp.sympify(value)
-    return value if value.count_ops() > LONG else sp.cancel(value)
+    """The same expression, simpler where that is cheap, without SymPy's polynomials: they compile code of their own."""
+    value = sp.signsimp(sp.sympify(value))
+    if value.count_ops() > LONG:
+        return value
+    over, under = value.as_numer_denom()
+    over = sp.expand(over)
+    return min((value, sp.factor_terms(over) / sp.factor_terms(under)), key=sp.count_ops) if over != 0 else over
+
+
+def _is_small(expressions: Sequence[sp.Expr]) -> bool:
+    """Whether expressions written out are short enough to be differentiated twice as trees."""
+    sizes: dict[sp.Basic, int] = {}
+
+    def size(expr: sp.Basic) -> int:
+        if expr not in sizes:
+            sizes[expr] = 1 + sum(map(size, expr.args))
+        return sizes[expr]
+
+    return sum(map(size, map(sp.sympify, expressions))) <= MOST_NODES
 
 
 def _fixed_point(states: list[sp.Symbol], equations: list[sp.Expr], further: Sequence[sp.Expr]) -> Point | None:

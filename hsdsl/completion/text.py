@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from hsdsl.completion.contact import Contact, cancelled, contact
+from hsdsl.completion.contact import LONG, Contact, cancelled, contact
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import slidings
 from hsdsl.expression.scope import symbol
@@ -162,7 +162,12 @@ def _transition(edge: Edge) -> dict[str, str]:
 
 
 def _flow(mode: Mode) -> dict[str, str]:
-    return {name: text_of(f) for name, f in zip(mode.states, mode.flow, strict=True)}
+    return {name: text_of(_reduced(f)) for name, f in zip(mode.states, mode.flow, strict=True)}
+
+
+def _reduced(value: sp.Expr) -> sp.Expr:
+    """The same expression, with common factors cancelled where that is cheap."""
+    return value if value.count_ops() > LONG else sp.cancel(value)
 
 
 def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:

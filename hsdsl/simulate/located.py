@@ -250,7 +250,7 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     standing = [] if isinstance(held, Stop) else standing_on(run, held)
     if not standing:
         return reached(here.t)
-    chosen, alternatives = choose(here, standing, run)
+    chosen, alternatives = choose(held, standing, run)
     return make_transition(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
 
 
