@@ -180,7 +180,8 @@ def cancelled(value: sp.Expr) -> sp.Expr:
         return value
     over, under = value.as_numer_denom()
     over = sp.expand(over)
-    return min((value, sp.factor_terms(over) / sp.factor_terms(under)), key=sp.count_ops) if over != 0 else over
+    shorter = sp.factor_terms(over) / sp.factor_terms(under)
+    return sp.S.Zero if over == 0 else min((value, shorter), key=sp.count_ops)
 
 
 def _is_small(expressions: Sequence[sp.Expr]) -> bool:

@@ -247,8 +247,7 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     if here.t < run.settings.until:
         return go_on(run, here)
     held = contact_at(run, here)
-    standing = [] if isinstance(held, Stop) else standing_on(run, held)
-    if not standing:
+    if isinstance(held, Stop) or not (standing := standing_on(run, held)):
         return reached(here.t)
     chosen, alternatives = choose(held, standing, run)
     return make_transition(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
