@@ -30,6 +30,7 @@ PAGES: dict[str, Callable[[], str]] = {
         if any(family(code) == name for code in RULES)
     },
     "integrators.md": methods.integrator_page,
+    "coefficients.md": methods.coefficient_page,
     "mistakes.md": mistakes.mistakes,
 }
 

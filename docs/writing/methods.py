@@ -16,7 +16,14 @@ INTEGRATORS = """# Integrators
 The values of `method` and `--method`. `auto` is chosen for each run, and the run says why: `radau` where the start is
 stiff, else `taylor` where every flow is smooth and has derivatives at the start, else `{auto}`, and `{auto}` with a
 fixed step. A method with an
-embedded error estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`.
+embedded error estimate is adaptive and keeps a `tolerance`; any method takes fixed steps of size `step`. The numbers of
+the tables are on [their own page](coefficients.md).
+
+"""
+
+COEFFICIENTS = """# Coefficients
+
+The Butcher tableaux of the [integrators](integrators.md), as the program has them.
 
 """
 
@@ -60,10 +67,15 @@ def integrator_page() -> str:
         error += f", and a coarser one of order {method.estimated_order - 2}" if method.coarse else ""
         known = "" if method.digits is None else f" Coefficients of {method.digits} digits."
         parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.{known}\n\n")
-        parts.append(f"Source: {method.source}.\n\n{tableau(method)}")
+        parts.append(f"Source: {method.source}. [Coefficients](coefficients.md#{name}).\n\n")
     parts.append(f"## {taylor.name}\n\n{taylor.title}. {TAYLOR}\n\nSource: {taylor.source}.\n")
     parts.append(f"\n## {radau.name}\n\n{radau.title}, order {radau.order}. {RADAU}\n\nSource: {radau.source}.\n")
     return "".join(parts)
+
+
+def coefficient_page() -> str:
+    """Write the tableau of every Runge-Kutta method."""
+    return COEFFICIENTS + "".join(f"## {name}\n\n{tableau(m)}" for name, m in integrators.INTEGRATORS.items())
 
 
 def tableau(method: ButcherTableau) -> str:

@@ -33,6 +33,20 @@ class Execution(Deferred):
 
     Attributes
     ----------
+    stop : Stop
+        Why and when the run ended.
+    transitions : tuple of Transition
+        The transitions, in order.
+    final : Point
+        Time, mode, states and outputs at the end.
+    verdict : Verdict
+        Whether the theorem holds for the run, with reasons.
+    settings : dict
+        The settings that the run had.
+    seconds : dict
+        Seconds for loading, compiling and simulating.
+    times, values, outputs : array, shape (n,), (n, states) and (n, outputs)
+        The recorded rows, two at a jump; :meth:`rows` gives them by name.
     overrides : dict
         The settings beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
         ``experiment.until``), each value as it was written.
