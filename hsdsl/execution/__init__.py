@@ -23,7 +23,7 @@ arcs           A x Arc        first and last row (inclusive), mode, states, kind
 Numbers are float64, or objects (mpmath) for a run at higher precision.
 """
 
-from hsdsl.execution.ensemble import Ensemble, Failure
+from hsdsl.execution.ensemble import Ensemble, Failure, TransitionTable
 from hsdsl.execution.parts import REASONS, Arc, Kind, Point, Stop, Transition, Verdict
 from hsdsl.execution.run import Execution, OutputFunction
 from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
@@ -46,5 +46,6 @@ __all__ = [
     "Side",
     "Stop",
     "Transition",
+    "TransitionTable",
     "Verdict",
 ]

@@ -26,6 +26,32 @@ class Failure:
 
 
 @dataclass(frozen=True, eq=False)
+class TransitionTable:
+    """Every transition of an ensemble's instances, one instance's behind the other's, in their order.
+
+    Attributes
+    ----------
+    first : array of int, shape (instances + 1,)
+        Where the transitions of each instance begin (instances as in the flattened arrays); the last one is the end.
+    time, edge, entry : array, shape (transitions,)
+        When it was made, the transition's name, and whether it fired at once on entering its mode.
+    before, after : dict of array, shape (transitions,)
+        States by name, not-a-number where the mode lacks the state, and after one that a run ended in.
+    """
+
+    first: Array
+    time: Array
+    edge: Array
+    entry: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+    def of(self, instance: int) -> slice:
+        """Where the transitions of an instance are."""
+        return slice(int(self.first[instance]), int(self.first[instance + 1]))
+
+
+@dataclass(frozen=True, eq=False)
 class Ensemble:
     """The runs of an ensemble. Every array begins with :attr:`shape`, the common shape of what was varied.
 
@@ -49,6 +75,8 @@ class Ensemble:
     sample_times : array, shape (..., n)
     samples : dict of array, shape (..., n)
         States and outputs at these times by name, not-a-number beyond a run's end; empty without sample times.
+    transition_table : TransitionTable or None
+        Every transition, where they were to be kept.
     """
 
     model: str
@@ -69,6 +97,7 @@ class Ensemble:
     samples: dict[str, Array]
     seconds: dict[str, float]
     refusals: Mapping[tuple[int, ...], str]
+    transition_table: TransitionTable | None = field(repr=False)
     again: Callable[[tuple[int, ...]], Execution] = field(repr=False)
 
     def __repr__(self) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
-from hsdsl.execution import Array, Ensemble, Execution
+from hsdsl.execution import Array, Ensemble, Execution, TransitionTable
 from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.options import KEYS, Options, check_arguments, overrides_of
 from hsdsl.model.settings import check_memory, setting_columns, whole
@@ -40,11 +40,14 @@ class EnsembleRequest:
     call: dict[str, Any]
     varied: dict[str, Array]
     shape: tuple[int, ...]
-    samples: int | Array | None
+    samples: int | Array | str | None
     transition_times: int
+    every_transition: bool = False
 
     @staticmethod
-    def of(call: dict[str, Any], samples: Any, transition_times: int) -> EnsembleRequest:
+    def of(
+        call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
+    ) -> EnsembleRequest:
         """Sort the arguments.
 
         Raises UsageError: an argument that a run does not take, a value that is no number, no expression and no array
@@ -64,7 +67,7 @@ class EnsembleRequest:
             raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}") from None
         shape = common[0].shape if common else ()
         flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
-        return EnsembleRequest(call, flat, shape, _samples(samples), transition_times)
+        return EnsembleRequest(call, flat, shape, _samples(samples), transition_times, every_transition)
 
     def arrays(self, initial: bool) -> dict[str, list[float]]:
         """The columns of initial states or of parameters, by name."""
@@ -79,19 +82,38 @@ class EnsembleRequest:
             own[group][name.removeprefix(INITIAL)] = float(array[index])
         return self.call | own
 
-    @property
-    def sample_count(self) -> int:
-        """The number of samples of each instance."""
-        return self.samples if isinstance(self.samples, int) else 0 if self.samples is None else len(self.samples)
+    def times(self, until: Array, table: InstanceTable) -> tuple[int, Callable[[], Array]]:
+        """The number of samples of an instance, and what makes their times, shape (instances, samples).
 
-    def times(self, until: Array) -> Array:
-        """The sample times of every instance, shape (instances, samples)."""
-        if self.samples is None:
-            return np.empty((len(until), 0))
-        if isinstance(self.samples, int):
-            n = self.samples
-            return np.concatenate([until[:, None] * np.arange(n - 1) / (n - 1), until[:, None]], axis=1)
-        return np.tile(self.samples, (len(until), 1))
+        Behind the last sample of an instance that has fewer than others is not-a-number.
+        """
+        given = self.samples
+        if given is None:
+            return 0, lambda: np.empty((len(until), 0))
+        if isinstance(given, str):
+            return _times_every(np.array(table.expression(given, "the time between samples"), float), until)
+        if isinstance(given, int):
+            return given, lambda: _evenly(until, given)
+        return len(given), lambda: np.tile(given, (len(until), 1))
+
+
+def _evenly(until: Array, count: int) -> Array:
+    return np.concatenate([until[:, None] * np.arange(count - 1) / (count - 1), until[:, None]], axis=1)
+
+
+def _times_every(step: Array, until: Array) -> tuple[int, Callable[[], Array]]:
+    """Multiples of each instance's step up to its end."""
+    if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
+        raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
+    with np.errstate(invalid="ignore"):
+        count = np.floor(until / step * (1 + 1e-12)) + 1
+    most = int(min(np.nanmax(count, initial=0), 2**62))
+
+    def times() -> Array:
+        times = step[:, None] * np.arange(most)
+        return np.where(np.arange(most) < count[:, None], np.minimum(times, until[:, None]), math.nan)
+
+    return most, times
 
 
 def _plain(value: Any) -> Any:
@@ -107,9 +129,10 @@ def _array(name: str, value: Any) -> Array:
         raise UsageError(f"{name}: expected a number, an expression or an array of numbers") from None
 
 
-def _samples(given: Any) -> int | Array | None:
-    if given is None:
-        return None
+def _samples(given: Any) -> int | Array | str | None:
+    """A number of samples, their times, or the time between them as an expression of parameters."""
+    if given is None or isinstance(given, str):
+        return given
     if np.ndim(given) == 1 and not isinstance(given, str):
         times = np.asarray(given, dtype=float)
         if np.isfinite(times).all() and (times >= 0).all() and (np.diff(times) >= 0).all():
@@ -163,12 +186,11 @@ class PreparedEnsemble:
         began, program = time.perf_counter(), self.base.program
         plan, samples = self.base.plan, self.instances.time.shape[1]
         width = plan.compiled.table.width if plan else max(map(len, self.kinds))
-        crossings = self.request.transition_times
-        kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings)
+        crossings, logs = self.request.transition_times, self.request.every_transition
+        kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings, logs)
         if plan is None:
-            modes = [mode.name for mode in program.modes]
             again = [partial(self.again.numbered, place) for place in self.places]
-            run_in_turn(again, ArrayRecorder(self.instances, kept, self.names, self.kinds, modes), progress)
+            run_in_turn(again, ArrayRecorder(self.instances, kept, self.names, self.kinds, program), progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
@@ -212,8 +234,23 @@ class PreparedEnsemble:
             samples=columns(sampled if self.instances.time.shape[1] else ()),
             seconds={"simulate": seconds},
             refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
+            transition_table=self._transition_table(kept, placed(kept.transitions, 0)) if kept.logs else None,
             again=self.again,
         )
+
+    def _transition_table(self, kept: Kept, counts: Array) -> TransitionTable:
+        made, *around = kept.logged()
+        modes, names = self.base.program.modes, self.names
+        edges = [(mode, edge) for mode in modes for edge in mode.edges]
+        offsets = np.cumsum([0, *(len(mode.edges) for mode in modes)])
+        number = offsets[made["mode"]] + made["edge"]
+        layouts = [mode.states for mode, _ in edges], [edge.target_states for _, edge in edges]
+        around[1][np.isnan(made["resumed"])] = math.nan
+        states = [columns_by_name(v, number, of, names)[0].T for v, of in zip(around, layouts, strict=True)]
+        before, after = (dict(zip(names, columns, strict=True)) for columns in states)
+        known = np.array([edge.name for _, edge in edges], dtype=str)
+        first = np.concatenate([[0], np.cumsum(counts)])
+        return TransitionTable(first, made["time"], known[number], made["entry"] != 0, before, after)
 
 
 def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
@@ -225,22 +262,26 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     values = pipeline.values(FLOAT64)
     columns = InstanceTable(values, [()] * math.prod(request.shape))
     evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
-    first = next((k for k in range(len(columns.rows)) if k not in columns.refused), None)
+    finite = np.logical_and.reduce([np.isfinite(array) for array in request.varied.values()] or [[True]])
+    first = next((k for k in np.flatnonzero(finite).tolist() if k not in columns.refused), None)
     if first is None:
-        why = next(iter(columns.refused.values()), "there is none")
+        why = next(iter(columns.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
         raise UsageError(f"no instance of the ensemble can be run: {why}")
     base = pipeline.prepare(request.single(first))
-    kept = 2 * len(base.states) + request.transition_times + request.sample_count * (1 + len(model.columns))
-    check_memory(base.settings.memory, len(columns.rows), "instances", kept)
     start = np.array(initial_columns(columns, base.states, call["initial"], request.arrays(initial=True)), dtype=float)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
     settings = _settings(columns, base.settings, options)
     places = list(settings)
+    until = np.full(len(columns.rows), math.nan)
+    until[places] = [settings[k].until for k in places]
+    samples, times = request.times(until, columns)
+    kept = 2 * len(base.states) + request.transition_times + samples * (1 + len(model.columns))
+    check_memory(base.settings.memory, len(columns.rows), "instances", kept)
     instances = Instances(
         settings=list(settings.values()),
         timelines=[pipeline.timeline(values, columns.rows[k], settings[k].until) for k in places],
         start=start.reshape(len(base.states), len(columns.rows)).T[places],
-        time=request.times(np.array([settings[k].until for k in places], dtype=float)),
+        time=times()[places],
     )
     kinds = list(StateLayouts(model.program, base.states).kinds)
     return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
@@ -262,11 +303,12 @@ def run_ensemble(
     transition_times: int,
     threads: int | None,
     progress: Callable[[int, int], None] | None,
+    every_transition: bool = False,
 ) -> Ensemble:
     """Run many instances of a model; see `Model.ensemble`."""
     if threads is not None:
         whole(threads, "threads", least=1)
-    request = EnsembleRequest.of(call, samples, transition_times)
+    request = EnsembleRequest.of(call, samples, transition_times, every_transition)
     completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
     return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
 

@@ -379,6 +379,7 @@ class Model:
         initial: Mapping[str, Any] | None = None,
         samples: Any = None,
         transition_times: int = 0,
+        every_transition: bool = False,
         threads: int | None = None,
         progress: Callable[[int, int], None] | None = None,
         **arguments: Any,
@@ -392,10 +393,13 @@ class Model:
         parameters, initial : mapping, optional
             Overrides by name: numbers, expressions, or arrays of numbers. Arrays are brought to a common shape, as
             NumPy does; each of its elements is an instance.
-        samples : int or sequence of float, optional
-            Sample every run: at so many equally spaced times from 0 to its ``until``, or at these times.
+        samples : int, sequence of float or str, optional
+            Sample every run: at so many equally spaced times from 0 to its ``until``, at these times, or at the
+            multiples of an expression of parameters, such as ``"2*pi/w"``.
         transition_times : int
             Keep the times of so many first transitions of each run.
+        every_transition : bool
+            Keep every transition, with the states around it: `Ensemble.transition_table`.
         threads : int, optional
             How many; left out, as many as there are cores for this process.
         progress : callable, optional
@@ -408,7 +412,7 @@ class Model:
         from hsdsl.model.ensemble import run_ensemble
 
         call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
-        return run_ensemble(self, call, samples, transition_times, threads, progress)
+        return run_ensemble(self, call, samples, transition_times, threads, progress, every_transition)
 
     @cached_property
     def sliding(self) -> Model:

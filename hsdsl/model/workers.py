@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsdsl.execution import Execution
+from hsdsl.execution import Execution, Transition
+from hsdsl.program import Program
+from hsdsl.runtime import structures
 from hsdsl.simulate.compiled import CompiledPlan
-from hsdsl.simulate.ensemble import CompiledEnsemble, Instances, Kept
+from hsdsl.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
 
 SLICE = 32  # instances that a thread takes at a time
 INTERVAL = 0.1  # seconds between looks at how far it is
@@ -77,20 +79,21 @@ def run_in_turn(
 
 @dataclass(frozen=True, eq=False)
 class ArrayRecorder:
-    """Arrays for executions; ``kinds`` are the layouts of states, ``modes`` and ``names`` those of the model."""
+    """Arrays for executions; ``kinds`` are the layouts of states, ``names`` those of all states."""
 
     instances: Instances
     kept: Kept
     names: tuple[str, ...]
     kinds: list[tuple[str, ...]]
-    modes: list[str]
+    program: Program
 
     def __call__(self, i: int, execution: Execution) -> None:
         """Record the execution of an instance."""
         kept, last = self.kept, execution.arcs[-1]
         n, end = len(last.states), execution.times[-1]
         kept.stop[i] = execution.stop.reason
-        kept.mode[i] = self.modes.index(last.mode)
+        modes = [mode.name for mode in self.program.modes]
+        kept.mode[i] = modes.index(last.mode)
         kept.kind[i] = self.kinds.index(last.states)
         kept.transitions[i] = len(execution.transitions)
         kept.ended[i] = end
@@ -104,3 +107,18 @@ class ArrayRecorder:
             if name in samples.states:
                 kept.states[i, k, inside] = samples[name]
         kept.results[i, inside] = samples.output_columns
+        if kept.logs:
+            kept.log[i] = self._logged(execution.transitions, modes)
+
+    def _logged(self, transitions: Sequence[Transition], modes: list[str]) -> Logged:
+        nan = float("nan")
+        table = np.zeros(len(transitions), structures.TRANSITION)
+        before, after = np.full((2, len(transitions), self.kept.width), nan)
+        for k, made in enumerate(transitions):
+            source = modes.index(made.source)
+            edges = [edge.name for edge in self.program.modes[source].edges]
+            resumed = nan if made.resumed is None else made.resumed
+            table[k] = made.time, resumed, source, edges.index(made.edge), made.entry, len(made.alternatives)
+            before[k, : len(made.before)] = list(made.before.values())
+            after[k, : len(made.after or ())] = list((made.after or {}).values())
+        return table, before, after

@@ -26,6 +26,8 @@ ENDED = {
 
 
 LONGEST = f"U{max(map(len, REASONS))}"
+LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
+Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,12 @@ class Instances:
 class Kept:
     """What is kept of each instance, to be filled in place; ``columns`` states and all outputs are sampled."""
 
-    def __init__(self, instances: int, width: int, outputs: int, columns: int, samples: int, crossings: int) -> None:
+    def __init__(
+        self, instances: int, width: int, outputs: int, columns: int, samples: int, crossings: int, logs: bool = False
+    ) -> None:
         nan = float("nan")
+        self.width, self.logs = width, logs
+        self.log: dict[int, Logged] = {}  # every transition, by the first instance of those that made them
         self.stop = np.full(instances, "interrupted", LONGEST)  # until it is run to its end
         self.reason = np.full(instances, -1, np.int32)  # as the compiled loop says it; -1 where it was not run
         self.mode = np.full(instances, -1, np.int32)
@@ -57,6 +63,13 @@ class Kept:
         self.crossed = np.full((instances, crossings), nan)
         self.states = np.full((instances, columns, samples), nan)
         self.results = np.full((instances, samples, outputs), nan)
+
+    def logged(self) -> Logged:
+        """Every transition, in the order of the instances."""
+        empty = np.empty(0, structures.TRANSITION), np.empty((0, self.width)), np.empty((0, self.width))
+        columns = zip(empty, *(self.log[first] for first in sorted(self.log)), strict=True)
+        first, second, third = (np.concatenate(column) for column in columns)
+        return first, second, third
 
 
 BY_INSTANCE = ("reason", "mode", "kind", "transitions", "ended", "final", "outputs", "crossed", "states", "results")
@@ -104,10 +117,13 @@ class CompiledEnsemble:
             raise place.workspace.failed[0]
         known = np.array([*(ENDED.get(reason, reason) for reason in structures.REASONS), "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
+        if kept.logs:
+            kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))
 
     def place(self) -> ThreadWorkspace:
         """Make a place to work at."""
-        return ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1])
+        room = LOG_ROOM if self._kept.logs else 0
+        return ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room)
 
 
 class ThreadWorkspace:
@@ -119,6 +135,7 @@ class ThreadWorkspace:
         names: tuple[str, ...],
         layouts: StateLayouts,
         samples: int,
+        log_room: int,
     ) -> None:
         self.table = structures.Ensemble()
         self.workspace = plan.workspaces.new(self.table.task)
@@ -135,6 +152,34 @@ class ThreadWorkspace:
         sampling.scratch = start + 8 * room * (2 + len(names))
         self.table.layouts = self._arcs.ctypes.data
         self.table.layout_of = None if layouts.one else layouts.of_mode.ctypes.data
+        self._log: Logged = (
+            np.empty(log_room, structures.TRANSITION),
+            np.empty((log_room, model.width)),
+            np.empty((log_room, model.width)),
+        )
+        self._full: list[Logged] = []
+        self._lay_log(log_room)
+
+    def _lay_log(self, room: int) -> None:
+        table = self.table
+        table.log_room = room
+        table.log, table.before, table.after = (column.ctypes.data for column in self._log)
+        self._drain = type(table.drain)(self._take)
+        table.drain = self._drain
+
+    def _take(self, _: int | None = None) -> int:
+        """Take the transitions out of the log."""
+        first, second, third = (column[: self.table.logged].copy() for column in self._log)
+        self._full.append((first, second, third))
+        self.table.logged = 0
+        return 0
+
+    def logged(self, count: int) -> Logged:
+        """Take away so many transitions of the instances that have been run; behind them are those of one cut short."""
+        self._take()
+        first, second, third = (np.concatenate(column)[:count] for column in zip(*self._full, strict=True))
+        self._full.clear()
+        return first, second, third
 
 
 def _row(array: Any, row: int) -> int:

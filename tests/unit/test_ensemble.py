@@ -92,6 +92,8 @@ def test_modes_of_several_sizes_inputs_and_failures(engine):
     assert refused[5,] == "parameter stop has no finite value with these parameters"
     assert refused[6,] == "parameter twice = 14 is beyond its maximum 12"
     assert "has no finite value" in refused[7,] and "until" in refused[8,]
+    first = several.ensemble(initial={"x": [float("nan"), 0]}, engine=engine, tolerance=1e-6)
+    assert first.stop.tolist() == ["refused", "until"] and "initial.x: nan" in first.failures()[0].message
     assert np.isnan(ensemble.time[5:]).all() and set(ensemble.mode[5:]) == {""}
     kept = several.ensemble(parameters={"a": a[:5]}, samples=[0.0, 0.1, 0.7, 2.0, 6.5], engine=engine, tolerance=1e-6)
     assert_as_single_runs(kept)
@@ -166,3 +168,34 @@ def test_nothing_varied_is_one_run():
 def test_instances_of_short_runs_have_their_own_default_relaxation():
     ensemble = hsdsl.load(OSCILLATOR).ensemble(parameters={"c": [0.5, 0.6]}, until=0.5, scheme="relaxed")
     assert_as_single_runs(ensemble)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_transition_is_kept_with_the_states_around_it(engine, monkeypatch):
+    monkeypatch.setattr("hsdsl.simulate.ensemble.LOG_ROOM", 2)
+    several = model(MODES)
+    ensemble = several.ensemble(
+        parameters={"a": [0.5, 0, 2, 4]}, every_transition=True, engine=engine, tolerance=1e-6, scheme="relaxed"
+    )
+    table = ensemble.transition_table
+    assert table.first.tolist() == [0, *np.cumsum(ensemble.transitions)] and ensemble.transitions[2] > 2
+    for k in (0, 2, 3):
+        made, here = ensemble.run(k).transitions, table.of(k)
+        assert table.time[here].tolist() == [t.time for t in made]
+        assert table.edge[here].tolist() == [t.edge for t in made]
+        assert table.entry[here].tolist() == [t.entry for t in made]
+        for kept, own in ((table.before, [t.before for t in made]), (table.after, [t.after or {} for t in made])):
+            for name, column in kept.items():
+                assert same(column[here], np.array([state.get(name, float("nan")) for state in own])), (k, name)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_samples_at_multiples_of_an_expression(engine):
+    ensemble = model(MODES).ensemble(parameters={"a": [1, 0, 0.25]}, samples="a/3", engine=engine, tolerance=1e-6)
+    assert ensemble.sample_times.shape == (3, 10)
+    assert same(ensemble.sample_times[2], np.minimum(np.arange(10) * (0.25 / 3), 0.75))
+    assert np.isnan(ensemble.sample_times[1]).all()
+    one = model(MODES).ensemble(parameters={"a": [0.25]}, samples=ensemble.sample_times[2], tolerance=1e-6)
+    assert same(ensemble.samples["energy"][2], one.samples["energy"][0])
+    with pytest.raises(UsageError, match="must be positive, not -1"):
+        model(MODES).ensemble(parameters={"a": [1]}, samples="-a")

@@ -35,8 +35,22 @@ static void sample_chunk(hs_ensemble *e, int at_end) {
   e->next += count;
 }
 
+/* Put the transitions of the chunk into the log. */
+static void log_transitions(hs_ensemble *e) {
+  const hs_chunk *chunk = &e->task.chunk;
+  const int64_t w = e->task.model->width;
+  for (int64_t i = 0; i < chunk->transitions; i++) {
+    if (e->logged == e->log_room) e->drain(e);
+    e->log[e->logged] = chunk->transition[i];
+    copy(e->before + e->logged * w, chunk->before + i * w, (int)w);
+    copy(e->after + e->logged * w, chunk->after + i * w, (int)w);
+    e->logged++;
+  }
+}
+
 static void note_transitions(hs_ensemble *e) {
   const hs_chunk *chunk = &e->task.chunk;
+  if (e->log_room) log_transitions(e);
   for (int64_t i = 0; i < chunk->transitions && e->made + i < e->most_transitions; i++)
     e->crossed[e->done * e->most_transitions + e->made + i] = chunk->transition[i].time;
   e->made += chunk->transitions;

@@ -233,7 +233,7 @@ typedef struct {
 HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
 
 /* Many instances of one model: `task` must come first; of each run only the results below are kept. */
-typedef struct {
+typedef struct hs_ensemble {
   hs_task task;
   hs_sampling sampling; /* of one chunk, with memory for all samples of an instance */
   int64_t instances, samples, most_transitions;
@@ -256,6 +256,10 @@ typedef struct {
   int64_t base, made, next;    /* of the instance under way: the chunk's first row, transitions, samples */
   int32_t layout;              /* of its last arc, the first one's being 0 */
   int32_t *layouts;            /* (arc_room) */
+  int64_t log_room, logged;    /* transitions of all instances, one instance's behind the other's; no room: none */
+  hs_transition *log;
+  double *before, *after;      /* (log_room, width): states around a transition */
+  int (*drain)(struct hs_ensemble *); /* takes the log where it is full, and makes it empty */
 } hs_ensemble;
 
 /* Run the instances one after the other; those from `done` on were not run to their end. */
