@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from textwrap import fill
 from typing import Any
 
 from writing.markdown import table
@@ -66,10 +67,13 @@ def integrator_page() -> str:
         error = f"; embedded method of order {method.estimated_order}" if method.adaptive else ""
         error += f", and a coarser one of order {method.estimated_order - 2}" if method.coarse else ""
         known = "" if method.digits is None else f" Coefficients of {method.digits} digits."
-        parts.append(f"## {name}\n\n{method.title}, order {method.order}{error}. Inside a step: {between}.{known}\n\n")
+        about = f"{method.title}, order {method.order}{error}. Inside a step: {between}.{known}"
+        parts.append(f"## {name}\n\n{fill(about, 120)}\n\n")
         parts.append(f"Source: {method.source}. [Coefficients](coefficients.md#{name}).\n\n")
-    parts.append(f"## {taylor.name}\n\n{taylor.title}. {TAYLOR}\n\nSource: {taylor.source}.\n")
-    parts.append(f"\n## {radau.name}\n\n{radau.title}, order {radau.order}. {RADAU}\n\nSource: {radau.source}.\n")
+    about = fill(f"{taylor.title}. {TAYLOR}", 120)
+    parts.append(f"## {taylor.name}\n\n{about}\n\nSource: {taylor.source}.\n")
+    about = fill(f"{radau.title}, order {radau.order}. {RADAU}", 120)
+    parts.append(f"\n## {radau.name}\n\n{about}\n\nSource: {radau.source}.\n")
     return "".join(parts)
 
 

@@ -22,24 +22,24 @@ DOCS = EXAMPLES.parent / "docs"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what is asked for; return the exit code."""
+    """Run what is chosen; return the exit code."""
     known = entries()
-    asked = _parser().parse_args(arguments)
-    if unknown := sorted({*asked.only} - set(known)):
+    given = _parser().parse_args(arguments)
+    if unknown := sorted({*given.only} - set(known)):
         print(f"gallery: there is no scene '{unknown[0]}'; the scenes are {', '.join(known)}", file=sys.stderr)
         return 2
-    chosen = [known[name] for name in asked.only or known]
-    file = asked.out / "gallery.json"
-    if not asked.page:
-        _run(file, chosen, _settings(asked.tools), asked.processes)
-    if asked.pictures if asked.pictures is not None else not asked.page:
-        (asked.out / "images" / "gallery").mkdir(parents=True, exist_ok=True)
+    chosen = [known[name] for name in given.only or known]
+    file = given.out / "gallery.json"
+    if not given.page:
+        _run(file, chosen, _settings(given.tools), given.processes)
+    if given.pictures if given.pictures is not None else not given.page:
+        (given.out / "images" / "gallery").mkdir(parents=True, exist_ok=True)
         for entry in chosen:
             _say(f"{entry.name}: picture")
             scipy = [r for r in read(file).of(entry.name, "scipy") if r.setting.tolerance == DRAWN_AT]
             wrong = any(r.outcome.word == "wrong" for r in scipy)
-            draw(entry, asked.out / "images" / "gallery" / f"{entry.name}.svg", wrong)
-    (asked.out / "gallery.md").write_text(page(read(file), list(known.values())), encoding="utf-8")
+            draw(entry, given.out / "images" / "gallery" / f"{entry.name}.svg", wrong)
+    (given.out / "gallery.md").write_text(page(read(file), list(known.values())), encoding="utf-8")
     return 0
 
 

@@ -28,7 +28,7 @@ from hsdsl.cli.options import (
     settings_of,
 )
 from hsdsl.errors import UsageError
-from hsdsl.export import TARGETS, check_folder, files_of, source_of, write
+from hsdsl.export import TARGETS, check_folder, check_scheme, files_of, source_of, write
 
 TO = f"The target: {', '.join(TARGETS)}."
 OUT = "The folder for the files; left out, a target with one file of text prints it."
@@ -65,6 +65,7 @@ def export(
             completion=completion,
         )  # fmt: skip
         loaded = load(model)
+        check_scheme(loaded, to, settings)
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
         files = files_of(source, to)
         if out is None:
@@ -76,5 +77,4 @@ def export(
         if json:
             print_json({"target": to, "files": [str(path) for path in written]})
         elif not quiet:
-            for path in written:
-                say(f"wrote {path}")
+            say(f"wrote {written[0] if len(written) == 1 else f'{len(written)} files below {out}'}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from hsdsl.cli.console import print_json, say
+from hsdsl.cli.console import counted, print_json, say
 from hsdsl.cli.options import Json, Limit, Quiet, Until, answering, check_target, option
 from hsdsl.errors import UsageError
 
@@ -48,4 +48,4 @@ def import_(
         if json:
             print_json({"file": str(out), "modes": len(system.modes), "transitions": edges})
         elif not quiet:
-            say(f"wrote {out}: {len(system.modes)} modes, {edges} transitions")
+            say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")

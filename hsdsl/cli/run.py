@@ -98,7 +98,7 @@ def run(
     stop = result.stop
     if not stop.complete:
         if not json:
-            say(f"hsdsl: stopped ({stop.reason}): {stop.message}")
+            say(f"hsdsl: stopped ({stop.reason})" + (f": {stop.message}" if quiet else ""))
         raise Exit(INTERRUPTED if stop.reason == "interrupted" else STOPPED)
 
 

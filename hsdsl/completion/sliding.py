@@ -67,8 +67,15 @@ def _pairs(system: HybridSystem) -> Iterator[tuple[Mode, Edge, Mode, Edge]]:
             if a.states == b.states and a.states:
                 for out in a.edges:
                     for back in b.edges:
-                        if out.target == b.name and back.target == a.name and _opposite(out, back):
+                        to_and_fro = out.target == b.name and back.target == a.name and _opposite(out, back)
+                        if to_and_fro and not _first(a, out) & _first(b, back):
                             yield a, out, b, back
+
+
+def _first(mode: Mode, edge: Edge) -> set[str]:
+    """The modes that edges of higher priority on the same surface lead to; a common one is sliding that is written."""
+    r = edge.surface.residual
+    return {e.target for e in mode.edges if e.priority > edge.priority and sp.expand(e.surface.residual - r) == 0}
 
 
 def _opposite(out: Edge, back: Edge) -> bool:

@@ -11,10 +11,10 @@ import sympy as sp
 
 from hsdsl.completion.contact import LONG, Contact, cancelled, contact
 from hsdsl.completion.printer import inequality, text_of, wall
-from hsdsl.completion.sliding import slidings
+from hsdsl.completion.sliding import Sliding, slidings
 from hsdsl.expression.scope import symbol
 from hsdsl.source import Mapping, Node, Text, child
-from hsdsl.system import Edge, HybridSystem, Mode
+from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 TIME_OF_CONTACT = "1e-6"
 
@@ -33,9 +33,29 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     for sliding in surfaces:
         for entry in sliding.entries:
             writer.add_transition(entry.source, _transition(entry))
-    for mode, name in [(s.mode, s.mode.name) for s in surfaces] + [writer.add_contact(*found) for found in contacts]:
-        writer.add_mode(mode, name)
+    slide = [(_leaving_on_surface(s), s.mode.name) for s in surfaces]
+    for mode, name in slide + [writer.add_contact(*found) for found in contacts]:
+        writer.add_mode(_without_constant_guards(mode, system), name)
     return writer.result()
+
+
+def _leaving_on_surface(found: Sliding) -> Mode:
+    """The mode of a sliding, left on the surface also where that is affine: a reader of the text can rely on it."""
+    mode, r = found.mode, found.entries[0].surface.residual
+    states = tuple(map(symbol, mode.states))
+    slopes = [sp.diff(r, x) for x in states]
+    size = sum(slope**2 for slope in slopes)
+    if size == 0 or size.free_symbols & {TIME, *states}:
+        return mode
+    onto = tuple(cancelled(x - r * slope / size) for x, slope in zip(states, slopes, strict=True))
+    leave = [replace(edge, reset=onto) if edge.reset == states else edge for edge in mode.edges[:2]]
+    return replace(mode, edges=(*leave, *mode.edges[2:]))
+
+
+def _without_constant_guards(mode: Mode, system: HybridSystem) -> Mode:
+    """The mode without transitions that parameters alone decide: where it is entered they do not fire, nor later."""
+    fixed = {symbol(parameter.name) for parameter in system.parameters}
+    return replace(mode, edges=tuple(edge for edge in mode.edges if edge.surface.residual.free_symbols - fixed))
 
 
 class _Writer:
@@ -111,9 +131,11 @@ class _Writer:
         """Add a mode behind the others."""
         node = child(self._root, "modes")
         assert node is not None
-        block = f"{name}:\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
+        end = "" if mode.edges else "  # hsdsl: ignore[HS425] no transition leads out of this motion"
+        block = f"{name}:{end}\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
         edges = ", ".join(_flow_style(_transition(edge)) for edge in mode.edges)
-        parts = [f"flow: {_flow_style(_flow(mode))}", *_rest(mode, self._system), f"transitions: [{edges}]"]
+        parts = [f"flow: {_flow_style(_flow(mode))}", *_rest(mode, self._system)]
+        parts += [f"transitions: [{edges}]"] if mode.edges else []
         self._append(node, f"{name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
 
     def _append(self, node: Node, inline: str, block: str) -> None:
@@ -183,7 +205,8 @@ def _mode_lines(mode: Mode, system: HybridSystem) -> Iterator[str]:
     yield "flow:"
     yield from (f"  {state}: {text}" for state, text in _flow(mode).items())
     yield from _rest(mode, system)
-    yield "transitions:"
+    if mode.edges:
+        yield "transitions:"
     yield from (f"  - {_flow_style(fields)}" for fields in map(_transition, mode.edges))
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hsdsl.export.source import Source
     from hsdsl.model import Model
 
-__all__ = ["TARGETS", "check_folder", "files_of", "source_of", "write"]
+__all__ = ["TARGETS", "check_folder", "check_scheme", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
@@ -33,6 +33,9 @@ TARGETS = {
 }
 
 
+DOCUMENTS = ("latex", "mermaid")  # targets that do not run
+
+
 def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     """The source of a model with arguments of `Model.simulate` (`hsdsl.export.source`, imported when it is called)."""
     from hsdsl.export.source import source_of
@@ -45,9 +48,22 @@ def files_of(source: Source, target: str) -> dict[str, bytes]:
 
     Raises UsageError: an unknown target, or a model that the target cannot keep.
     """
+    _check_target(target)
+    return import_module(f"hsdsl.export.{target}").files(source)
+
+
+def _check_target(target: str) -> None:
     if target not in TARGETS:
         raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS) or _choices())
-    return import_module(f"hsdsl.export.{target}").files(source)
+
+
+def check_scheme(model: Model, target: str, arguments: Mapping[str, Any]) -> None:
+    """Refuse a scheme that no code has, before anything else about it: the two documents of a model have none."""
+    _check_target(target)
+    given = {"scheme": arguments.get("scheme"), "step": 1}  # a step, since some schemes are refused without one
+    scheme = model.resolve(arguments.get("settings"), given).values["scheme"].value
+    if scheme == "paoli-schatzman" and target not in DOCUMENTS:
+        raise UsageError(f"{target} has no scheme '{scheme}'", "--scheme relaxed or --scheme located")
 
 
 def _choices() -> str:

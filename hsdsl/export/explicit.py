@@ -20,8 +20,9 @@ def explicit(source: Source, target: str, scheme: str | None = None) -> tuple[So
         raise UsageError(f"{target} has no scheme '{settings.scheme}'", "--scheme relaxed or --scheme located")
     known = ", ".join(INTEGRATORS)
     if method.implicit:
-        why = "the model is stiff: an explicit one takes many small steps, if you want it"
-        raise UsageError(f"{target} has explicit methods ({known}), not {method.name}", f"{why} with --method {AUTO}")
+        stiff = "the model is stiff: an explicit one takes many small steps, if you want it with "
+        hint = f"{'' if settings.method_chosen is None else stiff}--method {AUTO}"
+        raise UsageError(f"{target} has explicit methods ({known}), not {method.name}", hint)
     if method.kind != "table" and settings.method_chosen is None:
         raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {AUTO}")
     table = method if method.kind == "table" else INTEGRATORS[AUTO]

@@ -32,9 +32,10 @@ def _lines(fit: Fit) -> Iterator[str]:
     width = max(map(len, fit.values))
     for name, value in fit.values.items():
         deviation = fit.deviations[name]
-        known = f"+- {number(deviation, 3)}" if np.isfinite(deviation) else "not determined by the measurements"
+        determined = bool(np.isfinite(deviation))
+        known = f"+- {number(deviation, 3)}" if determined else "not determined by the measurements"
         bound = ", at its bound" if name in fit.at_bound else ""
-        yield f"  {name:{width}}  {number(value, 12)} {known}{bound}"
+        yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{bound}"
     yield f"left over: {number(fit.deviation, 4)} (weighted root mean square)"
     yield f"{'ended' if fit.success else 'did not end'} well: {fit.message}"
     yield from (f"not smooth: {reason}" for reason in fit.nonsmooth)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,8 @@ from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
 
+MOST_ALIKE = 3  # of reasons that differ in numbers only
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
@@ -67,8 +70,26 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     yield "outputs", values({name: value for name, value in final.outputs.items() if value == value})
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
-    yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(execution.verdict.reasons))))
+    yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(_reasons(execution)))))
     yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
+
+
+def _reasons(execution: Execution) -> list[str]:
+    """The reasons of the verdict; a stop that the lines above describe is only named."""
+    reason, message = execution.stop.reason, execution.stop.message
+    return condensed([text.replace(message, f"the run stops ({reason})") for text in execution.verdict.reasons])
+
+
+def condensed(reasons: Sequence[str]) -> list[str]:
+    """The same reasons; of those that differ in numbers only the first few, and how many more there are."""
+    groups: dict[str, list[str]] = {}
+    for reason in reasons:
+        groups.setdefault(NUMBER.sub("#", reason), []).append(reason)
+    found: list[str] = []
+    for alike in groups.values():
+        more = len(alike) - MOST_ALIKE
+        found += alike if more <= 1 else [*alike[:MOST_ALIKE], f"{more} more like this"]
+    return found
 
 
 def stop(execution: Execution) -> str:

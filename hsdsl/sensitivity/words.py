@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from hsdsl.report.json_form import plain
-from hsdsl.report.words import number
+from hsdsl.report.words import condensed, number
 from hsdsl.sensitivity.result import EndSlopes, Sensitivity, TransitionSlopes
 from hsdsl.sensitivity.ties import Tie
 
@@ -68,7 +68,8 @@ def _lines(found: Sensitivity, parts: Sequence[str]) -> Iterator[str]:
     run = found.execution
     yield f"{run.title or run.model}: derivatives by {', '.join(found.wrt)}"
     answer = {True: "yes", False: "no", None: "not known"}[found.exists]
-    yield f"they exist: {answer}" + "".join(f"\n  {reason}" for reason in found.reasons if not found.exists)
+    reasons = [] if found.exists else condensed(found.reasons)
+    yield f"they exist: {answer}" + "".join(f"\n  {reason}" for reason in reasons)
     if "final" in parts:
         yield from _final(found)
     for edge, side in found.sides.items() if found.breaks else ():

@@ -15,6 +15,7 @@ import pytest
 from hsdsl import decimals, report
 from hsdsl.execution import Verdict
 from hsdsl.report.html import html
+from hsdsl.report.words import condensed
 
 FIFTY = decimals.context_of(50)
 
@@ -119,6 +120,12 @@ def test_json_lines_are_short_and_break_only_where_they_must():
     assert all(len(line) <= 100 for line in text.splitlines())
     assert '  "settings": {"until": 3.0, "step": 0.001, "relaxation": 1e-06, "tolerance": null},' in text.splitlines()
     assert '    "outputs": {"double": null}' in text.splitlines()  # a line of 101 characters would not do
+
+
+def test_reasons_that_differ_in_numbers_are_listed_once_each_kind_is_known():
+    slides = [f"sliding from t = {k}.5 to t = {k + 1}e-3" for k in range(9)]
+    assert condensed([*slides, "at rest"]) == [*slides[:3], "6 more like this", "at rest"]
+    assert condensed(slides[:4]) == slides[:4]
 
 
 def test_summary_to_the_letter():

@@ -20,7 +20,7 @@ from hsdsl.lint.analysis.wording import at, number, within
 from hsdsl.lint.finding import Alike, Finding
 from hsdsl.lint.subject import EdgePart, Subject
 from hsdsl.lower.straight import replaced
-from hsdsl.system import TIME, Mode
+from hsdsl.system import TIME, Edge, Mode
 
 MOST_PAIRS = 100  # that are followed: each takes a hundred times as long as to see whether two guards overlap
 
@@ -138,6 +138,8 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
     left = MOST_PAIRS
     for part in subject.modes:
         for first, second in combinations(part.edges, 2):
+            if _ordered(first.edge, second.edge):
+                continue
             overlaps = together(subject.dynamics, first.edge, second.edge)
             if not any(subject.dynamics.ask(part.mode, overlap).somewhere for overlap in overlaps):
                 continue
@@ -148,6 +150,11 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
             left -= 1
             _follow_both_orders(subject.dynamics, part.mode, first, second, overlaps, alike)
     yield from alike
+
+
+def _ordered(first: Edge, second: Edge) -> bool:
+    """Whether two edges on one surface have an order: every run reaches both at once, and round-off decides nothing."""
+    return first.priority != second.priority and first.surface.residual == second.surface.residual
 
 
 def _follow_both_orders(
@@ -170,10 +177,17 @@ def _follow_both_orders(
     residuals = [dynamics.residual(edge.edge.surface) for edge in (first, second)]
     where = at(dynamics, mode, answer, residuals)
     message = f"the guards of '{first.edge.name}' and '{second.edge.name}' overlap, {where}; {then}"
-    hint = None if proof else "separate them with `if`, or say with `priority` which goes first"
+    hint = None if proof else _separate(first.edge, second.edge)
     severity = "note" if proof else "warning"
     kind = (then, *(dynamics.rate(mode, residual) for residual in residuals))
     alike.add(kind, Finding(second.document.when.place.span, message, hint, decided, severity=severity))
+
+
+def _separate(first: Edge, second: Edge) -> str:
+    if first.priority == second.priority:
+        return "separate them with `if`, or say with `priority` which goes first"
+    winner = max(first, second, key=lambda edge: edge.priority)
+    return f"separate them with `if`; where both are reached '{winner.name}' goes first, by its priority"
 
 
 _UNPROVED = {

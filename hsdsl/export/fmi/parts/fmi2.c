@@ -15,7 +15,7 @@ typedef struct {
   double reached;
 } instance;
 
-static fmi2Status said(instance *own, fmi2Status status, const char *message) {
+static fmi2Status logged(instance *own, fmi2Status status, const char *message) {
   if (own->callbacks.logger)
     own->callbacks.logger(own->callbacks.componentEnvironment, own->name, status, "logStatusError", "%s", message);
   return status;
@@ -23,12 +23,12 @@ static fmi2Status said(instance *own, fmi2Status status, const char *message) {
 
 static fmi2Status answer(instance *own, fmu_status status) {
   if (status == FMU_OK) return fmi2OK;
-  if (status == FMU_NO_VALUE) return said(own, fmi2Discard, "something has no finite value here");
-  return said(own, fmi2Error, own->unit->complaint ? own->unit->complaint : "not allowed here, or without a value");
+  if (status == FMU_NO_VALUE) return logged(own, fmi2Discard, "something has no finite value here");
+  return logged(own, fmi2Error, own->unit->complaint ? own->unit->complaint : "not allowed here, or without a value");
 }
 
 static fmi2Status none(fmi2Component i, size_t count) {
-  return count ? said(i, fmi2Error, "this unit has none of these variables") : fmi2OK;
+  return count ? logged(i, fmi2Error, "this unit has none of these variables") : fmi2OK;
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -195,7 +195,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component i, fmi2EventInfo *info) {
   info->terminateSimulation = own->unit->now.ended != 0;
   info->nextEventTimeDefined = next - next == 0;
   info->nextEventTime = info->nextEventTimeDefined ? next : 0.0;
-  if (own->unit->complaint && own->unit->now.ended) said(own, fmi2Warning, own->unit->complaint);
+  if (own->unit->complaint && own->unit->now.ended) logged(own, fmi2Warning, own->unit->complaint);
   return answer(own, status);
 }
 
@@ -254,12 +254,12 @@ fmi2Status fmi2DoStep(fmi2Component i, fmi2Real point, fmi2Real size, fmi2Boolea
   int event = 0;
   (void)no_state_before;
   const fmu_status status = fmu_step(own->unit, point + size, &own->reached, &event);
-  if (own->unit->complaint && own->unit->now.ended) said(own, fmi2Warning, own->unit->complaint);
+  if (own->unit->complaint && own->unit->now.ended) logged(own, fmi2Warning, own->unit->complaint);
   if (status) return answer(own, status);
   return own->unit->now.ended ? fmi2Discard : fmi2OK;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component i) { return said(i, fmi2Error, "steps are made at once"); }
+fmi2Status fmi2CancelStep(fmi2Component i) { return logged(i, fmi2Error, "steps are made at once"); }
 
 fmi2Status fmi2GetStatus(fmi2Component i, const fmi2StatusKind kind, fmi2Status *value) {
   (void)i, (void)kind;

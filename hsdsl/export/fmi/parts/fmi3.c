@@ -23,21 +23,21 @@ typedef struct {
   fmi3Boolean logs;
 } instance;
 
-static fmi3Status said(instance *own, fmi3Status status, const char *message) {
+static fmi3Status logged(instance *own, fmi3Status status, const char *message) {
   if (own->log) own->log(own->environment, status, status == fmi3Error ? "logStatusError" : "logEvents", message);
   return status;
 }
 
 static fmi3Status answer(instance *own, fmu_status status) {
   if (status == FMU_OK) return fmi3OK;
-  if (status == FMU_NO_VALUE) return said(own, fmi3Discard, "something has no finite value here");
-  return said(own, fmi3Error, own->unit->complaint ? own->unit->complaint : "not allowed here, or without a value");
+  if (status == FMU_NO_VALUE) return logged(own, fmi3Discard, "something has no finite value here");
+  return logged(own, fmi3Error, own->unit->complaint ? own->unit->complaint : "not allowed here, or without a value");
 }
 
 static fmi3Status refuse(fmi3Instance instance_, const char *function) {
   char message[120];
   snprintf(message, sizeof message, "%s: this unit has none of these variables", function);
-  return said(instance_, fmi3Error, message);
+  return logged(instance_, fmi3Error, message);
 }
 
 static instance *new_instance(fmi3String token, int co_simulation, fmi3Boolean logs, fmi3InstanceEnvironment environment,
@@ -344,7 +344,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *more, fmi3Boole
   *terminate = own->unit->now.ended != 0;
   *next_defined = time - time == 0;
   *next = *next_defined ? time : 0.0;
-  if (own->unit->complaint && own->unit->now.ended) said(own, fmi3Warning, own->unit->complaint);
+  if (own->unit->complaint && own->unit->now.ended) logged(own, fmi3Warning, own->unit->complaint);
   return answer(own, status);
 }
 
@@ -415,7 +415,7 @@ fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 point, fmi3Float64 size, fmi3B
   *early = *last < point + size && own->unit->early_return_allowed;
   *event = handled && own->unit->event_mode_used && *early;
   *terminate = own->unit->now.ended != 0;
-  if (own->unit->complaint && own->unit->now.ended) said(own, fmi3Warning, own->unit->complaint);
+  if (own->unit->complaint && own->unit->now.ended) logged(own, fmi3Warning, own->unit->complaint);
   return answer(own, status);
 }
 
