@@ -21,6 +21,7 @@ HEAD = """<!-- Written by examples/gallery: edit the models and the code, not th
 {count} small scenes, one phenomenon each, all with exact solutions. One command runs every one of them with every
 scheme, method and engine of ours and with the tools that are installed:
 
+<!-- not run: takes an hour; tests/golden/test_gallery.py runs every scene -->
 ```console
 $ python examples/gallery
 ```

@@ -1,0 +1,190 @@
+"""The examples of README and docs, run as a reader would, in a folder that has only `models/` to begin with.
+
+Marks, each on the line before a fenced block:
+
+    <!-- file: NAME -->          the block becomes the file NAME
+    <!-- run -->                 the block is run: Python, or lines that begin with `$ ` with what they print below
+    <!-- run: exit N -->         as `run`, with another exit code than 0
+    <!-- run with: A B -->       as `run`, where these programs and modules are installed
+    <!-- not run: REASON -->     a block with commands that is not run
+    <!-- prints -->              what the Python block before printed
+
+`...` in expected output stands for anything, and blanks do not count. `hsdsl` and Python run in this process. Every
+block of commands or of Python has a mark, and `hsdsl` in the running text names verbs and options that exist.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from subprocess import PIPE, STDOUT
+from typing import NamedTuple
+
+import pytest
+from typer import Context
+
+from hsdsl.cli import main
+from hsdsl.cli.verbs import VERBS, command
+
+ROOT = Path(__file__).parent.parent.parent
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+BLOCK = re.compile(
+    r"^(?P<indent> *)(?:<!-- (?P<mark>[^>\n]*?) -->\n\s*)?```(?P<language>\w*)\n(?P<text>.*?)^(?P=indent)```$",
+    re.MULTILINE | re.DOTALL,
+)
+SHELL = ("console", "sh", "bash")
+MARKED = (*SHELL, "python")
+MARK = re.compile(r"file: \S+|run(: exit \d+| with: .+)?|not run: \w.+|prints|setup-and-(run|test)")
+INLINE = re.compile(r"`hsdsl ([^`]+)`")
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+class Block(NamedTuple):
+    kind: str
+    argument: str
+    language: str
+    text: str
+
+
+def blocks(page: Path) -> list[Block]:
+    found = []
+    for match in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        kind, _, argument = (match["mark"] or "").partition(": ")
+        lines = [line.removeprefix(match["indent"]) for line in match["text"].splitlines(keepends=True)]
+        found.append(Block(kind, argument, match["language"], "".join(lines)))
+    return found
+
+
+def commands(text: str) -> Iterator[tuple[str, str]]:
+    """Split a console block into commands and what they print; without `$ ` each line is a command."""
+    if "$ " not in text:
+        yield from ((line, "...\n") for line in text.replace("\\\n", " ").splitlines())
+        return
+    for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+        line, _, output = part.partition("\n")
+        yield line, output
+
+
+def run(line: str) -> tuple[int, str]:
+    """Run a command in the present folder: its exit code and what it prints, both streams in one."""
+    line, _, target = line.partition(" > ")
+    program, *arguments = shlex.split(line)
+    if program == "hsdsl":
+        code, output = run_hsdsl(arguments)
+    else:
+        program = sys.executable if program == "python" else program
+        done = subprocess.run([program, *arguments], stdout=PIPE, stderr=STDOUT, text=True, check=False)
+        code, output = done.returncode, done.stdout
+    if target:
+        Path(target).write_text(output, encoding="utf-8")
+    return code, "" if target else output
+
+
+def run_hsdsl(arguments: list[str]) -> tuple[int, str]:
+    stream = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
+        patch.setattr(sys, "argv", ["hsdsl", *arguments])
+        with pytest.raises(SystemExit) as stop:
+            main()
+    code = stop.value.code
+    return (code if isinstance(code, int) else 0), stream.getvalue()
+
+
+def run_python(text: str) -> tuple[int, str]:
+    stream = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(stream):
+            exec(compile(text, "<example>", "exec"), {"__name__": "__main__"})
+    except Exception:
+        traceback.print_exc(file=stream)
+        return 1, stream.getvalue()
+    return 0, stream.getvalue()
+
+
+def installed(name: str) -> bool:
+    return shutil.which(name) is not None or find_spec(name) is not None
+
+
+def assert_prints(expected: str, got: str) -> None:
+    checker = doctest.OutputChecker()
+    if expected != "...\n" and not checker.check_output(expected, got, FLAGS):
+        pytest.fail(checker.output_difference(doctest.Example("", expected), got, FLAGS))
+
+
+RUNNABLE = [name for name in NAMES if any(block.kind.startswith("run") for block in blocks(ROOT / name))]
+    name for name, page in zip(NAMES, PAGES, strict=True) if any(b.kind.startswith("run") for b in blocks(page))
+]
+
+
+@pytest.fixture
+def reader(tmp_path, monkeypatch):
+    """A reader's folder, and a terminal of 120 columns without colours."""
+    for name in ("models", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", RUNNABLE)
+def test_examples_run_and_print_what_the_page_says(name, reader):
+    printed = ""
+    for kind, argument, language, text in blocks(ROOT / name):
+        expected_code = int(argument.removeprefix("exit ")) if kind == "run" and argument else 0
+        if kind == "file":
+            (reader / argument).write_text(text, encoding="utf-8")
+        elif kind == "prints":
+            assert_prints(text, printed)
+        elif kind in ("run", "run with"):
+            if kind == "run with" and not all(map(installed, argument.split())):
+                continue
+            if language == "python":
+                code, printed = run_python(text)
+                assert code == expected_code, printed
+                continue
+            for line, expected in commands(text):
+                code, output = run(line)
+                assert code == expected_code, f"{line}\n{output}"
+                assert_prints(expected, output)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_block_of_commands_has_a_mark(name):
+    for block in blocks(ROOT / name):
+        mark = block.kind + (f": {block.argument}" if block.argument else "")
+        if block.language in MARKED:
+            assert MARK.fullmatch(mark), f"{name}: expected a mark above this block, got '{mark}':\n{block.text}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_commands_in_the_text_exist(name):
+    """Verbs and options in the running text; values are not tried."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for found in INLINE.findall(re.sub(r"\s*\n\s*", " ", text)):
+        verb, *words = found.split()
+        if not re.fullmatch(r"[a-z]+", verb) or name == "docs/reference/mistakes.md":
+            continue
+        assert verb in VERBS, f"{name}: hsdsl {found}"
+        verb = command(verb)
+        options = {flag for p in verb.get_params(Context(verb)) for flag in (*p.opts, *p.secondary_opts)}
+        for word in words:
+            option = word.partition("=")[0].strip(",;.|[]")
+            assert not option.startswith("--") or option in options, f"{name}: hsdsl {found}"
+
+
+def test_tutorial_and_readme_have_examples_that_run():
+    assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md"}
