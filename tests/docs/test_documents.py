@@ -123,8 +123,6 @@ def assert_prints(expected: str, got: str) -> None:
 
 
 RUNNABLE = [name for name in NAMES if any(block.kind.startswith("run") for block in blocks(ROOT / name))]
-    name for name, page in zip(NAMES, PAGES, strict=True) if any(b.kind.startswith("run") for b in blocks(page))
-]
 
 
 @pytest.fixture
