@@ -201,6 +201,8 @@ class Program:
     ``contacts`` are motions along guards of modes: each has the name, states and walls of its mode and, in the place of
     the edge that it is in contact with, one that releases it.
 
+    ``initial_uses`` says that initial values use each other.
+
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
     """
 
@@ -222,6 +224,7 @@ class Program:
     switches: tuple[Switch, ...] = ()
     switching: Routines = NOTHING
     scaled_states: tuple[str, ...] = ()
+    initial_uses: bool = False
     contacts: tuple[ModeProgram, ...] = ()
 
     @property

@@ -10,7 +10,7 @@ Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with its p
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
@@ -158,11 +158,48 @@ class Definition:
 
 
 @dataclass(frozen=True)
+class FunctionText:
+    """A function of the file as it was written; its calls are written out everywhere."""
+
+    name: str
+    arguments: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True)
 class Initial:
-    """Where a run starts: a mode and expressions of parameters for its states (file order)."""
+    """Where a run starts: a mode and expressions of parameters for its states (file order).
+
+    ``written`` is given where values use each other: the values over parameters and the symbols of the states whose
+    values they use, each behind those.
+    """
 
     mode: str
     values: tuple[tuple[str, sp.Expr], ...]
+    written: tuple[tuple[str, sp.Expr], ...] = ()
+
+    @property
+    def in_order(self) -> tuple[tuple[str, sp.Expr], ...]:
+        """The values, each behind those that it uses."""
+        return self.written or self.values
+
+    def following(self, given: Iterable[str]) -> tuple[tuple[str, sp.Expr], ...]:
+        """The other values over parameters and the symbols of the states whose values are given."""
+        known: dict[Any, Any] = {symbol(name): symbol(name) for name in given}
+        for name, value in self.in_order:
+            known.setdefault(symbol(name), sp.sympify(value).xreplace(known))
+        names = (name for name, _ in self.values)
+        return tuple((name, known[symbol(name)]) for name in names if known[symbol(name)] != symbol(name))
+
+
+def started(mode: str, names: Iterable[str], in_order: Sequence[tuple[str, sp.Expr]]) -> Initial:
+    """Where a run starts, of values over parameters and earlier ones; ``names`` are the states in file order."""
+    known: dict[Any, Any] = {}
+    for name, value in in_order:
+        known[symbol(name)] = sp.sympify(value).xreplace(known)
+    used = set().union(*(sp.sympify(value).free_symbols for _, value in in_order))
+    written = tuple(in_order) if used & known.keys() else ()
+    return Initial(mode, tuple((name, known[symbol(name)]) for name in names), written)
 
 
 @dataclass(frozen=True)
@@ -234,6 +271,7 @@ class HybridSystem:
     files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
     scene: tuple[Shape, ...] = ()
     definitions: tuple[Definition, ...] = ()  # for people: they are substituted everywhere
+    functions: tuple[FunctionText, ...] = ()
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

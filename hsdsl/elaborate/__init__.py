@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 from hsdsl import limits
 from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units, substituted_definitions
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
+from hsdsl.elaborate.functions import define_functions, named_functions
 from hsdsl.elaborate.inputs import define_inputs, switch_name
 from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
 from hsdsl.elaborate.reference import elaborate_reference
@@ -18,7 +19,7 @@ from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
 from hsdsl.elaborate.scene import elaborate_scene, scene_of
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
-from hsdsl.expression.scope import Refusal, Scope, Value, symbol
+from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
@@ -112,6 +113,7 @@ def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
 def _system(symbols: SymbolTable) -> HybridSystem:
     """The system, its parts in the order in which they build upon each other."""
     document = symbols.document
+    functions = define_functions(symbols)
     parameters = define_parameters(symbols)
     inputs = define_inputs(symbols)
     define_lets(symbols)
@@ -140,6 +142,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         files=symbols.data,
         scene=scene,
         definitions=tuple(substituted_definitions(document)),
+        functions=functions,
     )
 
 
@@ -161,13 +164,13 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
         raise UsageError(f"{where}: working this expression out takes too long") from None
 
 
-def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Value | Refusal | None]:
+def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Meaning]:
     others = {"t": "the time", **dict.fromkeys(system.states, "a state")}
     others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
-    values: dict[str, Value | Refusal | None] = {
+    values: dict[str, Meaning] = {
         name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
     }
     for name in (parameter.name for parameter in system.parameters):
         late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
         values[name] = Value(symbol(name)) if name in usable else late
-    return values
+    return values | named_functions(system.functions, values)

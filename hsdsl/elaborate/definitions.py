@@ -27,7 +27,8 @@ def define_parameters(symbols: SymbolTable) -> tuple[Parameter, ...]:
         entry = symbols.document.parameters[name]
         entry = entry if isinstance(entry, ParameterEntry) else ParameterEntry.model_construct(value=entry)
         value = symbols.number(entry.value, scope, finite_now=True)
-        symbols.values[name] = earlier[name] = None if value is None else Value(symbol(name), value.number)
+        earlier[name] = None if value is None else Value(symbol(name), value.number)
+        symbols.values[name] = symbols.of_functions[name] = earlier[name]
         bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
         if value is not None:
             _check_bounds(symbols, name, entry.value, value, *bounds)
@@ -76,7 +77,8 @@ def substituted_definitions(document: ModelDocument) -> Iterator[Definition]:
 
 def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
     """The unit of each name that has one."""
-    known = [name for name, kind in symbols.names.items() if kind != "let"] + [*symbols.all_outputs, "t"]
+    known = [name for name, kind in symbols.names.items() if kind not in ("let", "functions")]
+    known += [*symbols.all_outputs, "t"]
     units: dict[str, str] = {}
     for key, scalar in symbols.document.units.items():
         if key not in known:

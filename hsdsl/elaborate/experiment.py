@@ -6,12 +6,13 @@ from __future__ import annotations
 from typing import Any
 
 from hsdsl.elaborate.edges import known_mode
-from hsdsl.elaborate.symbols import SymbolTable
+from hsdsl.elaborate.symbols import SymbolTable, cycle_among
 from hsdsl.errors import STEP_AND_TOLERANCE
-from hsdsl.expression.scope import Scope, Value
+from hsdsl.expression.scope import Scope, Value, state
+from hsdsl.expression.syntax import Name, walk
 from hsdsl.names import closest, did_you_mean, shown
 from hsdsl.source import ABSENT, Key, Scalar
-from hsdsl.system import Experiment, Initial
+from hsdsl.system import Experiment, Initial, started
 
 _POSITIVE = ("step", "tolerance", "relaxation")
 
@@ -19,14 +20,40 @@ _POSITIVE = ("step", "tolerance", "relaxation")
 def elaborate_initial(symbols: SymbolTable) -> Initial:
     """The initial mode and the values of its states."""
     document = symbols.document.initial
-    hint = "name the value under `parameters`, and write that name for both"
-    scope = symbols.parameter_scope("an initial value is an expression of parameters", hint)
     given: dict[Key, Scalar] = document.__pydantic_extra__
-    values = {str(key): symbols.number(scalar, scope, finite_now=True) for key, scalar in given.items()}
     mode = known_mode(symbols, document.mode)
     if mode is not None:
         _check_states(symbols, mode, given)
-    return Initial(mode or "", tuple((name, v.expr) for name, v in values.items() if v is not None))
+    texts = {str(key): scalar for key, scalar in given.items()}
+    values, written = dict[str, Value | None](), list[tuple[str, Any]]()
+    scope = symbols.parameter_scope("an initial value is an expression of parameters and of other initial values")
+    for name in _in_order(symbols, given):
+        values[name] = symbols.number(texts[name], Scope({**scope.values, **values}), finite_now=True)
+        own = {other: state(other) for other, value in values.items() if value is not None and other != name}
+        value = None if values[name] is None else symbols.number(texts[name], Scope({**scope.values, **own}))
+        written += [(name, value.expr)] if value is not None else []
+    known = {name for name, _ in written}
+    return started(mode or "", [name for name in texts if name in known], written)
+
+
+def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:
+    """The states with an initial value, each behind those whose value it uses; values in a cycle are left out."""
+    trees = {str(key): symbols.resolver.tree(scalar) for key, scalar in given.items()}
+    uses = {
+        name: [] if tree is None else [n.name for n in walk(tree) if isinstance(n, Name) and n.name in trees]
+        for name, tree in trees.items()
+    }
+    while (cycle := cycle_among(uses)) is not None:
+        path = " -> ".join((*cycle, cycle[0]))
+        place = next(scalar.place for key, scalar in given.items() if key == cycle[0])
+        message = f"the initial value of '{cycle[0]}' is defined by itself: {path}"
+        symbols.report(place, "HS302", message, "give one of them by numbers and parameters")
+        for name in cycle:
+            del uses[name]
+    ordered: list[str] = []
+    while waiting := [name for name in uses if name not in ordered]:
+        ordered += [name for name in waiting if not {*uses[name]} & {*waiting}]
+    return [name for name in ordered if trees[name] is not None]
 
 
 def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> None:

@@ -64,6 +64,21 @@ class ExpressionResolver:
             return None
         return value
 
+    def tree(self, scalar: Scalar) -> Tree | None:
+        """The tree of an expression whose names are looked up later."""
+        try:
+            return None if scalar.value == ABSENT else parse("" if scalar.kind == "null" else scalar.value)
+        except ExpressionError as error:
+            self._report(scalar, error)
+            return None
+
+    def names_known(self, scalar: Scalar, tree: Tree, scope: Scope) -> bool:
+        """Whether all names of an expression can be used; those that cannot are reported."""
+        faults = scope.faults(tree)
+        for fault in faults:
+            self._report(scalar, fault)
+        return not faults and not scope.broken(tree)
+
     def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
         """The SymPy Boolean of a condition."""
         return self._built(scalar, scope, "condition", lambda tree: symbolic.condition(tree, scope, scalar.value))
@@ -93,12 +108,10 @@ class ExpressionResolver:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, expected, scope)
-        faults = scope.faults(tree)
-        for fault in faults:
-            self._report(scalar, fault)
-        if expected == "inequality" and not (faults and isinstance(tree, Call)):
+        known = self.names_known(scalar, tree, scope)
+        if expected == "inequality" and not (isinstance(tree, Call) and scope.faults(tree)):
             the_comparison(tree, key, text)
-        return None if faults or scope.broken(tree) else tree
+        return tree if known else None
 
     def _report(self, scalar: Scalar, error: ExpressionError) -> None:
         hint = error.hint

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from hsdsl.system import Edge, HybridSystem, Mode
+from hsdsl.system import Edge, HybridSystem, Mode, started
 
 Node = tuple[str, str]  # a mode and one of its states
 
@@ -28,14 +28,14 @@ def only(system: HybridSystem, given: Iterable[str]) -> HybridSystem:
     outputs = [k for k, name in enumerate(system.outputs) if name in names]
     own = _with_states(system)
     mode, states = system.initial.mode, {state for _, state in needed}
-    start = tuple(v for v in system.initial.values if mode not in own or (mode, v[0]) in needed)
+    start = [name for name, _ in system.initial.values if mode not in own or (mode, name) in needed]
     scale = tuple(item for item in system.experiment.scale if item[0] in states)
     return replace(
         system,
         modes=tuple(_mode(mode, needed, outputs, own) for mode in system.modes),
         outputs=tuple(system.outputs[k] for k in outputs),
         experiment=replace(system.experiment, scale=scale),
-        initial=replace(system.initial, values=start),
+        initial=started(mode, start, system.initial.in_order),
     )
 
 

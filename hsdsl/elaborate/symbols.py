@@ -3,20 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from hsdsl.elaborate.resolver import ExpressionResolver, all_of
-from hsdsl.expression.scope import Refusal, Scope, Value, state
+from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.files import ModelFiles
 from hsdsl.names import closest
 from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
 
-KINDS = {"parameters": "a parameter", "inputs": "an input", "states": "a state", "let": "a `let` name"}
-Meanings = dict[str, Value | Refusal | None]
+KINDS = {
+    "functions": "a function", "parameters": "a parameter", "inputs": "an input", "states": "a state",
+    "let": "a `let` name",
+}  # fmt: skip
+Meanings = dict[str, Meaning]
 
 
 @dataclass
@@ -27,7 +30,8 @@ class SymbolTable:
     those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
     a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
     reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
-    that were used. ``drivable`` says that inputs of time stay inputs.
+    that were used. ``drivable`` says that inputs of time stay inputs. ``of_functions`` has the names that functions of
+    the file may use, with the parameters that are defined so far.
     """
 
     document: ModelDocument
@@ -40,11 +44,12 @@ class SymbolTable:
     scopes: dict[str, Scope] = field(default_factory=dict)
     data: dict[str, bytes] = field(default_factory=dict)
     drivable: bool = False
+    of_functions: Meanings = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         document = self.document
         self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
-        keys = [("parameters", document.parameters), ("inputs", document.inputs)]
+        keys = [(kind, getattr(document, kind)) for kind in ("functions", "parameters", "inputs")]
         keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
         for kind, names in keys:
             for key in names:
@@ -75,7 +80,7 @@ class SymbolTable:
 
         known: Meanings = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
         for name, kind in self.names.items():
-            if kind not in usable:
+            if kind not in (*usable, "functions"):
                 known[name] = refusal(name, KINDS[kind])
             elif name in self.values:
                 known[name] = self.values[name]
@@ -131,6 +136,23 @@ class SymbolTable:
     def without_states(self, mode: ModeDocument) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""
         return mode.final and mode.flow is None
+
+
+def cycle_among(uses: Mapping[str, Iterable[str]]) -> list[str] | None:
+    """Names of which each uses the next, and the last one the first; None where there are none."""
+    done: set[str] = set()
+
+    def search(name: str, path: list[str]) -> list[str] | None:
+        if name in path:
+            return path[path.index(name) :]
+        if name in done:
+            return None
+        found = (search(other, [*path, name]) for other in uses[name] if other in uses)
+        cycle = next((cycle for cycle in found if cycle), None)
+        done.add(name)
+        return cycle
+
+    return next((cycle for name in uses if (cycle := search(name, []))), None)
 
 
 def definition_order(keys: Iterable[Key], kind: str, refused: Meanings) -> Iterator[Key]:

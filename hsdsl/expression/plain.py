@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from hsdsl.expression import symbolic
 from hsdsl.expression.inequality import the_comparison
 from hsdsl.expression.parse import parse
-from hsdsl.expression.scope import Scope, state
+from hsdsl.expression.scope import Function, Scope, state
 from hsdsl.expression.syntax import Name, Tree, walk
 from hsdsl.functions import CONSTANTS
+
+_NONE: dict[str, Function] = {}
 
 
 def names_in(text: str) -> list[str]:
@@ -18,31 +21,32 @@ def names_in(text: str) -> list[str]:
     return [node.name for node in walk(parse(text)) if isinstance(node, Name) and node.name not in CONSTANTS]
 
 
-def value(text: str) -> Any:
-    """The SymPy expression.
+def value(text: str, functions: Mapping[str, Function] = _NONE) -> Any:
+    """The SymPy expression, with calls of ``functions`` written out.
 
     Raises ExpressionError: a function that there is not, a constant without a value, too large.
     """
     tree = parse(text)
-    return symbolic.number(tree, _scope(tree), text).expr
+    return symbolic.number(tree, _scope(tree, functions), text).expr
 
 
-def condition(text: str) -> Any:
+def condition(text: str, functions: Mapping[str, Function] = _NONE) -> Any:
     """The SymPy Boolean; errors as for :func:`value`."""
     tree = parse(text, "condition")
-    return symbolic.condition(tree, _scope(tree), text)
+    return symbolic.condition(tree, _scope(tree, functions), text)
 
 
-def inequality(text: str) -> tuple[Any, str, Any]:
+def inequality(text: str, functions: Mapping[str, Function] = _NONE) -> tuple[Any, str, Any]:
     """Both sides of an inequality with its sign; errors as for :func:`value`."""
     tree = parse(text, "inequality")
-    comparison, scope = the_comparison(tree, "when", text), _scope(tree)
+    comparison, scope = the_comparison(tree, "when", text), _scope(tree, functions)
     left, right = (symbolic.number(side, scope, text).expr for side in comparison.operands)
     return left, comparison.operators[0], right
 
 
-def _scope(tree: Tree) -> Scope:
-    scope = Scope({node.name: state(node.name) for node in walk(tree) if isinstance(node, Name)})
+def _scope(tree: Tree, functions: Mapping[str, Function]) -> Scope:
+    named = {node.name: state(node.name) for node in walk(tree) if isinstance(node, Name)}
+    scope = Scope({**named, **functions})
     if faults := scope.faults(tree):
         raise faults[0]
     return scope

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import ChainMap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -47,15 +48,44 @@ class Refusal:
     hint: str | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A function that a file defines, written out where it is called.
+
+    ``tree`` is its expression, written as ``text``, over its arguments and the names of ``others``; None where that is
+    broken. ``made`` has its values so far, by those of its arguments.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    tree: Tree | None
+    text: str
+    others: Mapping[str, Meaning]
+    made: dict[tuple[Value, ...], Value] = field(default_factory=dict)
+
+    def scope(self, given: Mapping[str, Value]) -> Scope:
+        """The names of its expression where its arguments have these values."""
+        return Scope(ChainMap(dict(given), self.others))  # pyright: ignore[reportArgumentType]
+
+    @property
+    def example(self) -> str:
+        """A call of it, with the names of its arguments."""
+        return f"{self.name}({', '.join(self.arguments)})"
+
+
+Meaning = Value | Refusal | Function | None
+
+
 @dataclass(frozen=True)
 class Scope:
     """The names that can be used in an expression.
 
-    ``values`` has the meaning of each name: a value, a refusal, or None where its own definition is broken. ``states``
-    are those of the mode of the expression, None where every state may be used; ``place`` names the mode in sentences.
+    ``values`` has the meaning of each name: a value, a function, a refusal, or None where its own definition is broken.
+    ``states`` are those of the mode of the expression, None where every state may be used; ``place`` names the mode in
+    sentences.
     """
 
-    values: Mapping[str, Value | Refusal | None]
+    values: Mapping[str, Meaning]
     states: frozenset[str] | None = None
     place: str = "here"
 
@@ -79,12 +109,15 @@ class Scope:
     def broken(self, tree: Tree) -> bool:
         """Whether a name in it has a definition that is reported already."""
         missing = object()
-        return any(isinstance(n, Name) and self.values.get(n.name, missing) is None for n in walk(tree))
+        called = (self.values.get(name) for name in functions_called(tree))
+        return any(isinstance(n, Name) and self.values.get(n.name, missing) is None for n in walk(tree)) or any(
+            isinstance(function, Function) and function.tree is None for function in called
+        )
 
     def _name(self, node: Name) -> ExpressionError | None:
         if node.name in CONSTANTS:
             return None
-        if node.name in FUNCTIONS:
+        if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
             message = f"`{node.name}` is a function and needs its arguments"
             return ExpressionError.at(node, "HS112", message, f"write {node.name}(...)")
         if node.name not in self.values:
@@ -93,8 +126,9 @@ class Scope:
         value = self.values[node.name]
         if isinstance(value, Refusal):
             return ExpressionError.at(node, value.code, value.message, value.hint)
-        if value is None or self.states is None or value.uses <= self.states:
+        if not isinstance(value, Value) or self._reachable(value):
             return None
+        assert self.states is not None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
         message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
         hint = None
@@ -104,30 +138,30 @@ class Scope:
         return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:
+        known = self.values.get(node.function)
+        if isinstance(known, Function) and known.tree is None:
+            return None
+        if isinstance(known, Function):
+            return _miscounted(node, len(known.arguments), len(known.arguments), known.example)
         if node.function not in FUNCTIONS:
             end = node.start + len(node.function)
             if node.function in self.values or node.function in CONSTANTS:
                 message, hint = f"'{shown(node.function)}' is not a function", _product_or_value(node)
             else:
                 message = f"there is no function '{shown(node.function)}'"
+                own = [name for name, value in self.values.items() if isinstance(value, Function)]
                 first = node.arguments[0] if node.arguments else None
                 time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
                 hint = (
                     timed(node.function, time)
                     or NAMES.get(node.function)
-                    or _nearest(node.function)
-                    or "functions: " + " ".join(FUNCTIONS)
+                    or _nearest(node.function, own)
+                    or "functions: " + " ".join((*FUNCTIONS, *own))
                 )
             return ExpressionError("HS112", message, node.start, end, hint)
         _, fewest, most = FUNCTIONS[node.function]
-        given = len(node.arguments)
-        if given >= fewest and (most is None or given <= most):
-            return None
-        number = f"{fewest}" if most == fewest else f"at least {fewest}"
-        noun = "argument" if fewest == 1 else "arguments"
-        message = f"`{node.function}` takes {number} {noun}, not {given}"
         arguments = "x" if most == fewest == 1 else "x, y"
-        return ExpressionError.at(node, "HS113", message, f"write {node.function}({arguments})")
+        return _miscounted(node, fewest, most, f"{node.function}({arguments})")
 
     def _hint(self, name: str) -> str | None:
         known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
@@ -152,8 +186,24 @@ def _product_or_value(node: Call) -> str:
             return f"write {node.function}*(...)"
 
 
-def _nearest(name: str) -> str | None:
-    best = closest(name, FUNCTIONS)
+def _miscounted(node: Call, fewest: int, most: int | None, example: str) -> ExpressionError | None:
+    """The error for a call with too few or too many arguments."""
+    given = len(node.arguments)
+    if given >= fewest and (most is None or given <= most):
+        return None
+    number = f"{fewest}" if most == fewest else f"at least {fewest}"
+    noun = "argument" if fewest == 1 else "arguments"
+    message = f"`{node.function}` takes {number} {noun}, not {given}"
+    return ExpressionError.at(node, "HS113", message, f"write {example}")
+
+
+def functions_called(tree: Tree) -> Iterator[str]:
+    """The name of every function that an expression calls."""
+    return (node.function for node in walk(tree) if isinstance(node, Call))
+
+
+def _nearest(name: str, own: list[str]) -> str | None:
+    best = closest(name, (*own, *FUNCTIONS))
     return f"did you mean '{best}'?" if best else None
 
 

@@ -10,7 +10,7 @@ import sympy as sp
 from hsdsl import functions
 from hsdsl.expression import bounds, numeric, syntax
 from hsdsl.expression.expression_hints import CASES
-from hsdsl.expression.scope import Scope, Value
+from hsdsl.expression.scope import Function, Scope, Value
 from hsdsl.expression.syntax import CONDITIONS, ExpressionError, Tree, children
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import shown
@@ -143,8 +143,11 @@ class _Builder:
         return self.value(tree, self.made(tree, functions.power, base.expr, exponent.expr), number, [base, exponent])
 
     def call(self, tree: syntax.Call) -> Value:
-        """A function of the language. min and max of many are taken in pairs."""
+        """A function of the language or of the file. min and max of many are taken in pairs."""
         values = [self.number(argument) for argument in tree.arguments]
+        own = self.scope.values.get(tree.function)
+        if isinstance(own, Function):
+            return self.written_out(tree, own, tuple(values))
         number = numeric.apply(tree.function, [v.number for v in values])
         if all(v.constant for v in values):
             self.refuse_unless_finite(tree, number)
@@ -156,6 +159,23 @@ class _Builder:
         pairwise = tree.function in ("min", "max")
         expr = self.made(tree, _pairwise, function, exprs) if pairwise else self.made(tree, function, *exprs)
         return self.value(tree, expr, number, values)
+
+    def written_out(self, tree: syntax.Call, function: Function, values: tuple[Value, ...]) -> Value:
+        """A function of the file with values for its arguments; its faults are faults of the call."""
+        if values in function.made:
+            return function.made[values]
+        scope = function.scope(dict(zip(function.arguments, values, strict=True)))
+        assert function.tree is not None
+        try:
+            if faults := scope.faults(function.tree):
+                raise faults[0]
+            value = _Builder(scope, function.text).number(function.tree)
+        except ExpressionError as error:
+            message = error.message if error.message.startswith("in `") else f"in `{function.name}`: {error.message}"
+            raise ExpressionError.at(tree, error.code, message, error.hint) from None
+        if value.depth > bounds.MOST_LEVELS:
+            raise self.too_deep(tree)
+        return function.made.setdefault(values, value)
 
     def made(self, tree: Tree, function: Any, *arguments: Any) -> Any:
         """What SymPy makes of arguments; its own failures (a sine of 1e308, exactly) are an error of the expression."""

@@ -10,7 +10,7 @@ from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.schema import ModelDocument
 from hsdsl.system import HybridSystem
 
-_DEFINING = ("parameter", "input", "let")
+_DEFINING = ("parameter", "function", "input", "let")
 _SETTINGS = ("until", "step", "tolerance", "relaxation", "max_transitions")
 T = TypeVar("T")
 
@@ -28,7 +28,7 @@ def closure(starts: Iterable[T], following: Callable[[T], Iterable[T]]) -> set[T
 
 
 class Definition(NamedTuple):
-    """The meaning of a name: a parameter, an input, a state, or a `let` name of the model or of one mode."""
+    """The meaning of a name: a parameter, a function, an input, a state, or a `let` name of the model or of a mode."""
 
     kind: str
     mode: str | None
@@ -41,6 +41,7 @@ class _Names:
     def __init__(self, document: ModelDocument) -> None:
         states = dict.fromkeys(str(key) for mode in document.modes.values() for key in mode.flow or ())
         kinds = {"state": states, "input": document.inputs, "parameter": document.parameters, "let": document.let}
+        kinds["function"] = document.functions
         self.top = {str(name): Definition(kind, None, str(name)) for kind, names in kinds.items() for name in names}
         self.own = {
             str(key): {str(name): Definition("let", str(key), str(name)) for name in mode.let}
@@ -59,7 +60,7 @@ class _Names:
 
 
 def unused(document: ModelDocument, expressions: Iterable[SourceExpression]) -> frozenset[Definition]:
-    """The parameters, inputs and `let` names that nothing depends on but, at most, other unused ones."""
+    """The parameters, functions, inputs and `let` names that nothing depends on but, at most, other unused ones."""
     names = _Names(document)
     tables = (names.top, *names.own.values())
     uses: dict[Definition, set[Definition]] = {d: set() for t in tables for d in t.values() if d.kind in _DEFINING}

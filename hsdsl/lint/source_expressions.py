@@ -10,12 +10,14 @@ from typing import Literal
 
 from hsdsl.errors import Span
 from hsdsl.expression import Expected, parse
+from hsdsl.expression.scope import functions_called
 from hsdsl.expression.syntax import Name, Tree, walk
 from hsdsl.schema import InputFile, InputSamples, ModeDocument, ModelDocument, ParameterEntry, ReferenceDocument
 from hsdsl.source import Scalar
 
 Role = Literal[
     "parameter",  # the value, or a bound, of the parameter `name`
+    "function",  # the function `name`, over its arguments
     "input",  # the input `name`, or one of its samples
     "let",  # the named subexpression `name`, of `mode` or of the whole model
     "flow",  # the derivative of the state `name` in `mode`
@@ -38,7 +40,7 @@ class SourceExpression:
     """One expression of a file: what it is for, its text and place, and the mode it belongs to, if any.
 
     ``name`` is what it defines; empty for walls, surfaces and conditions. ``index`` says of `domain`, `when`, `if` and
-    `reset` which wall or which transition of the mode it is.
+    `reset` which wall or which transition of the mode it is. ``arguments`` are those of a function.
     """
 
     role: Role
@@ -46,6 +48,7 @@ class SourceExpression:
     name: str = ""
     mode: str | None = None
     index: int = -1
+    arguments: tuple[str, ...] = ()
 
     @cached_property
     def tree(self) -> Tree:
@@ -55,8 +58,9 @@ class SourceExpression:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Every name in it."""
-        return frozenset(node.name for node in walk(self.tree) if isinstance(node, Name))
+        """Every name in it, and every function that it calls; arguments aside."""
+        named = (node.name for node in walk(self.tree) if isinstance(node, Name))
+        return frozenset((*named, *functions_called(self.tree))) - frozenset(self.arguments)
 
     def span(self, node: Tree | None = None) -> Span:
         """The place of the expression, or of one node of its tree."""
@@ -70,6 +74,8 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
     for name, entry in document.parameters.items():
         values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
         yield from _each("parameter", values, name)
+    for name, function in document.functions.items():
+        yield SourceExpression("function", function.expression, name, arguments=tuple(map(str, function.of)))
     for name, entry in document.inputs.items():
         if isinstance(entry, InputSamples):
             yield from _each("input", (*entry.times, *entry.values), name)

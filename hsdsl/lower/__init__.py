@@ -7,6 +7,7 @@ The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -81,6 +82,7 @@ def _lower(system: HybridSystem) -> lowered.Program:
         switches=switch_programs(switches),
         switching=print_routines(switch_routines(switches, names.shared), names.data),
         scaled_states=tuple(name for name, _ in experiment.scale),
+        initial_uses=bool(system.initial.written),
     )
 
 
@@ -113,13 +115,15 @@ def _contact(
     return replace(program, edges=edges, push_order=order)
 
 
-def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
-    """Lower expressions of parameters (what overrides are made of): each a routine of all parameters."""
+def lower_expressions(
+    system: HybridSystem, expressions: dict[str, sp.Expr], states: Sequence[str] = ()
+) -> lowered.Routines:
+    """Lower expressions of parameters (what overrides are made of) and states: each a routine of all of them."""
     names = number(system)
+    own = {symbol(state): symbol(f"x{i}") for i, state in enumerate(states)}
+    arguments, meaning = (*names.parameters, *own.values()), names.shared | own
     with deep_stack():
-        return print_routines(
-            [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
-        )
+        return print_routines([Definition(k, arguments, (e.xreplace(meaning),)) for k, e in expressions.items()], ())
 
 
 def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:

@@ -241,14 +241,39 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
 def initial_columns(
     columns: InstanceTable, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
 ) -> list[Sequence[Number]]:
-    """The initial value of each state, of every instance."""
-    in_file = columns.constant("initial", "initial")
-    numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False))
-    initial: list[Sequence[Number]] = []
+    """The initial value of each state, of every instance; those that use a given one follow it."""
+    numbers: dict[str, Sequence[Number]] = {}
     for name in states:
-        what = f"initial.{name}"
         if name in varied:
-            initial.append(columns.given(varied[name], what))
-        else:
-            initial.append(columns.expression(shared[name], what) if name in shared else numbers[name])
-    return initial
+            numbers[name] = columns.given(varied[name], f"initial.{name}")
+        elif name in shared:
+            numbers[name] = columns.expression(shared[name], f"initial.{name}")
+    if columns.values.program.initial_uses and numbers:
+        numbers |= _following(columns, numbers)
+    else:
+        in_file = columns.constant("initial", "initial")
+        numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False)) | numbers
+    return [numbers[name] for name in states]
+
+
+def _following(columns: InstanceTable, given: Mapping[str, Sequence[Number]]) -> dict[str, Sequence[Number]]:
+    """The initial values that are not given, from those that are."""
+    from hsdsl.lower import lower_expressions
+
+    system = columns.values.system
+    if len(given) == len(system.initial.values):
+        return {}
+    names, expressions = zip(*system.initial.following(given), strict=True)
+    routines = lower_expressions(system, {f"value_{i}": e for i, e in enumerate(expressions)}, tuple(given))
+    made = compile_routines(routines, columns.values.kernel.arithmetic, "initial")()
+    joined = InstanceTable(
+        columns.values,
+        [(*row, *own) for row, *own in zip(columns.rows, *given.values(), strict=True)],
+        strict=columns.strict,
+    )
+    found: dict[str, Sequence[Number]] = {
+        name: [row[0] for row in joined.of(made[i], f"initial.{name}")] for i, name in enumerate(names)
+    }
+    for instance, why in joined.refused.items():
+        columns.refuse(instance, why)
+    return found

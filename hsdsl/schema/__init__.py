@@ -2,6 +2,7 @@
 
 from hsdsl.schema.documents import (
     ExperimentDocument,
+    FunctionDocument,
     InputFile,
     InputSamples,
     ModeDocument,
@@ -17,6 +18,7 @@ from hsdsl.schema.read import read
 
 __all__ = [
     "ExperimentDocument",
+    "FunctionDocument",
     "InputFile",
     "InputSamples",
     "ModeDocument",

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag
 
 from hsdsl.schema.fields import (
     AnyKey,
+    ArgumentName,
     Completion,
     Document,
     Expression,
@@ -87,6 +88,13 @@ Input = Annotated[
     AsExpression | Annotated[InputSamples, Tag("<samples>")] | Annotated[InputFile, Tag("<file>")],
     Discriminator(_kind_of_input),
 ]
+
+
+class FunctionDocument(Document):
+    """A function of its arguments, of parameters and of other functions, written out where it is called."""
+
+    of: Items[ArgumentName] = required("The names of its arguments, in the order of a call.", ["x", "k"])
+    expression: Expression = required("Its value.", "x**2/(k**2 + x**2)", alias="is")
 
 
 class TransitionDocument(Document):
@@ -229,6 +237,10 @@ class ModelDocument(Document):
         "Name: number, expression of earlier parameters, or a mapping with its value.",
         {"g": "9.81", "e": {"value": "0.8", "min": 0, "max": 1}},
     )
+    functions: Table[FunctionDocument] = mapping(
+        "Name: a function for use in every expression of the file.",
+        {"hill": {"of": ["x", "k"], "is": "x**2/(k**2 + x**2)"}},
+    )
     inputs: Table[Input] = mapping(
         "Name: expression of `t` and parameters, or samples, or a CSV file.", {"u": "20*cos(2.5*t)"}
     )
@@ -258,6 +270,7 @@ class ModelDocument(Document):
 SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     (): (ModelDocument, "a model"),
     ("parameters", "*"): (ParameterEntry, "a parameter"),
+    ("functions", "*"): (FunctionDocument, "a function"),
     ("inputs", "*", "<samples>"): (InputSamples, "an input"),
     ("inputs", "*", "<file>"): (InputFile, "an input"),
     ("modes", "*"): (ModeDocument, "a mode"),

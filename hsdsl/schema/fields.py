@@ -130,6 +130,13 @@ def _name(key: Any) -> Key:
     return key
 
 
+def _argument(value: Any) -> Key:
+    scalar = _single(value, "a name")
+    if scalar.value == ABSENT:
+        return Key.at(ABSENT, scalar.place)
+    return _name(Key.at(scalar.value, scalar.place))
+
+
 def _state_name(key: Any) -> Key:
     if key == "mode":
         raise refuse("HS205", "a state cannot be called 'mode', which `initial` uses", "choose another name")
@@ -166,9 +173,9 @@ def shaped_as_list(value: Any) -> Any:
     return [] if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 
-def required(description: str, *examples: Any) -> Any:
+def required(description: str, *examples: Any, alias: str | None = None) -> Any:
     """A key that must be there."""
-    return Field(description=description, examples=list(examples))
+    return Field(description=description, examples=list(examples), alias=alias)
 
 
 def optional(description: str, *examples: Any, default: Any = None, alias: str | None = None) -> Any:
@@ -234,6 +241,7 @@ Hold = Annotated[
 Name = Annotated[Key, PlainValidator(_name), WithJsonSchema({"type": "string"})]
 StateName = Annotated[Key, PlainValidator(_state_name), WithJsonSchema({"type": "string"})]
 ModeName = Annotated[Key, PlainValidator(_mode_name), WithJsonSchema({"type": "string"})]
+ArgumentName = Annotated[Key, PlainValidator(_argument), WithJsonSchema({"type": "string"})]
 AnyKey = Annotated[Key, PlainValidator(_any_key), WithJsonSchema({"type": "string"})]
 
 Table = Annotated[dict[Name, T], BeforeValidator(shaped_as_mapping)]

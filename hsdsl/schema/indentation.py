@@ -12,7 +12,7 @@ from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, child, is_empty, 
 
 _OF_MAPPINGS = ("parameters", "inputs", "experiment")
 _REQUIRED = frozenset(("modes", "initial", "experiment", "when", "to"))
-_SECTIONS = ("parameters", "inputs", "let", "outputs", "units", "initial", "experiment", "flow", "reset")
+_SECTIONS = ("parameters", "functions", "inputs", "let", "outputs", "units", "initial", "experiment", "flow", "reset")
 _MODEL, _MODE = frozenset(keys_of()), frozenset(keys_of("modes", "*"))
 _TRANSITION = frozenset(keys_of("modes", "*", "transitions", "*"))
 

@@ -6,7 +6,7 @@ from hsdsl.schema.value_suggestions import assigned
 from hsdsl.source import Key, Mapping, Node, NodePath, Scalar, Sequence, SourceRange, absent, descend, is_empty
 
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",), ("scene",))
-_CONTAINERS = ("parameters", "inputs", "let", "modes", "outputs", "flow", "initial", "experiment")
+_CONTAINERS = ("parameters", "functions", "inputs", "let", "modes", "outputs", "flow", "initial", "experiment")
 _OF_AN_INPUT = ("times", "values", "file")  # an input that lacks one is dropped as a whole
 _INDISPENSABLE = ("modes", "initial", "experiment")
 

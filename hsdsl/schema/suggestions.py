@@ -52,6 +52,8 @@ _ADD = {
     "until": "write until: and the time at which a run ends",
     "when": "write when: and the inequality at which the transition fires, such as x >= 1",
     "to": "write to: and the mode that is entered",
+    "of": "write of: [x], the names of the function's arguments",
+    "is": "write is: and an expression of the function's arguments",
     "value": "write value: and the parameter's number or expression",
     "times": "write times: [0, 1, 2], or file: and the name of a CSV file",
     "values": "write values: and one value for each of the times",

@@ -28,7 +28,7 @@ from hsdsl.sensitivity.derivatives import Derivatives
 from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.overrides import Overridden
 from hsdsl.sensitivity.state_names import ERROR, LAST, SPAN, UNIT, derivative_name, rate_name, shift_name
-from hsdsl.system import TIME, Edge, HybridSystem, Initial, Mode, Parameter
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, started
 
 
 def augmented(given: Overridden, by: Sequence[Target], entries: bool = False) -> HybridSystem:
@@ -62,10 +62,11 @@ class _Writer:
     def system(self) -> HybridSystem:
         """The whole system."""
         base, names = self.base, [name for name, _ in self.base.initial.values]
-        values = dict(base.initial.values) | {
+        states = tuple(self._states(base.initial.mode, names))
+        values = dict(base.initial.in_order) | {
             derivative_name(x, self.labels[k]): value for (x, k), value in self.start.items()
         }
-        initial = tuple((name, values.get(name, sp.S.Zero)) for name in self._states(base.initial.mode, names))
+        values |= {name: sp.S.Zero for name in states if name not in values}
         return replace(
             base,
             parameters=(*base.parameters, *(Parameter(name, sp.S.One, "1") for name in (UNIT, SPAN, ERROR))),
@@ -73,7 +74,7 @@ class _Writer:
             modes=tuple(map(self._mode, base.modes)),
             outputs=tuple(self._output_names()),
             units={},
-            initial=Initial(base.initial.mode, initial),
+            initial=started(base.initial.mode, states, tuple(values.items())),
             experiment=replace(
                 base.experiment, until=symbol(SPAN), scheme=None, method=None, step=None, tolerance=None, samples=None
             ),
@@ -84,10 +85,13 @@ class _Writer:
     def _start(self, given: Overridden, by: Sequence[Target]) -> dict[tuple[str, int], sp.Expr]:
         """The derivatives of the initial state that are not zero."""
         found: dict[tuple[str, int], sp.Expr] = {}
-        for name, value in given.system.initial.values:
-            (row,) = slopes([value], self.of.moving)
+        earlier: list[sp.Symbol] = []
+        for name, value in given.system.initial.in_order:
+            (row,) = slopes([value], [*self.of.moving, *earlier])
+            earlier.append(symbol(name))
             for k, target in enumerate(by):
-                slope = sp.S.Zero if name in given.placed else self.of.by(row, k)
+                through = (row[x] * found.get((x.name, k), sp.S.Zero) for x in earlier if x in row)
+                slope = sp.S.Zero if name in given.placed else sp.Add(self.of.by(row, k), *through)
                 slope = sp.S.One if target.initial and target.name == name else slope
                 if slope != 0:
                     found[name, k] = slope

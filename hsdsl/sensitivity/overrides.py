@@ -13,7 +13,7 @@ from hsdsl.elaborate import parameter_expression
 from hsdsl.expression.scope import symbol
 from hsdsl.sensitivity.chain import slopes
 from hsdsl.sensitivity.names import Target
-from hsdsl.system import HybridSystem, Initial
+from hsdsl.system import HybridSystem, Initial, started
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,13 @@ def _samples(given: Any, read: Any, known: int) -> Any:
 def _start(system: HybridSystem, initial: Mapping[str, Any], read: Any) -> tuple[Initial, frozenset[str]]:
     """Where a run starts; a state whose value is a number has 0 there, and is named."""
     mode = str(initial.get("mode", system.initial.mode))
-    values: dict[str, Any] = dict(system.initial.values)
+    values: dict[str, Any] = dict(system.initial.in_order)
     placed = {name for name, value in initial.items() if name != "mode" and not is_expression(value)}
     for name, value in initial.items():
         if name != "mode":
             values[name] = sp.S.Zero if name in placed else read(value, f"initial.{name}")
-    own = next(m for m in system.modes if m.name == mode).states or tuple(values)
-    return Initial(mode, tuple((name, values[name]) for name in own)), frozenset(placed)
+    own = next(m for m in system.modes if m.name == mode).states or tuple(name for name, _ in system.initial.values)
+    return started(mode, own, tuple(values.items())), frozenset(placed)
 
 
 def parameter_slopes(given: Overridden, by: Sequence[Target]) -> dict[sp.Symbol, list[sp.Expr]]:

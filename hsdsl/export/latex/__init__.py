@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from hsdsl.elaborate.functions import named_functions
 from hsdsl.export.latex.escaping import escaped
 from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
 from hsdsl.expression.plain import names_in
+from hsdsl.expression.scope import state
 from hsdsl.system import Edge, HybridSystem, Mode
 
 WIDEST = 90  # signs of a formula that fit into a line, roughly: a longer one is a paragraph that breaks by itself
@@ -33,7 +35,8 @@ def files(source: Source) -> dict[str, bytes]:
 def document(source: Source) -> str:
     """The text of the document."""
     system = source.system
-    math = Mathematics(_names(system))
+    parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
+    math = Mathematics(_names(system), named_functions(system.functions, parameters))
     lines = [*(f"% {line}" for line in source.heading), _HEAD, rf"\section*{{{escaped(system.title or source.name)}}}"]
     lines += [escaped(system.source), ""] if system.source else []
     lines += _parameters(source, math)

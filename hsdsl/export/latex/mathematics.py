@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from typing import Any
 
@@ -12,7 +12,7 @@ from sympy.printing.latex import LatexPrinter
 
 from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
 from hsdsl.expression import plain
-from hsdsl.expression.scope import symbol
+from hsdsl.expression.scope import Function, symbol
 
 _SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
 _PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")
@@ -23,7 +23,8 @@ _MOST_DIGITS = 20
 class Mathematics:
     """Expressions with the names of one model: each has a form of its own."""
 
-    def __init__(self, names: Iterable[str]) -> None:
+    def __init__(self, names: Iterable[str], functions: Mapping[str, Function] | None = None) -> None:
+        self.functions = functions or {}
         self.names: dict[str, str] = {"t": "t"}
         for name in names:
             if name not in self.names:
@@ -38,16 +39,16 @@ class Mathematics:
 
     def expression(self, text: str) -> str:
         """An expression, as it was written."""
-        return self.printer.doprint(plain.value(text))
+        return self.printer.doprint(plain.value(text, self.functions))
 
     def inequality(self, text: str) -> str:
         """One inequality, as it was written."""
-        left, sign, right = plain.inequality(text)
+        left, sign, right = plain.inequality(text, self.functions)
         return f"{self.printer.doprint(left)} {_SIGNS[sign]} {self.printer.doprint(right)}"
 
     def condition(self, text: str) -> str:
         """A condition, as it was written."""
-        return self.printer.doprint(plain.condition(text))
+        return self.printer.doprint(plain.condition(text, self.functions))
 
     def number(self, value: Any) -> str:
         """A number or an expression of SymPy."""

@@ -50,6 +50,7 @@ RULES: dict[str, Rule] = {
     "HS407": Rule("confusable-names", names.confusable_names),
     "HS408": Rule("misleading-name", names.misleading_name),
     "HS409": Rule("misnamed-output", names.misnamed_output),
+    "HS410": Rule("unused-function", names.unused_name("function")),
     "HS421": Rule("identity-reset", shape.identity_reset),
     "HS422": Rule("missing-reset", shape.missing_reset),
     "HS425": Rule("dead-end", shape.dead_end),

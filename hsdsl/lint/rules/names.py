@@ -33,7 +33,7 @@ _ELSEWHERE = {  # names of functions and constants in other languages
 
 
 def unused_name(kind: str) -> Callable[[Subject], Iterator[Finding]]:
-    """Make the rule that finds unused parameters or inputs."""
+    """Make the rule that finds unused parameters, functions or inputs."""
 
     def check(subject: Subject) -> Iterator[Finding]:
         for name in getattr(subject.document, f"{kind}s"):

@@ -39,6 +39,7 @@ class Units:
     def __init__(self, document: ModelDocument, expressions: tuple[SourceExpression, ...]) -> None:
         self._document = document
         self._expressions = expressions
+        self._functions = {str(e.name): e for e in expressions if e.role == "function"}
         self._lets: dict[str, dict[str | None, Measure]] = {}  # by name, and by the mode that has it
         self._texts = {str(key): scalar for key, scalar in document.units.items() if scalar is not None}
         for key, entry in document.parameters.items():
@@ -79,7 +80,7 @@ class Units:
         return tuple(self._check(e) for e in self._expressions if e.role in roles) if self.given else ()
 
     def _check(self, written: SourceExpression) -> Checked:
-        walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value)
+        walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value, self._functions)
         measure = walk.measure(written.tree)
         if written.role == "let":
             self._lets.setdefault(str(written.name), {})[written.mode] = measure

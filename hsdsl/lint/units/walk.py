@@ -6,7 +6,7 @@ metres too. A name without a unit has an unknown one, and so has every expressio
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
@@ -26,6 +26,7 @@ from hsdsl.expression.syntax import (
     Truth,
 )
 from hsdsl.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
+from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.lint.units.unit import ONE, Unit, exponent_of
 
 Any_ = Literal["any", "unknown"]  # a number that takes the expected unit; an unknown unit
@@ -51,6 +52,7 @@ class Walk:
 
     unit_of: Callable[[str], Measure]
     text: str
+    functions: Mapping[str, SourceExpression] = field(default_factory=dict[str, SourceExpression])
     misfits: list[Misfit] = field(default_factory=list[Misfit])
 
     def measure(self, tree: Tree) -> Measure:
@@ -128,7 +130,23 @@ class Walk:
             return "unknown"
         return base
 
+    def _written_out(self, tree: Call, function: SourceExpression) -> Measure:
+        """The unit of a function of the file with these arguments."""
+        pairs = zip(function.arguments, tree.arguments, strict=True)
+        given: dict[str, Measure] = {name: self.measure(argument) for name, argument in pairs}
+
+        def unit_of(name: str) -> Measure:
+            return given[name] if name in given else self.unit_of(name)
+
+        inner = Walk(unit_of, function.scalar.value, self.functions)
+        found = inner.measure(function.tree)
+        if inner.misfits:
+            self.misfits.append(Misfit(inner.misfits[0].kind, tree, f"in `{tree.function}` {inner.misfits[0].message}"))
+        return found
+
     def _call(self, tree: Call) -> Measure:
+        if tree.function in self.functions:
+            return self._written_out(tree, self.functions[tree.function])
         if tree.function in _ALIKE:
             found = self._alike(list(tree.arguments), "compared with")
             return ONE if tree.function == "atan2" else found

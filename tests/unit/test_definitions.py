@@ -1,0 +1,104 @@
+"""Functions of a file, and initial values that use each other."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import hsdsl
+from hsdsl.elaborate import elaborate
+from hsdsl.errors import ModelError, UsageError
+
+HILL = """hsdsl: 1
+functions:
+  hill: {of: [x, k], is: x**2/(k**2 + x**2)}
+  gain: {of: [x], is: "rate*hill(x, 2)"}
+parameters: {rate: 3}
+modes:
+  cell:
+    flow: {x: "1 - %s", y: %s}
+    transitions: [{when: "%s >= 1/3", to: cell, reset: {x: "%s"}}]
+initial: {mode: cell, x: 0, y: 1}
+experiment: {until: 4}
+"""
+CALLS = ("hill(x, rate)", "gain(x + y) - y", "hill(x, 2)", "gain(1)")
+WRITTEN = ("x**2/(rate**2 + x**2)", "rate*((x + y)**2/(2**2 + (x + y)**2)) - y", "x**2/(2**2 + x**2)", "rate*(1/5)")
+
+
+def test_a_call_is_the_expression_written_out():
+    called, written = (elaborate("m.yaml", text=(HILL % texts).encode()) for texts in (CALLS, WRITTEN))
+    assert called.modes[0].flow == written.modes[0].flow
+    assert called.modes[0].edges[0].reset == written.modes[0].edges[0].reset
+    assert called.modes[0].edges[0].surface.residual == written.modes[0].edges[0].surface.residual
+
+
+def test_functions_are_known_to_overrides(tmp_path):
+    (tmp_path / "m.yaml").write_text(HILL % CALLS)
+    model = hsdsl.load(tmp_path / "m.yaml")
+    run = model.simulate(until=0, parameters={"rate": "hill(1, 3)"}, initial={"x": "gain(2)"})
+    assert run.final.state["x"] == 0.1 / 2
+    with pytest.raises(UsageError, match="`hill` takes 2 arguments, not 1"):
+        model.simulate(parameters={"rate": "hill(1)"})
+
+
+def test_many_nested_calls_are_written_out_once():
+    """Without memory of what was written out, 2**60 calls."""
+    nest = "\n".join(f"  f{i}: {{of: [x], is: f{i + 1}(f{i + 1}(x))}}" for i in range(60))
+    text = f"hsdsl: 1\nfunctions:\n{nest}\n  f60: {{of: [x], is: x}}\nmodes: {{m: {{flow: {{x: f0(x)}}}}}}\n"
+    made = elaborate("m.yaml", text=(text + "initial: {mode: m, x: 1}\nexperiment: {until: 1}\n").encode())
+    assert str(made.modes[0].flow[0]) == "x"
+
+
+def test_functions_that_grow_without_end_are_refused():
+    nest = "\n".join(f"  f{i}: {{of: [x], is: f{i + 1}(x) + sin(f{i + 1}(x + {i}))}}" for i in range(60))
+    text = f"hsdsl: 1\nfunctions:\n{nest}\n  f60: {{of: [x], is: x}}\nmodes: {{m: {{flow: {{x: f0(x)}}}}}}\n"
+    with pytest.raises(ModelError) as raised:
+        elaborate("m.yaml", text=(text + "initial: {mode: m, x: 1}\nexperiment: {until: 1}\n").encode())
+    assert [d.code for d in raised.value.diagnostics] == ["HS120"]
+
+
+START = """hsdsl: 1
+parameters: {a: 2}
+modes:
+  m:
+    flow: {x: -x, y: x, z: y - z}
+initial: {mode: m, x: y**2 + a, z: x*y, y: a}
+experiment: {until: 1}
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    (tmp_path / "m.yaml").write_text(START)
+    return hsdsl.load(tmp_path / "m.yaml")
+
+
+FOLLOWING = [
+    ({}, (6, 2, 12)),
+    ({"y": 3}, (11, 3, 33)),
+    ({"y": "a + 1"}, (11, 3, 33)),
+    ({"x": 1}, (1, 2, 2)),
+    ({"x": 1, "z": "a/4"}, (1, 2, 0.5)),
+]
+
+
+@pytest.mark.parametrize(("given", "expected"), FOLLOWING)
+def test_values_follow_those_that_are_given(start, given, expected):
+    assert tuple(start.simulate(until=0, initial=given).final.state.values()) == expected
+
+
+def test_values_follow_in_ensembles(start):
+    runs = start.ensemble(initial={"y": [1.0, 2.0, 3.0]}, until=0)
+    assert [list(runs.state[name]) for name in "xz"] == [[3, 6, 11], [3, 12, 33]]
+
+
+@pytest.mark.parametrize("given", [{}, {"y": 3}, {"y": "a + 1"}])
+def test_derivatives_go_through_initial_values(start, given):
+    """With x = X e^-t and y = Y + X - x, z' + z = y gives z(1) = Z/e + (Y + X) (1 - 1/e) - X/e."""
+    found = start.sensitivity(["initial.y", "a"], initial=given).final.state["z"]
+    y, e = 3 if given else 2, math.exp(-1)
+    for name, dy, by_a in (("initial.y", 1, 0), ("a", 0 if given.get("y") == 3 else 1, 1)):
+        dx = 2 * y * dy + by_a
+        dz = dx * y + (y**2 + 2) * dy
+        assert found[name] == pytest.approx(dz * e + (dy + dx) * (1 - e) - dx * e, rel=1e-9)
