@@ -1,6 +1,6 @@
-"""Write the reference pages that the code itself knows: language, command line, integrators, errors, lint rules.
+"""Write the pages that the code itself knows: those of docs/reference, and the gallery of models, which are run for it.
 
-python docs/generate.py           write docs/reference/*.md
+python docs/generate.py           write docs/reference/*.md and docs/models.md
 python docs/generate.py --check   write nothing; name the pages that are stale and exit 1
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from writing import codes, command_line, language, methods, mistakes
+from writing import codes, command_line, language, methods, mistakes, models
 
 from hsdsl.lint.rules import FAMILIES, RULES, family
 
@@ -32,6 +32,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "integrators.md": methods.integrator_page,
     "coefficients.md": methods.coefficient_page,
     "mistakes.md": mistakes.mistakes,
+    "../models.md": models.model_page,
 }
 
 

@@ -44,7 +44,10 @@ def test_the_probe_for_heavy_libraries_sees_them():
     assert "sympy" in modules_after("import hsdsl.system")
 
 
-@pytest.mark.parametrize("name", generate.PAGES)
+WITHOUT_RUNS = [name for name in generate.PAGES if name != "../models.md"]  # `.ci/run` checks that one
+
+
+@pytest.mark.parametrize("name", WITHOUT_RUNS)
 def test_reference_page_says_what_the_code_says(name):
     assert generate.written(name) == generate.render(name), "run python docs/generate.py"
 
