@@ -15,7 +15,7 @@ import os
 import stat
 import sys
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 
 MOST_ENTRIES = 500  # of one kind; the least recently used go first
@@ -128,6 +128,15 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
                 other.unlink(missing_ok=True)
     _prune(folder() / kind)
     return path
+
+
+def making(kind: str, key: str) -> AbstractContextManager[None]:
+    """Let one process at a time make an entry, where the cache can be written: others wait and find it."""
+    from hsdsl.unfinished import locked
+
+    entry = folder() / kind / key
+    usable = all(private(place) is None for place in (folder(), entry.parent, entry))
+    return locked(entry) if usable else nullcontext()
 
 
 def _checksum(data: bytes) -> str:

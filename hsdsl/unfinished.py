@@ -1,4 +1,7 @@
-"""Files that are being written, `.hsdsl-*.part`: locked by who writes them, removed where nobody does."""
+"""Files that are being written, `.hsdsl-*.part`: locked by who writes them, removed where nobody does.
+
+Folders have locks as well, for those who make something in them together.
+"""
 
 from __future__ import annotations
 
@@ -37,6 +40,21 @@ def part_in(folder: Path) -> Generator[tuple[Path, int]]:
             path.unlink()
         if lock is not None:
             os.close(lock)
+
+
+@contextmanager
+def locked(folder: Path) -> Generator[None]:
+    """Let no other process lock a folder in the block, on systems and disks that have such locks."""
+    descriptor = None
+    with suppress(OSError):
+        if fcntl is not None:
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
 
 
 def _claimed(folder: Path) -> tuple[Path, int]:

@@ -9,7 +9,7 @@ from functools import partial
 from gallery.scenes import Entry
 from gallery.settings import Setting, run
 from hsdsl.chart.outcome import Outcome
-from hsdsl.chart.processes import HANGS, Lost, in_processes
+from hsdsl.processes import HANGS, Lost, in_processes
 
 LIMIT = 30.0  # processor seconds of a run
 SHORTER = {"stiff-switch": 8.0}  # most explicit runs would take all of it

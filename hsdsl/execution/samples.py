@@ -137,11 +137,11 @@ def _split(
     return tuple(name for name in asked if name in states), tuple(name for name in asked if name not in states)
 
 
-def optional(library: str, what: str) -> Any:
-    """Import a library of the ``table`` extra, or say how to get it."""
+def optional(library: str, what: str, extra: str = "table") -> Any:
+    """Import a library of an extra, or say how to get it."""
     try:
         return import_module(library)
     except ImportError:
         package = library.partition(".")[0]
-        message = f"{what} needs {package}, which is not installed: pip install 'hsdsl[table]', or {package} alone"
+        message = f"{what} needs {package}, which is not installed: pip install 'hsdsl[{extra}]', or {package} alone"
         raise UsageError(message) from None

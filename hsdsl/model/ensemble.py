@@ -30,6 +30,14 @@ if TYPE_CHECKING:
 INITIAL = "initial."
 
 
+class NothingToRunError(UsageError):
+    """No instance of an ensemble has numbers to start with; ``why`` is the reason of the first one."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"no instance of the ensemble can be run: {why}")
+        self.why = why
+
+
 @dataclass(frozen=True)
 class EnsembleRequest:
     """The arguments of an ensemble: ``call`` has those of every single run, and ``varied`` the arrays by name.
@@ -266,7 +274,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     first = next((k for k in np.flatnonzero(finite).tolist() if k not in columns.refused), None)
     if first is None:
         why = next(iter(columns.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
-        raise UsageError(f"no instance of the ensemble can be run: {why}")
+        raise NothingToRunError(why)
     base = pipeline.prepare(request.single(first))
     start = np.array(initial_columns(columns, base.states, call["initial"], request.arrays(initial=True)), dtype=float)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hsdsl.orbits.orbit import Orbit
     from hsdsl.orbits.sampling import OrbitalStability
     from hsdsl.sensitivity.result import Sensitivity
+    from hsdsl.sweep import Sweep
     from hsdsl.system import HybridSystem
 
 MOST_PREPARED = 16
@@ -413,6 +414,57 @@ class Model:
 
         call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
         return run_ensemble(self, call, samples, transition_times, threads, progress, every_transition)
+
+    def sweep(
+        self,
+        vary: Sequence[str] | Mapping[str, Any],
+        out: str | os.PathLike[str],
+        *,
+        random: int | None = None,
+        seed: int = 0,
+        record: str | Sequence[str] = "final",
+        outputs: Sequence[str] | None = None,
+        cluster: str | None = None,
+        processes: int | None = None,
+        chunk: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> Sweep:
+        """Run the model over many values into a dataset of Parquet files, on all cores or on a Dask cluster.
+
+        The same call goes on with a dataset that is not complete. A run that fails is a row with its reason.
+
+        Parameters
+        ----------
+        vary : sequence of str or mapping
+            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`hsdsl.sweep.variation`), or by name what
+            follows the name, or an array of values. Names are parameters, and initial states as ``initial.NAME``.
+        out : path
+            The folder of the dataset: a new one, or that of the same sweep.
+        random : int, optional
+            How many rows each point of the grid has, where something is drawn.
+        seed : int
+            Of the draws. A row has the same values for any number of workers.
+        record : str or sequence of str
+            What is kept of each run besides how it ended (`hsdsl.sweep.recording`).
+        outputs : sequence of str, optional
+            States and outputs, as for :meth:`simulate`; the others have no columns.
+        cluster : str, optional
+            The address of a Dask scheduler, such as ``tcp://host:8786``.
+        processes : int, optional
+            How many on this machine; left out, as many as there are cores for this process.
+        chunk : int, optional
+            How many rows a file has; left out, it follows from a few runs that are timed.
+        progress : callable, optional
+            Called after each chunk with how many rows are there, and how many there will be.
+        **arguments
+            Further arguments of :meth:`simulate` for every run, but ``precision``, ``samples`` and ``watch``.
+
+        Raises UsageError: an unknown name, a folder of another sweep, or a cluster that does not answer.
+        """
+        from hsdsl.model.sweeps import sweep
+
+        return sweep(self, vary, out, random, seed, record, outputs, cluster, processes, chunk, progress, arguments)
 
     @cached_property
     def sliding(self) -> Model:

@@ -183,14 +183,14 @@ def recorded(parameters: Mapping[str, Any], initial: Mapping[str, Any], options:
     overrides = dict(parameters)
     for group, values in (("initial", initial), ("experiment", given)):
         overrides |= {f"{group}.{name}": value for name, value in values.items()}
-    return {name: _written(value) for name, value in overrides.items()}
+    return {name: as_written(value) for name, value in overrides.items()}
 
 
-def _written(value: Any) -> Any:
+def as_written(value: Any) -> Any:
     """A value as plain data: what has no such form, such as a fraction, becomes the text of an expression."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)):
-        return [_written(item) for item in cast("Sequence[Any]", value)]
+        return [as_written(item) for item in cast("Sequence[Any]", value)]
     return value if isinstance(value, (str, int, float)) or decimals.is_multiprecision(value) else str(value)
 
 

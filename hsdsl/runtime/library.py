@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from hsdsl.cache import find, keep, key_of
+from hsdsl.cache import find, keep, key_of, making
 from hsdsl.names import shown
 from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_compiler
 
@@ -31,13 +31,19 @@ def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -
     """
     compiler = find_compiler()
     key = _key(content, compiler, effort)
+    loaded = _kept(key)
+    if loaded is not None:
+        return loaded
+    with making(KIND, key):
+        return _kept(key) or _made(compiler, key, symbol, source, effort)
+
+
+def _kept(key: str) -> ctypes.CDLL | None:
     path = find(KIND, key)
-    if path is not None:
-        try:
-            return ctypes.CDLL(str(path))
-        except OSError:
-            pass  # made for something else than what runs now: it is made again
-    return _made(compiler, key, symbol, source, effort)
+    try:
+        return None if path is None else ctypes.CDLL(str(path))
+    except OSError:
+        return None  # made for something else than what runs now: it is made again
 
 
 def is_kept(content: str, effort: Effort) -> bool:

@@ -14,10 +14,11 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.store.atomic import locked, replacing, unplaced
+from hsdsl.store.atomic import replacing, unplaced
 from hsdsl.store.npz import load, save_npz
 from hsdsl.store.sidecar import forget_sidecar, read_sidecar, sidecar_of, write_sidecar
 from hsdsl.store.table import at_samples, write_csv, write_parquet
+from hsdsl.unfinished import locked
 
 __all__ = ["forget_sidecar", "load", "read_sidecar", "save"]
 

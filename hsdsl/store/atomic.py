@@ -68,22 +68,6 @@ def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO]:
         new.place()
 
 
-@contextmanager
-def locked(folder: Path) -> Generator[None]:
-    """Let no other writer rename several files in a folder at once, on systems and disks that have such locks."""
-    descriptor = None
-    with suppress(ImportError, OSError):
-        import fcntl
-
-        descriptor = os.open(folder, os.O_RDONLY)
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-    try:
-        yield
-    finally:
-        if descriptor is not None:
-            os.close(descriptor)
-
-
 def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
     mode = stat.S_IFREG
     with suppress(FileNotFoundError):

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.chart.processes import CRASHES, HANGS, Lost, in_processes
 from hsdsl.chart.stability import stability_map
 from hsdsl.chart.stability.axes import read_axes
 from hsdsl.chart.stability.cells import Bench, Tool
@@ -20,6 +19,7 @@ from hsdsl.chart.stability.limits import eigenvalues, grows_on_the_axis, largest
 from hsdsl.chart.stability.table import as_csv, as_plain, as_text
 from hsdsl.errors import UsageError
 from hsdsl.integrators import INTEGRATORS
+from hsdsl.processes import CRASHES, HANGS, Lost, in_processes
 
 GALLERY = Path(__file__).parents[2] / "models" / "gallery"
 DECAY = """hsdsl: 1

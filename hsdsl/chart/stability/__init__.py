@@ -15,13 +15,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.chart.processes import Lost, in_processes
 from hsdsl.chart.stability.axes import SIZES, Axis, read_axes
 from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell, Tool
 from hsdsl.chart.stability.limits import eigenvalues, largest_step
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.model import Model
+from hsdsl.processes import Lost, in_processes
 
 __all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "Tool", "stability_map"]
 Progress = Callable[[int, int], None]

@@ -81,6 +81,11 @@ class _Worker(Generic[Task, Answer]):
         self.here.close()
 
 
+def can_fork() -> bool:
+    """Whether tasks get processes here."""
+    return "fork" in multiprocessing.get_all_start_methods()
+
+
 def in_processes(
     work: Callable[[Task], Answer], tasks: Sequence[Task], count: int, limit: float
 ) -> Iterator[tuple[int, Answer | Lost]]:
@@ -88,7 +93,7 @@ def in_processes(
 
     ``limit`` is in seconds of the processor. Where the system cannot fork, tasks are answered here, without a limit.
     """
-    if "fork" not in multiprocessing.get_all_start_methods():
+    if not can_fork():
         yield from ((index, work(task)) for index, task in enumerate(tasks))
         return
     waiting = list(range(len(tasks)))[::-1]

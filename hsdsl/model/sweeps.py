@@ -1,0 +1,256 @@
+"""``Model.sweep``: chunks of rows, each an ensemble, made here or at a cluster, and gathered in a dataset."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.errors import UsageError
+from hsdsl.model.ensemble import INITIAL, NothingToRunError, cores
+from hsdsl.model.options import KEYS, as_written, check_arguments, overrides_of
+from hsdsl.model.values import with_parameters
+from hsdsl.names import did_you_mean
+from hsdsl.processes import can_fork
+from hsdsl.sweep import Sweep, recording, variation
+from hsdsl.sweep import manifest as manifests
+from hsdsl.sweep.dataset import damaged, encoded, write_chunk
+from hsdsl.sweep.manifest import Manifest
+from hsdsl.sweep.rows import library, refused, table
+from hsdsl.sweep.schedule import Run, run_here
+
+if TYPE_CHECKING:
+    from hsdsl.model import Model
+
+PROBES, SECONDS, BYTES, MOST_ROWS = 16, 2.0, 64e6, 100_000
+CHUNKS_A_CORE = 4  # at least, so that no core waits for the last chunk
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class ChunkWork:
+    """What makes a chunk: it can be sent to other processes and machines."""
+
+    model: Model
+    manifest: Manifest
+    threads: int = 1
+
+    def __call__(self, chunk: int) -> bytes:
+        """The bytes of a chunk's file."""
+        return encoded(self.rows(*self.manifest.rows_of(chunk)))
+
+    def prepare(self) -> None:
+        """Compile what the first chunk needs."""
+        self.rows(0, 1)
+
+    def rows(self, first: int, last: int) -> Any:
+        """The rows from ``first`` up to ``last`` as a table.
+
+        A row that stops all others from being run is found by halves, and is refused by itself.
+        """
+        try:
+            return table(self.manifest, first, self._ensemble(first, last))
+        except UsageError as error:
+            if last - first == 1:
+                why = error.why if isinstance(error, NothingToRunError) else str(error)
+                return refused(self.manifest, first, last, why)
+        middle = (first + last) // 2
+        return library().concat_tables([self.rows(first, middle), self.rows(middle, last)])
+
+    def _ensemble(self, first: int, last: int) -> Any:
+        call: dict[str, Any] = dict(self.manifest.arguments)
+        groups = {group: dict(call.pop(group, {})) for group in ("parameters", "initial")}
+        for name, values in self.manifest.variation.values(first, last).items():
+            groups["initial" if name.startswith(INITIAL) else "parameters"][name.removeprefix(INITIAL)] = values
+        kept = self.manifest.recording
+        call |= groups | {"samples": kept.samples, "every_transition": kept.transitions}
+        found = self.model.ensemble(**call, threads=self.threads)
+        if "interrupted" in found.reasons:
+            raise KeyboardInterrupt
+        return found
+
+    def check(self, rows: Sequence[int]) -> None:
+        """Refuse a sweep of which no row can be run, all for one reason: a setting is wrong.
+
+        Raises UsageError: the reason.
+        """
+        refusals: list[UsageError] = []
+        for k in rows:
+            try:
+                self._ensemble(k, k + 1)
+                return
+            except UsageError as error:
+                refusals.append(error)
+        if len({str(error) for error in refusals}) == 1:
+            raise refusals[0]
+
+
+def sweep(
+    model: Model,
+    vary: Sequence[str] | Mapping[str, Any],
+    out: str | os.PathLike[str],
+    random: int | None,
+    seed: int,
+    record: str | Sequence[str],
+    outputs: Sequence[str] | None,
+    cluster: str | None,
+    processes: int | None,
+    chunk: int | None,
+    progress: Progress | None,
+    arguments: dict[str, Any],
+) -> Sweep:
+    """Run a sweep, or what is missing of it; see `Model.sweep`."""
+    library("pyarrow.parquet")
+    folder = Path(out)
+    model = model if outputs is None else model.only(outputs)
+    planned = _planned(model, vary, random, seed, record, outputs, chunk, arguments)
+    with _place(cluster, processes or cores()) as run:
+        work, missing = _begun(model, planned, folder, chunk, processes or cores(), cluster is None)
+        _fill(work, folder, missing, run, progress)
+    return Sweep(folder, work.manifest)
+
+
+@contextmanager
+def _place(cluster: str | None, processes: int) -> Generator[Run]:
+    """What makes chunks: processes here, or a cluster."""
+    if cluster is None:
+        yield partial(run_here, processes=processes if can_fork() else 1)
+        return
+    from hsdsl.execution.samples import optional
+
+    optional("distributed", "a sweep on a cluster", "cluster")
+    from hsdsl.sweep.cluster import connected
+
+    with connected(cluster) as run:
+        yield run
+
+
+def _fill(work: ChunkWork, folder: Path, missing: Sequence[int], run: Run, progress: Progress | None) -> None:
+    """Make the missing chunks."""
+    found = Sweep(folder, work.manifest)
+    done = found.rows - sum(last - first for first, last in map(work.manifest.rows_of, missing))
+
+    def write(number: int, content: bytes) -> None:
+        nonlocal done
+        write_chunk(folder, number, content)
+        first, last = work.manifest.rows_of(number)
+        done += last - first
+        if progress is not None:
+            progress(done, found.rows)
+
+    if progress is not None:
+        progress(done, found.rows)
+    if missing:
+        run(work, missing, write)
+
+
+def _planned(
+    model: Model,
+    vary: Sequence[str] | Mapping[str, Any],
+    random: int | None,
+    seed: int,
+    record: str | Sequence[str],
+    outputs: Sequence[str] | None,
+    chunk: int | None,
+    arguments: dict[str, Any],
+) -> Manifest:
+    """The manifest of a sweep that is still to be measured."""
+    given = {name: value for name, value in arguments.items() if value not in (None, {})}
+    check_arguments(given, "a sweep", without=("samples", "precision"))
+    fixed = {group: overrides_of(given, group) for group in ("parameters", "initial")}
+    values = with_parameters(model.pipeline.values(FLOAT64), fixed["parameters"])
+    varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
+    _check_names(model, varied.names, fixed)
+    if chunk is not None and chunk < 1:
+        raise UsageError(f"--chunk: expected at least 1 row, got {chunk}")
+    program = model.program
+    kept = {name for name in (*program.all_states, *program.outputs) if outputs is None or name in outputs}
+    return manifests.new(
+        model=program.path,
+        digest=program.digest,
+        title=program.title,
+        units=program.units,
+        variation=varied,
+        recording=recording.read(record),
+        arguments={name: _plain(value) for name, value in given.items()},
+        states=tuple(name for name in program.all_states if name in kept),
+        outputs=tuple(name for name in program.outputs if name in kept),
+        chunk=chunk or 1,
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: as_written(item) for name, item in cast("Mapping[str, Any]", value).items()}
+    return as_written(value)
+
+
+def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse what cannot be varied, and what is given as well."""
+    program = model.program
+    known = [*program.parameters, *(f"{INITIAL}{state}" for state in program.all_states)]
+    for name in names:
+        if name not in known:
+            settings = name.removeprefix("experiment.") in KEYS
+            hint = "until and relaxation may be expressions of a parameter that varies" if settings else None
+            hint = hint or did_you_mean(name, known) or f"it may vary {', '.join(known)}"
+            raise UsageError(f"--vary: the model has no parameter or initial value '{name}'", hint)
+        group = "initial" if name.startswith(INITIAL) else "parameters"
+        if name.removeprefix(INITIAL) in fixed[group]:
+            raise UsageError(f"{name} is both set and varied", "leave one of them out")
+
+
+def _begun(
+    model: Model, planned: Manifest, folder: Path, chunk: int | None, processes: int, here: bool
+) -> tuple[ChunkWork, list[int]]:
+    """The work of a sweep that goes on in a folder, or begins there, and the chunks that are missing."""
+    threads = processes if here and not can_fork() else 1
+    if (folder / manifests.FILE).exists():
+        there = manifests.read(folder)
+        there.check_same(planned, folder)
+        if chunk not in (None, there.chunk):
+            raise UsageError(f"{folder} has chunks of {there.chunk} rows, not {chunk}", "leave --chunk out to go on")
+        found = Sweep(folder, there)
+        broken = set(damaged(found))
+        return ChunkWork(model, there, threads), [
+            k for k in range(there.chunks) if k in broken or k not in found.chunks
+        ]
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} is not an empty folder", "choose another one")
+    work = ChunkWork(model, planned)
+    size = _measured(work, processes)
+    manifest = replace(planned, chunk=chunk or size)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from None
+    manifest.write(folder)
+    return ChunkWork(model, manifest, threads), list(range(manifest.chunks))
+
+
+def _measured(work: ChunkWork, processes: int) -> int:
+    """How many rows a chunk should have: some seconds of work, little memory, and enough chunks for every process.
+
+    A few rows are run for that. What they refuse for another reason than their own values is refused here.
+    """
+    rows = work.manifest.variation.rows
+    work.check(np.unique(np.linspace(0, rows - 1, min(rows, PROBES)).astype(int)).tolist())
+    first, shared = rows // 2, math.ceil(rows / (CHUNKS_A_CORE * processes))
+    work.rows(first, first + 1)  # what is imported and compiled only once does not count
+    count, seconds, size = 1, 0.0, 0.0
+    while seconds < SECONDS / 20 and 2 * count <= rows - first:
+        count *= 2
+        began = time.perf_counter()
+        size = work.rows(first, first + count).nbytes / count
+        seconds = time.perf_counter() - began
+    by_memory, by_time = BYTES / max(1.0, size), SECONDS * count / max(seconds, 1e-6)
+    return max(1, int(min(by_memory, by_time, shared, MOST_ROWS)))

@@ -1,0 +1,100 @@
+# pyarrow has no types.
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+"""What a picture of a sweep is of: which columns, over which of the names that vary.
+
+A column of lists gives a bifurcation diagram over the first name. A column of numbers or words gives a curve over one
+name, a map over two. More names are refused: their rows would lie on each other.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.errors import UsageError
+from hsdsl.names import did_you_mean
+from hsdsl.sweep.manifest import Manifest
+from hsdsl.sweep.rows import LISTS, column_of
+
+if TYPE_CHECKING:
+    from hsdsl.execution import Array
+    from hsdsl.plot.sweep import Axis
+    from hsdsl.sweep.dataset import Sweep
+
+TIMES = {"transition": "transition.time", "before": "transition.time", "after": "transition.time"}
+
+
+def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float) -> None:
+    """Draw a column of a sweep; left out, the numbers of transitions.
+
+    Raises UsageError: no such column, one that cannot be drawn, or more than two names that vary.
+    """
+    from hsdsl.plot import sweep as plots
+
+    column = of or "transitions"
+    names = sweep.manifest.variation.names
+    if column not in sweep.columns or column in ("row", "message", "verdict.reasons", *map(column_of, names)):
+        raise UsageError(f"--of: the sweep has no column '{column}' to draw", _hint(sweep, column))
+    listed = column.partition(".")[0] in LISTS
+    if len(names) > (1 if listed else 2):
+        most = "a bifurcation diagram has one name that varies" if listed else "a map has two"
+        raise UsageError(f"{most}, and here {', '.join(names)} vary", "read the dataset with pandas, and draw a part")
+    if not 0 < tail <= 1:
+        raise UsageError(f"--tail: expected a share above 0 and up to 1, got {tail:g}")
+    title, unit = sweep.manifest.title or sweep.manifest.model, sweep.manifest.units.get(column.rpartition(".")[2])
+    label = f"{column} [{unit}]" if unit else column
+    axes = [_axis(sweep, name) for name in names]
+    if listed:
+        values, where = _dots(sweep, column, tail)
+        plots.plot_dots(path, axes[0], plots.Quantity(label, values), where, title)
+        return
+    quantity = plots.Quantity(label, _numbers(sweep, column))
+    if len(axes) == 1:
+        plots.plot_curve(path, axes[0], quantity, title)
+    else:
+        plots.plot_map(path, axes[0], axes[1], quantity, title)
+
+
+def _hint(sweep: Sweep, column: str) -> str:
+    first = column.partition(".")[0]
+    if first in LISTS:
+        return f"record it: --record {'outputs:every=TIME' if first == 'sample' else 'transitions'}"
+    return did_you_mean(column, sweep.columns) or f"there are {', '.join(sweep.columns)}"
+
+
+def _axis(sweep: Sweep, name: str) -> Axis:
+    from hsdsl.plot.sweep import Axis
+
+    manifest: Manifest = sweep.manifest
+    grid = next((grid for grid in manifest.variation.grids if grid.name == name), None)
+    drawn = next((each for each in manifest.variation.draws if each.name == name), None)
+    unit = manifest.units.get(name.removeprefix("initial."))
+    logarithmic = grid.logarithmic if grid else drawn is not None and drawn.distribution.startswith("log")
+    label = f"{name} [{unit}]" if unit else name
+    return Axis(label, sweep[name], grid and grid.values, logarithmic)
+
+
+def _numbers(sweep: Sweep, column: str) -> Array:
+    """A column as numbers, or as words."""
+    values = sweep[column]
+    return values if values.dtype == object else values.astype(float)
+
+
+def _dots(sweep: Sweep, column: str, tail: float) -> tuple[Array, Array]:
+    """The numbers of lists in the last part of each run, and the row of each among those that there are."""
+    times = TIMES.get(column.partition(".")[0], "sample.time")
+    values: list[Any] = [np.empty(0)]
+    where, rows = [np.empty(0, int)], 0
+    for table in sweep.batches(list(dict.fromkeys([column, times, "time"]))):
+        at, lists = table.column(times).combine_chunks(), table.column(column).combine_chunks()
+        row = at.value_lengths().fill_null(0).to_numpy().astype(int)
+        row = np.repeat(np.arange(table.num_rows), row)
+        ends = table.column("time").to_numpy()
+        found = lists.flatten().to_numpy(zero_copy_only=False)
+        late = at.flatten().to_numpy(zero_copy_only=False) >= (1 - tail) * ends[row]
+        values.append(found[late])
+        where.append(row[late] + rows)
+        rows += table.num_rows
+    return np.concatenate(values), np.concatenate(where)

@@ -1,0 +1,98 @@
+"""``hsdsl sweep``: datasets, pictures, JSON, and one clear message for what cannot be."""
+
+from __future__ import annotations
+
+import pytest
+
+from hsdsl.cli.sweep import Pace, duration
+
+DECAY = """hsdsl: 1
+title: Decay
+parameters: {rate: 1, low: 0.5}
+modes:
+  high:
+    flow: {x: -rate*x}
+    transitions: [{when: x <= low, to: low_mode}]
+  low_mode:
+    flow: {x: -rate*x}
+initial: {mode: high, x: 1}
+experiment: {until: 2}
+"""
+
+
+def test_a_dataset_is_made_continued_and_shown(command, model, tmp_path):
+    pytest.importorskip("pyarrow")
+    out, words = tmp_path / "s", ["--vary", "rate=0.1:1:4", "--vary", "low=0.4,0.8", "--processes", 1]
+    first = command("sweep", model(DECAY), *words, "--out", out, "--chunk", 3)
+    assert first.code == 0 and "8 of 8 rows in 3 of 3 files" in first.out and "8 until" in first.out
+    (out / "chunk-000001.parquet").unlink()
+    shown = command("sweep", "--show", out, "--json", "--of", "mode")
+    assert (shown.json["done"], shown.json["complete"], shown.json["stops"]) == (5, False, {"until": 5})
+    assert (out / "_picture.png").read_bytes().startswith(b"\x89PNG") and f"wrote {out}" in shown.err
+    again = command("sweep", model(DECAY), *words, "--out", out, "--json", "--plot", tmp_path / "p.svg")
+    assert again.json["complete"] and [item["name"] for item in again.json["vary"]] == ["rate", "low"]
+    assert "final.x" not in (tmp_path / "p.svg").read_text()
+    assert command("sweep", model(DECAY), *words, "--out", out, "--until", 3).code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "expected a model, or --show DIR"),
+        (["MODEL"], "expected --vary"),
+        (["MODEL", "--vary", "rate=1"], "expected --out DIR"),
+        (
+            ["MODEL", "--vary", "rat=1", "--out", "OUT"],
+            "initial value 'rat'\n  hint: did you mean 'rate'",
+        ),
+        (["MODEL", "--vary", "rate=1:x:3", "--out", "OUT"], "--vary rate"),
+        (["MODEL", "--vary", "rate=1", "--out", "OUT", "--record", "all"], "--record"),
+        (["MODEL", "--vary", "rate=1", "--out", "OUT", "--plot", "p.pdf"], "the name must end in .png or .svg"),
+        (["MODEL", "--show", "OUT"], "takes neither MODEL"),
+        (["--show", "OUT"], "is not a sweep"),
+    ],
+)
+def test_what_cannot_be_served_is_refused(command, model, tmp_path, words, message):
+    pytest.importorskip("pyarrow")
+    names = {"MODEL": model(DECAY), "OUT": tmp_path / "out"}
+    answer = command("sweep", *(names.get(word, word) for word in words))
+    assert answer.code == 2 and message in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_pyarrow_there_is_a_hint(command, model, tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    answer = command("sweep", model(DECAY), "--vary", "rate=1", "--out", tmp_path / "s")
+    assert answer.code == 2 and "pip install 'hsdsl[sweep]'" in answer.err
+
+
+def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(command, model, tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow")
+    note = Pace.note
+
+    def interrupted(self, done, rows):
+        note(self, done, rows)
+        if done == 4:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Pace, "note", interrupted)
+    words = ["--vary", "rate=0.1:1:8", "--out", tmp_path / "s", "--processes", 1, "--chunk", 2]
+    answer = command("sweep", model(DECAY), *words)
+    assert answer.code == 130 and "4 of 8 rows are in" in answer.err and "the same command goes on" in answer.err
+    monkeypatch.setattr(Pace, "note", note)
+    assert command("sweep", model(DECAY), *words).code == 0
+
+
+def test_progress_shows_rate_and_time_left(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("hsdsl.cli.sweep.time.monotonic", lambda: clock[0])
+    pace = Pace()
+    pace.note(100, 1100)  # a sweep that goes on
+    assert pace.text(10) == "[=         ] 100 of 1,100 rows"
+    clock[0] = 110.0
+    pace.note(600, 1100)
+    assert pace.text(10) == "[=====     ] 600 of 1,100 rows, 50 rows/s, 10 s left"
+    assert [duration(s) for s in (59.4, 61, 7260)] == ["59 s", "1 min 01 s", "2 h 01 min"]
