@@ -30,7 +30,7 @@ SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does;
 WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
 WEIGHT = "The weight of a column; left out, one over its largest size. May be repeated."
-Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with a column t and columns of states and outputs.")]
+Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file: t or time, and states and outputs.")]
 
 
 def fit(

@@ -127,7 +127,7 @@ class _Table:
         columns = [cell.strip().strip('"') for cell in header.split(",")] if self.lines else []
         if "time" not in columns or name not in columns:
             present = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
-            message = f"the header must be `time,{name}`, and has {present}"
+            message = f"expected the columns `time` and `{name}`, got {present}"
             self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns))
             return
         for number, line in enumerate(self.lines[1:], start=2):

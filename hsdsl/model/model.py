@@ -320,7 +320,7 @@ class Model:
         Parameters
         ----------
         data : path, mapping or DataFrame
-            A CSV file, or columns by name: ``t``, and states and outputs. An empty or NaN cell was not measured.
+            A CSV file, or columns by name: ``t`` or ``time``, states, outputs. An empty or NaN cell was not measured.
         wrt : str or sequence of str
             What to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The first
             values are those of the file, or of ``parameters`` and ``initial``.

@@ -79,7 +79,8 @@ class InputFile(Document):
     """An input given by samples in a CSV file."""
 
     file: Label = required(
-        "A CSV file with the header `time,NAME`, by its path from the model's own folder, inside it.", "u.csv"
+        "A CSV file with columns `time` and the input's name, by its path from the model's own folder, inside it.",
+        "u.csv",
     )
     hold: Hold = optional(_HOLD, "linear", default="zero")
 
