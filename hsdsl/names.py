@@ -13,6 +13,7 @@ INVISIBLE = re.compile(
 )
 _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
+SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300

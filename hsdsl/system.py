@@ -20,6 +20,7 @@ import sympy as sp
 from hsdsl.expression.scope import symbol
 
 TIME = sp.Symbol("t", real=True)
+ZERO, ONE = sp.S.Zero, sp.S.One
 
 
 @dataclass(frozen=True)

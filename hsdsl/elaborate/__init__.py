@@ -18,12 +18,14 @@ from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
 from hsdsl.elaborate.scene import elaborate_scene, scene_of
 from hsdsl.elaborate.symbols import SymbolTable
+from hsdsl.elaborate.timers import with_timers
 from hsdsl.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
+from hsdsl.names import SINCE
 from hsdsl.schema import ModelDocument, read
 from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem, switch_parameter
@@ -93,6 +95,7 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
         try:
             with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
                 system = _system(symbols)
+                system = with_timers(system) if symbols.timed else system
         except OutOfTime:
             _report_timeout(symbols.resolver)
         except ValueError as error:  # a check at birth that no diagnostic foresaw
@@ -165,7 +168,7 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
 
 
 def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Meaning]:
-    others = {"t": "the time", **dict.fromkeys(system.states, "a state")}
+    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
     others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
     values: dict[str, Meaning] = {
         name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()

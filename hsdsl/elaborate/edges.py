@@ -8,7 +8,7 @@ import re
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
-from hsdsl.names import did_you_mean, shown
+from hsdsl.names import SINCE, did_you_mean, shown
 from hsdsl.schema import ModeDocument, TransitionDocument
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Edge, Surface
@@ -113,6 +113,8 @@ def _check_reset(
         if key not in states and key not in symbols.undeclared:  # those are reported under `initial`
             name, equals, value = (part.strip() for part in key.partition("="))
             hint = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
+            if key == SINCE and symbols.timed:
+                hint = "every transition into a mode starts it at 0"
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             symbols.report(key.place, "HS306", message, hint)
     for state in states:

@@ -10,7 +10,7 @@ from hsdsl.elaborate.symbols import SymbolTable, cycle_among
 from hsdsl.errors import STEP_AND_TOLERANCE
 from hsdsl.expression.scope import Scope, Value, state
 from hsdsl.expression.syntax import Name, walk
-from hsdsl.names import closest, did_you_mean, shown
+from hsdsl.names import SINCE, closest, did_you_mean, shown
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Experiment, Initial, started
 
@@ -62,7 +62,7 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
         return  # entered with the given values, or reported
     lacking = [s for s in symbols.states[mode] if s not in given]
     for key in given:
-        if key not in symbols.states[mode]:
+        if key not in symbols.states[mode] and not (key == SINCE and symbols.timed):
             message = f"the mode '{mode}' has no state '{shown(key)}'"
             hint = f"under `flow` of '{mode}' write {shown(key)}: and its derivative, or remove it here"
             symbols.report(key.place, "HS308", message, did_you_mean(key, lacking) or hint)

@@ -55,7 +55,7 @@ def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[
 
 def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope:
     """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
-    states = frozenset(symbols.states[name])
+    states = symbols.states_within(str(name))
     place = f"the mode '{name}'"
     own: Meanings = {}
     refused: Meanings = {}

@@ -10,7 +10,7 @@ from functools import cached_property
 from hsdsl.elaborate.resolver import ExpressionResolver, all_of
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.files import ModelFiles
-from hsdsl.names import closest
+from hsdsl.names import SINCE, closest
 from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
@@ -59,6 +59,8 @@ class SymbolTable:
                     self.report(key.place, "HS301", message, "give one of them another name")
         self.values["t"] = Value(TIME)
         self.values |= {name: state(name) for name in self.all_states()}
+        if self.timed:
+            self.values[SINCE] = state(SINCE)
         self.undeclared = frozenset(self._undeclared())
         self.values.update(dict.fromkeys(self.undeclared))
 
@@ -67,7 +69,7 @@ class SymbolTable:
         mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
         if mode is None or mode.flow is None:
             return []
-        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names]
+        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names and key != SINCE]
         return [key for key in given if closest(key, map(str, mode.flow)) is None]
 
     def scope(
@@ -79,6 +81,9 @@ class SymbolTable:
             return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
 
         known: Meanings = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
+        if self.timed:
+            since = "the time since the mode was entered"
+            known[SINCE] = self.values[SINCE] if "states" in usable else refusal(SINCE, since)
         for name, kind in self.names.items():
             if kind not in (*usable, "functions"):
                 known[name] = refusal(name, KINDS[kind])
@@ -115,6 +120,16 @@ class SymbolTable:
     def all_states(self) -> tuple[str, ...]:
         """Every state of every mode, once."""
         return tuple(name for name, kind in self.names.items() if kind == "states")
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether `since` is the time since the mode was entered: the file defines no such name."""
+        return SINCE not in self.names and SINCE not in self.inner_lets
+
+    def states_within(self, mode: str) -> frozenset[str]:
+        """The states that expressions of a mode may use: its own ones and, where it has a flow, `since`."""
+        timed = self.timed and not self.without_states(self.document.modes[mode])  # pyright: ignore[reportArgumentType]
+        return frozenset((*self.states[mode], SINCE) if timed else self.states[mode])
 
     @cached_property
     def all_outputs(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import sympy as sp
 from hsdsl.expression.expression_hints import NAMES, derivative_of, timed, unit
 from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Tree, walk
 from hsdsl.functions import CONSTANTS, FUNCTIONS
-from hsdsl.names import WORDS, closest, did_you_mean, shown
+from hsdsl.names import SINCE, WORDS, closest, did_you_mean, shown
 
 RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
 
@@ -134,7 +134,7 @@ class Scope:
         hint = None
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
-            hint = did_you_mean(node.name, sorted(self.states))
+            hint = did_you_mean(node.name, sorted(self.states - {SINCE}))
         return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:

@@ -40,8 +40,8 @@ class _Names:
 
     def __init__(self, document: ModelDocument) -> None:
         states = dict.fromkeys(str(key) for mode in document.modes.values() for key in mode.flow or ())
-        kinds = {"state": states, "input": document.inputs, "parameter": document.parameters, "let": document.let}
-        kinds["function"] = document.functions
+        kinds: dict[str, Iterable[str]] = {"state": states, "input": document.inputs, "let": document.let}
+        kinds |= {"parameter": document.parameters, "function": document.functions}
         self.top = {str(name): Definition(kind, None, str(name)) for kind, names in kinds.items() for name in names}
         self.own = {
             str(key): {str(name): Definition("let", str(key), str(name)) for name in mode.let}

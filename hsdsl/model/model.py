@@ -16,7 +16,7 @@ from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import ARGUMENTS, Options, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean, visible
+from hsdsl.names import SINCE, did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
@@ -484,7 +484,12 @@ class Model:
         if files is None:
             raise UsageError("expected a model that was read from text")
         read = elaborate_files(files)
-        return completed_text(read.text, read.root, read.system)
+        declared = any(SINCE in (mode.flow or ()) for mode in read.document.modes.values())
+        text = completed_text(read.text, read.root, read.system)
+        if text is not None and SINCE in read.system.states and not declared:
+            hint = "write it as a state: its flow 1 in each mode, and since: 0 in each reset"
+            raise UsageError("a model that uses `since` cannot be written with its completions", hint)
+        return text
 
     def only(self, outputs: Sequence[str]) -> Model:
         """Return the model with these states and outputs and those they, or any transition, depend on.

@@ -44,7 +44,7 @@ import hsdsl
 
 HERE = Path(__file__).parent
 CASES = {path.name.removesuffix(".expect.yaml"): path for path in sorted((HERE / "cases").glob("*.expect.yaml"))}
-MEANING = [f"M{k}" for k in range(1, 12)]
+MEANING = [f"M{k}" for k in range(1, 13)]
 SCHEMES = ("relaxed", "located")
 LIMIT = 30  # seconds for one run; most take a thousandth of it
 ENGINES: dict[str, dict[str, Any]] = {"python": {"engine": "python"}} | ({"c": {"engine": "c"}} if COMPILER else {})

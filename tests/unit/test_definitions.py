@@ -102,3 +102,44 @@ def test_derivatives_go_through_initial_values(start, given):
         dx = 2 * y * dy + by_a
         dz = dx * y + (y**2 + 2) * dy
         assert found[name] == pytest.approx(dz * e + (dy + dx) * (1 - e) - dx * e, rel=1e-9)
+
+
+SINCE = """hsdsl: 1
+modes:
+  on:
+    flow: {x: "exp(-since)"}
+    transitions: [{when: since >= 1/3, to: off}]
+  off:
+    flow: {x: 0}
+    transitions: [{when: t >= 1, to: on}]
+initial: {mode: on, x: 0}
+experiment: {until: 3/2}
+"""
+
+
+def test_time_in_a_mode_is_a_state_of_the_modes_that_use_it():
+    made = elaborate("m.yaml", text=SINCE.encode())
+    assert [mode.states for mode in made.modes] == [("x", "since"), ("x",)]
+    assert [edge.target_states for mode in made.modes for edge in mode.edges] == [("x",), ("x", "since")]
+    plain = elaborate("m.yaml", text=SINCE.replace("since", "t").encode())
+    assert plain.states == ("x",)
+
+
+def test_a_name_of_the_file_goes_before_the_timer():
+    text = SINCE.replace("modes:", "parameters: {since: 2}\nmodes:", 1)
+    assert elaborate("m.yaml", text=text.encode()).states == ("x",)
+
+
+def test_derivatives_through_a_dwell(tmp_path):
+    """The mode is left when since = rest, entered at 0: x = 1 - exp(-rest) then."""
+    (tmp_path / "m.yaml").write_text(SINCE.replace("1/3", "rest").replace("modes:", "parameters: {rest: 1/3}\nmodes:"))
+    found = hsdsl.load(tmp_path / "m.yaml").sensitivity("rest", until="3/4").final.state["x"]
+    assert found["rest"] == pytest.approx(math.exp(-1 / 3), rel=1e-9)
+
+
+def test_completions_as_text_refuse_the_timer(tmp_path):
+    mode = "{flow: {h: v, v: -1}, transitions: [{when: h <= 0, to: m, reset: {v: -v/2}}], outputs: {s: since}}"
+    text = f"hsdsl: 1\nmodes: {{m: {mode}}}\ninitial: {{mode: m, h: 1, v: 0}}\nexperiment: {{until: 9}}\n"
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(UsageError, match="`since` cannot be written with its completions"):
+        hsdsl.load(tmp_path / "m.yaml").completed()

@@ -9,6 +9,7 @@ from functools import cached_property
 from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
+from hsdsl.names import SINCE
 from hsdsl.schema import ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
 
@@ -70,8 +71,9 @@ class Units:
         return self._read[1]
 
     def of(self, name: str) -> Unit | None:
-        """The unit of a state, a parameter, an input, an output or `t`; None where it is not known."""
-        return self._read[0].get(name)
+        """The unit of a state, a parameter, an input, an output, `t` or `since`; None where it is not known."""
+        known = self._read[0]
+        return known.get("t") if name == SINCE and name not in known else known.get(name)
 
     @cached_property
     def checked(self) -> tuple[Checked, ...]:
