@@ -40,7 +40,7 @@ def _without(system: HybridSystem) -> Initial:
 
 
 def _uses(expression: Any) -> bool:
-    return expression is not None and _TIMER in expression.free_symbols
+    return _TIMER in getattr(expression, "free_symbols", ())
 
 
 def _parts(mode: Mode) -> Iterator[Any]:
