@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Argument
 
@@ -22,12 +22,8 @@ from hsdsl.cli.options import (
     option,
     split,
 )
+from hsdsl.cli.saved import run_of
 from hsdsl.errors import UsageError
-
-if TYPE_CHECKING:
-    from hsdsl.execution import Execution
-    from hsdsl.model import Model
-
 
 SET = "Override a parameter. May be repeated."
 FIRST = "The model file, or a run: a saved one (.npz), or a model's own experiment."
@@ -127,7 +123,7 @@ def _between_runs(
     from hsdsl.model.distances import distance_of_runs as between_runs
     from hsdsl.model.distances import plot_distance
 
-    (run, model), (other, _) = (_run(path, options["parameters"]) for path in paths)
+    (run, model), (other, _) = (run_of(path, options["parameters"]) for path in paths)
     options = {**options, "model": model}
     with progress() as show:
         watch = show and partial(_watch, show)
@@ -143,17 +139,3 @@ def _between_runs(
 
 def _watch(show: Callable[[Text], None], lower: float, upper: float) -> None:
     show(lambda: f"at least {lower:.4g}, at most {upper:.4g} so far")
-
-
-def _run(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | Path | None]:
-    """A run, and its model where its path is not the recorded one."""
-    if path.suffix.lower() == ".npz":
-        from hsdsl.store import load
-
-        run = load(path)
-        neighbour = path.parent / Path(run.model).name
-        return run, neighbour if not Path(run.model).exists() and neighbour.exists() else None
-    from hsdsl.model import load as load_model
-
-    model = load_model(path)  # read once: it may come through a pipe
-    return model.simulate(parameters=parameters), model

@@ -52,6 +52,8 @@ StepSize = Annotated[str | None, option("H", "Fixed step size; excludes --tolera
 Tolerance = Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")]
 CompletionName = Annotated[Completion | None, option("C", "Where transitions accumulate: contact, auto or none.")]
 Relaxation = Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")]
+PAIR = "Draw one state or output against another, in one of the pictures. May be repeated."
+Phases = Annotated[list[str] | None, option("X,Y", PAIR, "--phase")]
 AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
 Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]
 
@@ -103,6 +105,26 @@ def settings_of(overrides: list[str] | None, **settings: Any) -> dict[str, Any]:
 def names_of(text: str | None) -> list[str]:
     """The names in a text with commas between them."""
     return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:
+    """Read ``--phase``; None where it is left out.
+
+    Raises
+    ------
+    UsageError
+        No pair, or no such state or output.
+    """
+    pairs: list[tuple[str, str]] = []
+    for text in texts or ():
+        names = [part.strip() for part in text.split(",")]
+        if len(names) != 2 or not all(names):
+            raise UsageError(f"--phase: expected two names with a comma between them, got '{text}'")
+        for name in names:
+            if name not in known:
+                raise UsageError(f"--phase: there is no state or output '{name}'", did_you_mean(name, known))
+        pairs.append((names[0], names[1]))
+    return pairs or None
 
 
 def check_target(path: Path | None, option: str, suffixes: Sequence[str]) -> None:

@@ -19,6 +19,7 @@ from hsdsl.cli.options import (
     MethodName,
     Model,
     Overrides,
+    Phases,
     Quiet,
     Relaxation,
     SchemeName,
@@ -29,8 +30,10 @@ from hsdsl.cli.options import (
     check_target,
     names_of,
     option,
+    pairs_of,
     settings_of,
 )
+from hsdsl.cli.shown import needed, shown_of, write_film
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
 from hsdsl.names import did_you_mean, visible
@@ -44,6 +47,9 @@ STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
 ESTIMATE = "Run again, finer, and give the distance of the runs."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
+DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
+FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
+SPEED = "Of the film: time of the run by seconds; else 1 where the film then lasts 4 to 20 s."
 OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".html")
 
 
@@ -63,7 +69,10 @@ def run(
     estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
     out: Annotated[Path | None, option("FILE", "Save the execution: .csv, .parquet or .npz.")] = None,
     every: Annotated[int | None, option("K", EVERY)] = None,
-    plot: Annotated[Path | None, option("FILE", "Draw it: .png, .svg or .html.")] = None,
+    plot: Annotated[Path | None, option("FILE", DRAW)] = None,
+    phase: Phases = None,
+    animate: Annotated[Path | None, option("FILE", FILM)] = None,
+    speed: Annotated[float | None, option("X", SPEED)] = None,
     json: Json = False,
     quiet: Quiet = False,
     allow_path: AllowPath = None,
@@ -75,24 +84,30 @@ def run(
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         check_target(plot, "--plot", PLOT_SUFFIXES)
+        check_target(animate, "--animate", (".gif", ".mp4"))
         loaded = _load(model, engine, precision, scheme)
         settings = settings_of(
             overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
             relaxation=relaxation, completion=completion, engine=engine, precision=precision,
         )  # fmt: skip
         names = chosen_names(outputs, loaded.columns)
+        shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
         result: Any
         with progress(quiet or json) as show:
             settings["watch"] = show and partial(_watch, show)
             if every is None:
-                result = loaded.simulate(**settings, outputs=names)
-            elif out is None or plot is not None or estimate or precision is not None:
-                raise UsageError("--every streams to --out FILE.csv, without --plot, --estimate or --precision")
+                result = loaded.simulate(**settings, outputs=needed(shown))
+            elif out is None or plot or animate or estimate or precision is not None:
+                raise UsageError(
+                    "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
+                )
             else:
                 settings = {name: value for name, value in settings.items() if value is not None}
                 result = loaded.stream(out, every=every, columns=names, **settings)
         if every is None:
-            _answer(loaded, result, names, estimate, out, plot, settings["parameters"], json, quiet)
+            _answer(loaded, result, shown, estimate, out, plot, settings["parameters"], json, quiet)
+            if animate is not None:
+                write_film(loaded, animate, speed, settings, quiet or json)
         else:
             _answer_streamed(result, model, json, quiet)
     stop = result.stop
@@ -115,7 +130,7 @@ def _load(path: Path, engine: str, precision: int | None, scheme: str | None) ->
 def _answer(
     model: Any,
     execution: Execution,
-    names: list[str] | None,
+    shown: dict[str, Any],
     estimate: bool,
     out: Path | None,
     plot: Path | None,
@@ -124,6 +139,7 @@ def _answer(
     quiet: bool,
 ) -> None:
     """Save, draw and print a run."""
+    names = shown["columns"]
     estimated = model.estimate(execution) if estimate else None
     if estimated is not None:
         execution = execution.estimated()
@@ -131,7 +147,7 @@ def _answer(
         for written in execution.save(out, columns=names):
             say(f"wrote {written}")
     if plot is not None:
-        model.plot(execution, plot, parameters)
+        model.plot(execution, plot, parameters, **shown)
         say(f"wrote {plot}")
     if json:
         _print_json(execution, names, estimated)

@@ -18,8 +18,8 @@ from hsdsl.interrupts import INTERRUPTED, WORD
 from hsdsl.names import did_you_mean, visible
 
 VERBS = (
-    "run", "sweep", "validate", "lint", "explain", "distance", "sensitivity", "orbit", "fit", "chart", "stability",
-    "complete", "export", "import", "schema", "doctor",
+    "run", "plot", "sweep", "validate", "lint", "explain", "distance", "sensitivity", "orbit", "fit", "chart",
+    "stability", "complete", "export", "import", "schema", "doctor",
 )  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hsdsl.elaborate.modes import output_here, output_scope
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.source import Scalar
-from hsdsl.system import Shape
+from hsdsl.system import HybridSystem, Shape
 
 Numbers = list[tuple[Scalar | None, Value | None]]  # each with what it means to the whole model; 0 where left out
 _ZERO = 0
@@ -29,3 +31,11 @@ def scene_of(symbols: SymbolTable, numbers: Numbers, scope: Scope) -> tuple:
     """The numbers of a scene in a mode; None for one that it does not have."""
     found = (_ZERO if s is None else output_here(symbols, s, value, scope) for s, value in numbers)
     return tuple(value.expr if isinstance(value, Value) else value for value in found)
+
+
+def scene_as_outputs(system: HybridSystem) -> HybridSystem:
+    """The system with the numbers of its scene as further outputs, which a run then records."""
+    count = sum(shape.numbers for shape in system.scene)
+    modes = tuple(replace(mode, outputs=(*mode.outputs, *mode.scene)) for mode in system.modes)
+    outputs = (*system.outputs, *(f"scene {i}" for i in range(count)))  # no name of a model has a blank
+    return replace(system, modes=modes, outputs=outputs)

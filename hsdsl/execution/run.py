@@ -63,6 +63,8 @@ class Execution(Deferred):
         ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.refinement`).
     differentiation : callable or None
         ``differentiation(wrt) -> Sensitivity``: its derivatives.
+    look : callable or None
+        ``look() -> dict``: what a picture shows of its model, as options of `hsdsl.plot.View`.
     """
 
     model: str
@@ -91,6 +93,7 @@ class Execution(Deferred):
     assessment: Assessment | None = field(default=None, compare=False)
     repetition: Callable[[Execution], Execution] | None = field(default=None, compare=False)
     differentiation: Callable[[Any], Any] | None = field(default=None, compare=False)
+    look: Callable[[], dict[str, Any]] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
@@ -131,6 +134,7 @@ class Execution(Deferred):
             "assessment": None,
             "repetition": None,
             "differentiation": None,
+            "look": None,
         }
 
     def __repr__(self) -> str:
@@ -143,10 +147,30 @@ class Execution(Deferred):
         )
 
     def _repr_html_(self) -> str:
-        """Show a short summary in Jupyter."""
-        from hsdsl.report.html import html
+        """Show a short summary and a picture in notebooks."""
+        from hsdsl.plot.notebook import run_html
 
-        return html(self, limit=12)
+        return run_html(self)
+
+    def plot(self, figure: Any = None, **options: Any) -> list[Any]:
+        """Draw the run with Matplotlib, and return the axes: those over time, then those of phase plots.
+
+        Parameters
+        ----------
+        figure : Figure or SubFigure, optional
+            Where to draw; left out, a new figure of pyplot, which notebooks show by themselves.
+        **options
+            ``columns`` (names), ``phases`` (pairs of names), ``title``; see `hsdsl.plot.View`.
+
+        Raises UsageError: an unknown name.
+        """
+        from hsdsl.plot import axes
+
+        return axes(self, figure, **(self.view() | options))
+
+    def view(self) -> dict[str, Any]:
+        """Return what a picture shows of the model: units, levels of guards; nothing for a run read from a file."""
+        return {} if self.look is None else self.look()
 
     @property
     def made(self) -> int:

@@ -179,6 +179,7 @@ class Model:
             self._prepared.keep(key, ready)
         run = ready.simulate(watch, self.pipeline.seconds)
         run.__dict__["differentiation"] = partial(self._differentiate, arguments)
+        run.__dict__["look"] = partial(self.look, parameters)
         return run
 
     def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
@@ -513,17 +514,81 @@ class Model:
         return estimate(execution)
 
     def plot(
-        self, execution: Execution, path: str | os.PathLike[str], parameters: Mapping[str, Any] | None = None
+        self,
+        runs: Execution | Sequence[Execution],
+        path: str | os.PathLike[str],
+        parameters: Mapping[str, Any] | None = None,
+        **options: Any,
     ) -> None:
-        """Draw an execution of this model to a .png, .svg or .html file, with the levels of its guards.
+        """Draw executions of this model to a .png, .svg or .html file, with the levels of its guards.
 
-        The levels depend on ``parameters``, the overrides of the run.
+        Parameters
+        ----------
+        runs : Execution or sequence of Execution
+            Several are drawn in one picture.
+        parameters : mapping, optional
+            The overrides of the run, which the levels depend on.
+        **options
+            ``columns``, ``phases``, ``labels`` and ``title`` of `hsdsl.plot.View`.
+
+        Raises UsageError: an unknown name or suffix, or a file that cannot be written.
         """
-        from hsdsl.model.guards import guard_lines
         from hsdsl.plot import plot
 
+        plot(runs, path, **self.look(parameters), **options)
+
+    def animate(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        speed: float | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> Execution:
+        """Run the model and write its scene as a film: .gif, or .mp4 where ffmpeg is there.
+
+        Parameters
+        ----------
+        speed : float, optional
+            Time of the run by seconds of the film; left out, 1 where the film then lasts 4 to 20 s, else what fits.
+        progress : callable, optional
+            Called after each frame with how many there are, and how many there will be.
+        **arguments
+            Arguments of :meth:`simulate`, but ``outputs``.
+
+        Returns
+        -------
+        Execution
+            The run, with the numbers of the scene as further outputs.
+
+        Raises UsageError: the model has no scene, or the file cannot be written.
+        """
+        from hsdsl.plot.animation import animate, check
+
+        check(path)
+        run = self._staged.simulate(**arguments)
+        animate(run, self.system.scene, path, speed, self.program.units.get("t"), progress)
+        return run
+
+    def check_scene(self) -> None:
+        """Raise UsageError where the model has no scene."""
+        if not self.system.scene:
+            raise UsageError("the model has no scene to animate", "a scene has shapes: scene: [{point: [x, 0]}]")
+
+    @cached_property
+    def _staged(self) -> Model:
+        """The model with the numbers of its scene as further outputs."""
+        from hsdsl.elaborate.scene import scene_as_outputs
+
+        self.check_scene()
+        return Model(scene_as_outputs(self.system))
+
+    def look(self, parameters: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """What a picture shows of the model: its units, levels of its guards, and the program of its mode graph."""
+        from hsdsl.model.guards import guard_lines
+
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
-        plot(execution, path, guards=guard_lines(values), units=self.program.units, program=self.program)
+        return {"guards": guard_lines(values), "units": self.program.units, "program": self.program}
 
     def distance(
         self,

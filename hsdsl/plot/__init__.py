@@ -1,59 +1,77 @@
-"""A picture of a run: states over time with mode bands, jumps not joined, stop levels; a phase plot for two states."""
+# pyright: reportUnknownMemberType=false
+# (matplotlib's stubs leave the keyword arguments untyped)
+"""Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from io import BytesIO
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.execution import Execution
 from hsdsl.plot.curves import GuardLine
 from hsdsl.plot.style import FORMATS, check_suffixes, save, styled, write_figure
-from hsdsl.program import Program
-from hsdsl.report.html import page
+from hsdsl.plot.view import View
 from hsdsl.store.atomic import replacing
 
-__all__ = ["GuardLine", "plot", "save"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["GuardLine", "View", "axes", "plot", "save"]
 
 
-def plot(
-    execution: Execution,
-    path: str | os.PathLike[str],
-    *,
-    guards: Sequence[GuardLine] = (),
-    units: Mapping[str, str] | None = None,
-    title: str | None = None,
-    program: Program | None = None,
-) -> None:
-    """Draw a run.
+def plot(runs: Execution | Sequence[Execution], path: str | os.PathLike[str], **options: Any) -> None:
+    """Draw a run, or several in one picture.
 
     Parameters
     ----------
     path : path
-        ``.png``, ``.svg``, or ``.html`` (one self-contained page with the picture, the summary and the mode graph).
-    guards : sequence of GuardLine
-        Levels at which transitions fire, drawn as dotted lines where their mode is occupied.
-    units : mapping, optional
-        Units of states and outputs, and of time under the name ``t``, for the labels of the axes.
-    title : str, optional
-        Replaces the model's title (or its path, where it has none).
-    program : Program, optional
-        The model whose mode graph is in the page.
+        ``.png``, ``.svg``, or ``.html``: one interactive page with the summary and the mode graph, without network.
+    **options
+        What is shown, by the names of :class:`View`.
 
     Raises
     ------
     UsageError
-        For an unknown suffix, or a file that cannot be written.
+        For an unknown suffix or name, or a file that cannot be written.
     """
     (target,) = check_suffixes(path, formats=(*FORMATS, ".html"))
-    suffix = target.suffix.lower()
-    with styled(), replacing(target) as file:
-        from hsdsl.plot.figure import draw
-
-        figure = draw(execution, guards=guards, units=units or {}, title=title)
+    suffix, view = target.suffix.lower(), View(**options)
+    several = _several(runs)
+    with replacing(target) as file:
         if suffix == ".html":
-            picture = BytesIO()
-            write_figure(figure, picture, "svg")
-            file.write(page(execution, picture.getvalue().decode(), title, program).encode())
-        else:
-            write_figure(figure, file, suffix[1:])
+            from hsdsl.plot.page import page
+
+            file.write(page(several, view).encode())
+            return
+        with styled():
+            from hsdsl.plot.figure import picture
+
+            write_figure(picture(several, view), file, suffix[1:])
+
+
+def axes(runs: Execution | Sequence[Execution], figure: Any = None, **options: Any) -> list[Axes]:
+    """Draw runs to a figure of pyplot, which notebooks show by themselves, or to a given one; return its axes.
+
+    Parameters
+    ----------
+    figure : Figure or SubFigure, optional
+        Where to draw; left out, a new figure of pyplot.
+    **options
+        As for :func:`plot`.
+
+    Raises UsageError: an unknown name.
+    """
+    several, view = _several(runs), View(**options)
+    with styled():
+        from hsdsl.plot.figure import draw, size_of
+
+        if figure is None:
+            from matplotlib import pyplot
+
+            figure = pyplot.figure(figsize=size_of(several, view), layout="constrained")
+        return draw(several, view, figure)
+
+
+def _several(runs: Execution | Sequence[Execution]) -> list[Execution]:
+    return [runs] if isinstance(runs, Execution) else list(runs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -43,6 +44,7 @@ class Curves:
     begins: Array
     jumps: Array
     bands: list[tuple[str, float, float]]
+    ends_badly: bool = False
 
     @property
     def span(self) -> tuple[float, float]:
@@ -54,10 +56,21 @@ class Curves:
         """The modes of the bands, in the order of their first."""
         return tuple(dict.fromkeys(mode for mode, _, _ in self.bands))
 
+    def has_values(self, name: str) -> bool:
+        """Whether a state or output has a number anywhere."""
+        return bool(np.isfinite(self.column(name)).any())
+
     def column(self, name: str) -> Array:
         """Return a state or output, not-a-number where there is nothing to draw."""
+        if name not in self.samples.names:
+            return np.full(len(self.samples), np.nan)
         values = self.samples[name]
         return np.where(np.isfinite(values), values, np.nan)
+
+
+def modes_of(runs: Sequence[Curves]) -> tuple[str, ...]:
+    """Return the modes of all runs, in the order of their first."""
+    return tuple(dict.fromkeys(mode for run in runs for mode in run.modes))
 
 
 def curves(execution: Execution) -> Curves:
@@ -69,7 +82,7 @@ def curves(execution: Execution) -> Curves:
     begins = np.zeros(len(rows), dtype=bool)
     begins[np.searchsorted(rows, first)] = True
     jumps = np.flatnonzero(np.diff(samples.jump)) + 1
-    return Curves(samples, begins, jumps, _bands(run))
+    return Curves(samples, begins, jumps, _bands(run), not run.stop.complete)
 
 
 def _in_float64(execution: Execution) -> Execution:
@@ -141,6 +154,12 @@ def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, f
     keep[1:-1] = moved[:-1] | broken[1:]  # the last point before a break must stay
     where = np.flatnonzero(np.concatenate([[False], broken])[keep])
     return np.insert(x[keep], where, np.nan), np.insert(y[keep], where, np.nan)
+
+
+def limits_of(runs: Sequence[Curves], name: str) -> tuple[float, float]:
+    """Choose the ends of an axis on which all runs are."""
+    ends = [limits(run.column(name), run.samples.time, run.ends_badly) for run in runs if run.has_values(name)]
+    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else (-1.0, 1.0)
 
 
 def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:

@@ -1,96 +1,193 @@
 # pyright: reportUnknownMemberType=false
 # (matplotlib's stubs leave the keyword arguments untyped)
-"""The figure of a run: its panels, their sizes and headings."""
+"""The figure of one run or of several: its panels, their sizes, headings and legend."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, sqrt
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpecFromSubplotSpec
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hsdsl.execution import Execution
-from hsdsl.plot.curves import Curves, GuardLine, curves
-from hsdsl.plot.panel import draw_panel, name_bands
-from hsdsl.plot.phase import draw_phase, has_phase
-from hsdsl.plot.style import band, colours
+from hsdsl.names import shown
+from hsdsl.plot.curves import Curves, GuardLine, curves, modes_of
+from hsdsl.plot.panel import LETTER, draw_panel, draw_ribbons, name_bands, raise_of
+from hsdsl.plot.phase import draw_phase
+from hsdsl.plot.style import fills, looks
+from hsdsl.plot.view import Pair, View
 from hsdsl.report import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
 
 MARGIN = 0.9  # inches for title and time axis
 HEIGHTS = {1: 3.2, 2: 2.3, 3: 1.9, 4: 1.7}  # of a panel, by panels on top of each other
 LOWEST = 1.5
+WIDTHS = {1: 9.0, 2: 13.0, 3: 16.0}  # of the panels, by panels side by side
+RIBBON, LINE = 0.28, 0.2  # inches of a run's ribbon, and of a line of text
+SMALLEST, LARGEST = 3.6, 5.2  # of a phase plot
+LONGEST = 40  # letters of a name in the legend
 
 
-def draw(execution: Execution, *, guards: Sequence[GuardLine], units: Mapping[str, str], title: str | None) -> Figure:
-    """Draw the whole figure."""
-    data = curves(execution)
-    names = data.samples.names
-    across = 1 if len(names) <= 6 else 2 if len(names) <= 16 else 3
-    down = max(1, -(-len(names) // across))
-    height = MARGIN + down * HEIGHTS.get(down, LOWEST)
-    phase = has_phase(execution)
-    width = {1: 9.0, 2: 13.0, 3: 16.0}[across]
-    phase_width = min(max(height - MARGIN, 3.6), 5.2) if phase else 0.0
-    figure = Figure(figsize=(width + phase_width, max(height, phase_width + MARGIN)), layout="constrained")
-    outer = figure.add_gridspec(1, 2 if phase else 1, width_ratios=[width, phase_width] if phase else [1])
-    inner = GridSpecFromSubplotSpec(down, across, subplot_spec=outer[0, 0])
-    axes = _panels(figure, inner, names, across)
-    visited = {arc.mode for arc in execution.arcs}
-    lines = [guard for guard in guards if guard.mode in visited]
-    ends_badly = not execution.stop.complete
-    for name, axis in zip(names, axes, strict=False):
-        draw_panel(axis, data, name, [g for g in lines if g.state == name], units, ends_badly)
-    _time_labels(axes, across, units)
-    if phase:
-        draw_phase(figure.add_subplot(outer[0, 1]), data, lines, units, ends_badly)
-    _headings(figure, axes[0], execution, data, title, width / across)
-    figure.align_ylabels(axes)
+@dataclass(frozen=True)
+class Plan:
+    """The rows and columns of panels and of phase plots, and the inches that they take."""
+
+    across: int
+    down: int
+    phase_across: int
+    phase_down: int
+    ribbon: float
+    width: float
+    phase: float
+    height: float
+
+    @classmethod
+    def of(cls, names: int, pairs: int, runs: int) -> Plan:
+        """Give every panel room to be read."""
+        across = 1 if names <= 6 else 2 if names <= 16 else 3
+        down = max(1, -(-names // across))
+        ribbon = RIBBON * runs + LINE if runs > 1 else 0.0
+        height = down * HEIGHTS.get(down, LOWEST) + ribbon
+        phase_down = min(pairs, max(1, round(height / LARGEST), ceil(sqrt(pairs))))
+        phase_across = -(-pairs // phase_down) if pairs else 0
+        phase = min(max(height / phase_down, SMALLEST), LARGEST) if pairs else 0.0
+        return cls(
+            across, down, phase_across, phase_down, ribbon, WIDTHS[across], phase, max(height, phase * phase_down)
+        )
+
+    @property
+    def room(self) -> float:
+        """The inches of a panel's width."""
+        return self.width / self.across - 0.8
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """The inches of the whole figure."""
+        return self.width + self.phase * self.phase_across, self.height + MARGIN
+
+
+def picture(runs: Sequence[Execution], view: View) -> Figure:
+    """Draw runs to a figure of their own."""
+    figure = Figure(figsize=size_of(runs, view), layout="constrained")
+    draw(runs, view, figure)
     return figure
 
 
-def _panels(figure: Figure, grid: GridSpecFromSubplotSpec, names: Sequence[str], across: int) -> list[Axes]:
+def size_of(runs: Sequence[Execution], view: View) -> tuple[float, float]:
+    """Return the inches that a figure of runs takes."""
+    return Plan.of(len(view.names(runs)), len(view.pairs(runs)), len(runs)).size
+
+
+def draw(runs: Sequence[Execution], view: View, figure: FigureBase) -> list[Axes]:
+    """Draw runs to a figure; return the axes: panels over time, then phase plots."""
+    names, pairs, labels = view.names(runs), view.pairs(runs), view.called(runs)
+    plan = Plan.of(len(names), len(pairs), len(runs))
+    data = [curves(run) for run in runs]
+    visited = {arc.mode for run in runs for arc in run.arcs}
+    guards = [guard for guard in view.guards if guard.mode in visited]
+    widths = [plan.width, plan.phase * plan.phase_across] if pairs else [1]
+    outer = figure.add_gridspec(1, len(widths), width_ratios=widths)
+    ribbon, panels = _panels(figure, outer[0, 0], plan, max(1, len(names)))
+    for name, axis in zip(names, panels, strict=False):
+        draw_panel(axis, data, name, [guard for guard in guards if guard.state == name], view, plan.room)
+    _time_labels(panels, plan.across, view)
+    if ribbon is not None:
+        draw_ribbons(ribbon, data, labels)
+    phases = _phases(figure, outer[0, 1], plan, pairs, data, guards, view) if pairs else []
+    _headings(figure, ribbon or panels[0], runs, view, plan)
+    _legend(figure, panels[0], data, labels, plan)
+    if isinstance(figure, Figure):
+        figure.align_ylabels(panels)
+    return [*panels, *phases]
+
+
+def _panels(figure: FigureBase, place: Any, plan: Plan, count: int) -> tuple[Axes | None, list[Axes]]:
+    """Add the axes of the ribbons, where there are any, and of the panels."""
+    ratios = [plan.ribbon, *[(plan.height - plan.ribbon) / plan.down] * plan.down][plan.ribbon == 0 :]
+    grid = GridSpecFromSubplotSpec(len(ratios), plan.across, subplot_spec=place, height_ratios=ratios)
+    first = len(ratios) - plan.down
     axes: list[Axes] = []
-    for i in range(max(1, len(names))):
+    for i in range(count):
         shared = axes[0] if axes else None
-        axes.append(figure.add_subplot(grid[i // across, i % across], sharex=shared))
+        axes.append(figure.add_subplot(grid[first + i // plan.across, i % plan.across], sharex=shared))
+    return (figure.add_subplot(grid[0, :], sharex=axes[0]) if first else None), axes
+
+
+def _phases(
+    figure: FigureBase,
+    place: Any,
+    plan: Plan,
+    pairs: Sequence[Pair],
+    data: Sequence[Curves],
+    guards: Sequence[GuardLine],
+    view: View,
+) -> list[Axes]:
+    grid = GridSpecFromSubplotSpec(plan.phase_down, plan.phase_across, subplot_spec=place)
+    axes = [figure.add_subplot(grid[i % plan.phase_down, i // plan.phase_down]) for i in range(len(pairs))]
+    for axis, pair in zip(axes, pairs, strict=True):
+        draw_phase(axis, data, pair, guards, view)
     return axes
 
 
-def _time_labels(axes: Sequence[Axes], across: int, units: Mapping[str, str]) -> None:
+def _time_labels(axes: Sequence[Axes], across: int, view: View) -> None:
     for i, axis in enumerate(axes):
         if i + across < len(axes):
             axis.tick_params(labelbottom=False)
         else:
-            axis.set_xlabel(f"time t [{units['t']}]" if "t" in units else "time t", parse_math=False)
+            axis.set_xlabel(f"time t [{view.units['t']}]" if "t" in view.units else "time t", parse_math=False)
 
 
-def _headings(figure: Figure, top: Axes, execution: Execution, data: Curves, title: str | None, width: float) -> None:
-    figure.suptitle(
-        title or words.heading(execution), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False
-    )
-    count = len(execution.transitions)
-    facts = f"{execution.scheme} {execution.method}, {count:,} transition{'' if count == 1 else 's'}, "
-    if execution.stop.complete:
-        how = "until" if execution.stop.reason == "until" else "final mode entered at"
-        facts += f"{how} t = {words.number(execution.stop.time, 8)}"
-    else:
-        facts += f"stopped: {words.stop(execution)}"
-    top.set_title(
-        textwrap.fill(facts, int(width * 14)), loc="left", fontsize=8.5, color="#555555", pad=16, parse_math=False
-    )
-    if len(data.modes) == 0 or name_bands(top, data, width - 0.8):
+def _headings(figure: FigureBase, top: Axes, runs: Sequence[Execution], view: View, plan: Plan) -> None:
+    heading = view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))
+    heading = textwrap.fill(heading, int(plan.size[0] * 10))
+    figure.suptitle(heading, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    facts = _facts(runs[0]) if len(runs) == 1 else _facts_of_several(runs)
+    facts = textwrap.fill(facts, int(plan.width / (plan.across if len(runs) == 1 else 1) * 14))
+    pad = 16 + raise_of(top) if len(runs) == 1 else 6
+    top.set_title(facts, loc="left", fontsize=8.5, color="#555555", pad=pad, parse_math=False)
+
+
+def _facts(run: Execution) -> str:
+    count = len(run.transitions)
+    made = f"{run.scheme} {run.method}, {count:,} transition{'' if count == 1 else 's'}"
+    if not run.stop.complete:
+        return f"{made}, stopped: {words.stop(run)}"
+    how = "until" if run.stop.reason == "until" else "final mode entered at"
+    return f"{made}, {how} t = {words.number(run.stop.time, 8)}"
+
+
+def _facts_of_several(runs: Sequence[Execution]) -> str:
+    badly = sum(not run.stop.complete for run in runs)
+    return f"{len(runs)} runs" + (f", {badly} stopped before the end" if badly else "")
+
+
+def _legend(figure: FigureBase, top: Axes, data: Sequence[Curves], labels: Sequence[str], plan: Plan) -> None:
+    """Write names of modes above their bands, or in a legend below everything, where it covers nothing."""
+    modes = modes_of(data)
+    handles: list[Any] = []
+    if len(data) > 1:
+        handles = [
+            Line2D([], [], linewidth=1.6, label=shown(label, LONGEST), **look)
+            for label, look in zip(labels, looks(len(data)), strict=True)
+        ]
+        handles += [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes, light=False).items()]
+    elif modes and not name_bands(top, data[0], plan.room):
+        handles = [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes).items()]
+    if not handles:
         return
-    patches = [
-        Patch(facecolor=band(colour, len(data.modes) == 1), label=mode) for mode, colour in colours(data.modes).items()
-    ]
-    legend = figure.legend(
-        handles=patches, loc="outside upper right", ncols=min(8, len(patches)), frameon=False, fontsize=8.5
-    )
+    widest = max(len(handle.get_label()) for handle in handles) * LETTER + 0.6
+    columns = min(len(handles), max(1, int(plan.size[0] / widest)))
+    legend = figure.legend(handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5)
     for text in legend.get_texts():
         text.set_parse_math(False)
+    if isinstance(figure, Figure) and (rows := -(-len(handles) // columns)):
+        figure.set_figheight(figure.get_figheight() + rows * LINE)

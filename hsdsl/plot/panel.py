@@ -7,42 +7,54 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits, line
-from hsdsl.plot.style import ALARM, FAINT, INK, band, colours
+from hsdsl.names import shown
+from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, modes_of
+from hsdsl.plot.style import ALARM, FAINT, Look, fills, looks
+from hsdsl.plot.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BOTH_SIDES = 60  # transitions up to which the values before and after are marked
 AFTER_ONLY = 400  # and up to which the value after is
+LONGEST = 24  # letters of a run's label
 LETTER = 0.085  # inches, about, of a letter in the name of a band
 
 
 def draw_panel(
-    axis: Axes, data: Curves, name: str, guards: Sequence[GuardLine], units: Mapping[str, str], ends_badly: bool
+    axis: Axes, runs: Sequence[Curves], name: str, guards: Sequence[GuardLine], view: View, room: float
 ) -> None:
-    """Draw the bands of the modes, the curve, its jumps and the levels of guards."""
-    values, time = data.column(name), data.samples.time
-    start, end = data.span
+    """Draw one run with the bands of its modes and the levels of guards, or several with a look for each.
+
+    The panel is about ``room`` inches wide.
+    """
+    start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
     if start == end:
         start, end = start - 0.5, end + 0.5
-    low, high = with_guards(limits(values, time, ends_badly), [guard.value for guard in guards])
+    low, high = with_guards(limits_of(runs, name), [guard.value for guard in guards])
     axis.set_xlim(start - 0.008 * (end - start), end + 0.008 * (end - start))  # room for markers at the ends
     axis.set_ylim(low, high)
-    draw_bands(axis, data)
-    x, y = line(time, values, data.begins, (start, end, low, high))
-    axis.plot(x, y, color=INK, linewidth=1.3, solid_capstyle="round", rasterized=len(x) > 60_000)
-    mark_jumps(axis, time, values, data.jumps)
-    if len(time) == 1:
-        axis.plot(time, values, "o", color=INK, markersize=4)
-    if ends_badly:
-        axis.axvline(data.span[1], color=ALARM, linewidth=1.2)
-    _draw_guards(axis, data, guards, (low, high))
-    if not np.isfinite(values).any():
+    if len(runs) == 1:
+        draw_bands(axis, runs[0])
+        _draw_guards(axis, runs[0], guards, (low, high), room)
+    elif guards:
+        _draw_levels(axis, guards)
+    for run, look in zip(runs, looks(len(runs)), strict=True):
+        _draw_curve(axis, run, name, look, (start, end, low, high))
+    if not any(run.has_values(name) for run in runs):
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
-    axis.set_ylabel(label(name, units), parse_math=False)
+    axis.set_ylabel(label(name, view.units), parse_math=False)
+
+
+def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[float, float, float, float]) -> None:
+    values, time = run.column(name), run.samples.time
+    x, y = line(time, values, run.begins, ends)
+    axis.plot(x, y, linewidth=1.3, rasterized=len(x) > 60_000, label=name, **look)
+    mark_jumps(axis, time, values, run.jumps, look["color"])
+    if len(time) == 1:
+        axis.plot(time, values, "o", color=look["color"], markersize=4)
+    if run.ends_badly:
+        axis.axvline(run.span[1], color=ALARM, linewidth=1.2, linestyle=look["linestyle"])
 
 
 def label(name: str, units: Mapping[str, str]) -> str:
@@ -52,14 +64,36 @@ def label(name: str, units: Mapping[str, str]) -> str:
 
 def draw_bands(axis: Axes, data: Curves) -> None:
     """Colour the background by mode."""
-    for mode, colour in colours(data.modes).items():
+    for mode, fill in fills(data.modes).items():
         spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
-        shade, across = band(colour, len(data.modes) == 1), axis.get_xaxis_transform()
-        axis.broken_barh(spans, (0, 1), transform=across, facecolors=shade, linewidth=0, zorder=0)
+        axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), zorder=0, label=mode, **fill)
+
+
+def draw_ribbons(axis: Axes, runs: Sequence[Curves], labels: Sequence[str]) -> None:
+    """Draw a bar of modes for each run, the first on top."""
+    fill = fills(modes_of(runs), light=False)
+    for row, run in enumerate(runs):
+        for mode in run.modes:
+            spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
+            axis.broken_barh(spans, (row - 0.4, 0.8), label=mode, **fill[mode])
+    axis.set_ylim(len(runs) - 0.5, -0.5)
+    axis.set_yticks(range(len(runs)), [shown(text, LONGEST) for text in labels])
+    for text in axis.get_yticklabels():
+        text.set_parse_math(False)
+    axis.tick_params(left=False, labelbottom=False)
+    axis.spines["left"].set_visible(False)
+
+
+def raise_of(axis: Axes) -> float:
+    """Points by which what is above an axis is raised: where its numbers have a common power of ten, that is there."""
+    form = axis.yaxis.get_major_formatter()
+    form.set_locs(list(axis.yaxis.get_majorticklocs()))
+    return 10.0 if form.get_offset() else 0.0
 
 
 def name_bands(axis: Axes, data: Curves, width: float) -> bool:
     """Write each mode's name above its first wide band, if every name fits somewhere; return whether it did."""
+    raised = raise_of(axis)
     start, end = data.span
     places: dict[str, tuple[float, float]] = {}
     for mode, begin, stop in data.bands:
@@ -69,13 +103,13 @@ def name_bands(axis: Axes, data: Curves, width: float) -> bool:
         return False
     for mode, (begin, _) in places.items():
         axis.annotate(
-            mode, (begin, 1), xycoords=axis.get_xaxis_transform(), xytext=(2, 2), textcoords="offset points",
+            mode, (begin, 1), xycoords=axis.get_xaxis_transform(), xytext=(2, 2 + raised), textcoords="offset points",
             va="bottom", ha="left", fontsize=8, color="#444444", parse_math=False,
         )  # fmt: skip
     return True
 
 
-def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array) -> None:
+def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array, colour: str) -> None:
     """Mark transitions: open circles before, full ones after; fewer and smaller the more there are."""
     if not len(jumps) or len(jumps) > AFTER_ONLY:
         return
@@ -83,8 +117,8 @@ def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array) -> None:
     size = 4.0 if len(jumps) <= 20 else 3.0 if few else 1.8
     if few:
         hollow: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 0.9}
-        axis.plot(x[jumps - 1], y[jumps - 1], "o", color=INK, markersize=size, **hollow)
-    axis.plot(x[jumps], y[jumps], "o", color=INK, markersize=size, markeredgewidth=0.0)
+        axis.plot(x[jumps - 1], y[jumps - 1], "o", color=colour, markersize=size, **hollow)
+    axis.plot(x[jumps], y[jumps], "o", color=colour, markersize=size, markeredgewidth=0.0)
 
 
 def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[float, float]:
@@ -100,10 +134,17 @@ def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[flo
     return low, high
 
 
-def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float]) -> None:
+def _draw_levels(axis: Axes, guards: Sequence[GuardLine]) -> None:
+    for level in dict.fromkeys(guard.value for guard in guards):
+        axis.axhline(level, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
+
+
+def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float], room: float) -> None:
     """Draw each level where its mode is occupied, and label it at the end; labels that would collide become one."""
     low, high = ends
-    near = 0.15 * (data.span[1] - data.span[0]), 0.04 * (high - low)
+    longest = max((len(guard.label) for guard in guards), default=0)
+    share = max(0.15, 1.2 * longest * LETTER / room)
+    near = share * (data.span[1] - data.span[0]), 0.04 * (high - low)
     labels: dict[tuple[float, float], list[str]] = {}
     for guard in guards:
         spans = [(begin, end) for mode, begin, end in data.bands if mode in (guard.mode, SEVERAL)]
@@ -115,7 +156,18 @@ def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tu
         labels.setdefault(next(close, (stops[-1], guard.value)), []).append(guard.label)
     for (end, level), texts in labels.items():
         above = level > (low + high) / 2
-        axis.annotate(
-            ", ".join(dict.fromkeys(texts)), (end, level), xytext=(-3, 4 if above else -4), textcoords="offset points",
+        fits = (end - data.span[0]) / ((data.span[1] - data.span[0]) or 1) * room / LETTER
+        joined = _joined(list(dict.fromkeys(texts)), int(fits))
+        text = axis.annotate(
+            joined, (end, level), xytext=(-3, 4 if above else -4), textcoords="offset points",
             ha="right", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
         )  # fmt: skip
+        text.set_bbox({"facecolor": "white", "alpha": 0.55, "linewidth": 0, "pad": 0.8})
+        text.set_in_layout(False)
+
+
+def _joined(texts: Sequence[str], most: int) -> str:
+    """Join labels, as many as fit, with how many there are more; at least one."""
+    count = next((k for k in range(len(texts), 1, -1) if len(", ".join(texts[:k])) + 9 * (k < len(texts)) <= most), 1)
+    more = f" and {len(texts) - count} more" if count < len(texts) else ""
+    return (", ".join(texts[:count]) if count > 1 else shown(texts[0], max(LONGEST, most - len(more)))) + more

@@ -39,11 +39,16 @@ STYLE: dict[str, Any] = {
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 5),
     "agg.path.chunksize": 20_000,
+    "hatch.linewidth": 0.6,
 }
 FORMATS = (".png", ".svg")
+Look = dict[str, Any]  # matplotlib's arguments for a line
 INK, FAINT, ALARM = "#16324f", "#8a8a8a", "#d55e00"
 # Okabe and Ito 2008: people with any colour vision tell them apart
 PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
+RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222", "#e69f00", "#56b4e9")  # lines of runs, by Okabe and Ito
+DASHES = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)))  # told apart without any colour
+PLAIN, HATCHES = 5, ("////", "\\\\\\\\", "xxxx", "....")  # of the bands of modes: so many without, then these
 _drawing = RLock()  # matplotlib's settings are the whole process's
 
 
@@ -73,7 +78,7 @@ def check_suffixes(*paths: str | os.PathLike[str], formats: Sequence[str] = FORM
     return targets
 
 
-def write_figure(figure: Figure, file: BinaryIO, kind: str) -> None:
+def write_figure(figure: Figure, file: BinaryIO, kind: str, dots: int = 150) -> None:
     """Write a figure as ``png`` or ``svg``: the same run gives the same bytes."""
     from matplotlib.text import Text
 
@@ -82,7 +87,7 @@ def write_figure(figure: Figure, file: BinaryIO, kind: str) -> None:
         if (visible := visible_lines(text.get_text())) != text.get_text():
             text.set_text(visible)
     dated = ("Date", "Creator", "Format", "Type") if kind == "svg" else ("Software",)
-    figure.savefig(file, format=kind, dpi=150, metadata=dict.fromkeys(dated))
+    figure.savefig(file, format=kind, dpi=dots, metadata=dict.fromkeys(dated))
 
 
 @contextmanager
@@ -110,6 +115,13 @@ def _import() -> None:
             matplotlib.rcParams["backend"] = named
 
 
+def looks(count: int) -> list[Look]:
+    """Give each run a line of its own colour and dashes; a single one is drawn in ink."""
+    if count == 1:
+        return [{"color": INK, "linestyle": "-", "solid_capstyle": "round"}]
+    return [{"color": RUNS[k % len(RUNS)], "linestyle": DASHES[k % len(DASHES)]} for k in range(count)]
+
+
 def colours(modes: Sequence[str]) -> dict[str, str]:
     """Give each mode a colour; after seven modes they begin again, darker."""
     chosen: dict[str, str] = {}
@@ -121,6 +133,17 @@ def colours(modes: Sequence[str]) -> dict[str, str]:
 def band(colour: str, alone: bool = False) -> str:
     """Lighten a colour for the background, more so where it is the only one."""
     return _mixed(colour, 0.1 if alone else 0.24, "#ffffff")
+
+
+def fills(modes: Sequence[str], light: bool = True) -> dict[str, Look]:
+    """Fill the bands of modes; from the sixth on they are hatched: light colours are too few to tell them apart."""
+    found: dict[str, Look] = {}
+    for i, (mode, colour) in enumerate(colours(modes).items()):
+        hatch = HATCHES[(i - PLAIN) % len(HATCHES)] if i >= PLAIN and mode != SEVERAL else None
+        strong = _mixed(colour, 0.5, "#ffffff") if light else "#ffffff"
+        found[mode] = {"facecolor": band(colour, len(modes) == 1) if light else colour, "linewidth": 0}
+        found[mode] |= {"hatch": hatch, "edgecolor": strong} if hatch else {}
+    return found
 
 
 def curve(colour: str) -> str:

@@ -16,27 +16,32 @@ LONGEST, MOST_LINES, MOST_MODES = 34, 7, 6  # of a line; of a flow's lines; of m
 MOST_DRAWN = 60  # modes of which there is a picture
 BADGE = 9.0
 CSS = """
-.modes text { font: 13px ui-monospace, SFMono-Regular, Menlo, Consolas, "DejaVu Sans Mono", monospace; fill: #222 }
+.modes text { font: 13px ui-monospace, SFMono-Regular, Menlo, Consolas, "DejaVu Sans Mono", monospace;
+  fill: var(--text, currentColor) }
 .modes .name { font-weight: 700 }
-.modes .box { fill: #f4f7fa; stroke: #16324f; stroke-width: 1.2 }
-.modes .unused { fill: #fff; stroke: #9aa5b1; stroke-dasharray: 4 3 }
-.modes .edge { fill: none; stroke: #16324f; stroke-width: 1.4 }
-.modes .never { stroke: #9aa5b1; stroke-dasharray: 4 3 }
-.modes .badge { fill: #16324f }
-.modes .badge.never { fill: #9aa5b1; stroke: none }
+.modes .box { fill: var(--panel, transparent); stroke: var(--ink, currentColor); stroke-width: 1.2 }
+.modes .unused { fill: var(--ground, transparent); stroke: #8b97a3; stroke-dasharray: 4 3 }
+.modes .edge { fill: none; stroke: var(--ink, currentColor); stroke-width: 1.4 }
+.modes .never { stroke: #8b97a3; stroke-dasharray: 4 3 }
+.modes .made { fill: var(--ink, currentColor) }
+.modes .badge { fill: #2f5f8f }
+.modes .badge.never { fill: #6b7783; stroke: none }
 .modes .number { font-size: 10px; fill: #fff; text-anchor: middle }
 """
 
 
-def mode_graph(program: Program, execution: Execution) -> str:
-    """The graph and its table, as HTML; every text of the model is escaped."""
+def mode_graph(program: Program, execution: Execution | None = None) -> str:
+    """The graph and its table, as HTML; every text of the model is escaped. Without a run nothing is counted."""
     edges = [edge for mode in program.modes for edge in mode.edges]
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""
+    names = [mode.name for mode in program.modes]
+    if execution is None:
+        picture = _picture(program, edges, [1] * len(edges), set(names), program.initial_mode)
+        return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, None)}"
     made = Counter((t.source, t.edge) for t in execution.transitions)
     numbers = [made[program.modes[edge.source].name, edge.name] for edge in edges]
     visited = {arc.mode for arc in execution.arcs}
-    names = [mode.name for mode in program.modes]
     first = names.index(execution.arcs[0].mode) if execution.arcs else program.initial_mode
     picture = _picture(program, edges, numbers, visited, first)
     return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, numbers)}"
@@ -54,11 +59,11 @@ def _picture(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int]
 
 
 def _svg(layout: Layout, parts: Sequence[str]) -> str:
-    arrow = '<path d="M0 0L9 4L0 8z" fill="{}"/></marker>'
+    arrow = '<path d="M0 0L9 4L0 8z" {}/></marker>'
     markers = "".join(
         f'<marker id="{name}" viewBox="0 0 9 8" refX="9" refY="4" markerWidth="9" markerHeight="8" orient="auto" '
         f'markerUnits="userSpaceOnUse">{arrow.format(colour)}'
-        for name, colour in (("made", "#16324f"), ("never", "#9aa5b1"))
+        for name, colour in (("made", 'class="made"'), ("never", 'fill="#8b97a3"'))
     )
     size = f'viewBox="0 0 {layout.width:.1f} {layout.height:.1f}" style="max-width: {layout.width:.0f}px"'
     inner = "\n".join(parts)
@@ -124,14 +129,16 @@ def _path(line: Line, side: int) -> str:
     return "".join(path)
 
 
-def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int]) -> str:
+def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int] | None) -> str:
     rows: list[str] = []
-    for number, (edge, count) in enumerate(zip(edges, made, strict=True), start=1):
+    for number, edge in enumerate(edges, start=1):
         when = edge.text + (f" if {edge.condition_text}" if edge.condition_text else "")
         resets = zip(edge.target_states, edge.reset_texts, strict=True)
         changed = ", ".join(f"{name} := {text}" for name, text in resets if name != text)
         ends = f"{program.modes[edge.source].name} -> {program.modes[edge.target].name}"
-        cells = (str(number), edge.name, ends, when, changed, str(count))
+        cells = [str(number), edge.name, ends, when, changed]
+        cells += [] if made is None else [str(made[number - 1])]
         rows.append("<tr>" + "".join(f"<td>{escape(visible(cell))}</td>" for cell in cells) + "</tr>")
-    header = "".join(f"<th>{name}</th>" for name in ("#", "transition", "from -> to", "when", "reset", "made"))
+    names = ["#", "transition", "from -> to", "when", "reset", *([] if made is None else ["made"])]
+    header = "".join(f"<th>{name}</th>" for name in names)
     return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"

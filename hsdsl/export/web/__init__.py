@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
-import re
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -15,12 +13,12 @@ from hsdsl.export.source import Source
 from hsdsl.export.web.model import model_of
 from hsdsl.export.web.wasm import PARTS, wasm_module
 from hsdsl.names import visible
+from hsdsl.plot.parts import filled, inert, scripts, shared
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Problem, prepare
 
-SCRIPTS = ("text.js", "controls.js", "axes.js", "plots.js", "scene.js", "facts.js", "page.js")
-_PLACE = re.compile(r"\{\{(\w+)\}\}")
+SCRIPTS = ("controls.js", "scene.js", "facts.js", "page.js")
 
 
 def files(source: Source) -> dict[str, bytes]:
@@ -39,12 +37,10 @@ def with_scene(source: Source) -> Source:
     system = source.system
     if not system.scene:
         return source
+    from hsdsl.elaborate.scene import scene_as_outputs
     from hsdsl.lower import lower
 
-    count = sum(shape.numbers for shape in system.scene)
-    modes = tuple(replace(mode, outputs=(*mode.outputs, *mode.scene)) for mode in system.modes)
-    outputs = (*system.outputs, *(f"scene {i}" for i in range(count)))  # no name of a model has a blank
-    system = replace(system, modes=modes, outputs=outputs)
+    system = scene_as_outputs(system)
     given = source.problem
     program = lower(system)
     problem = Problem(program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x)
@@ -65,19 +61,15 @@ def page(model: dict[str, Any], module: bytes) -> str:
     parts = {
         "title": escape(visible(model["title"])),
         "generator": escape(visible("; ".join(model["about"])), quote=True),
-        "style": _part("page.css"),
-        "model": _inert(json.dumps(model, allow_nan=False, separators=(",", ":"))),
+        "style": shared("page.css"),
+        "pictures": shared("pictures.html"),
+        "model": inert(model),
         "wasm": base64.b64encode(module).decode(),
         "worker": _part("worker.js"),
-        "script": "\n".join(map(_part, SCRIPTS)),
+        "script": "\n".join([scripts(), *map(_part, SCRIPTS)]),
     }
-    return _PLACE.sub(lambda place: parts[place[1]], _part("page.html"))
+    return filled(_part("page.html"), parts)
 
 
 def _part(name: str) -> str:
     return (Path(PARTS) / name).read_text(encoding="utf-8")
-
-
-def _inert(text: str) -> str:
-    """JSON that is no markup, and in one line: the signs that could end an element are escapes."""
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -3,7 +3,6 @@
 const MOST_ROWS = 500;
 const time = (t) => `t = ${format(t, 10)}`;
 const edgeOf = (mode, k) => model.modes[mode]?.edges[k]?.name ?? "?";
-const modeOf = (k) => model.modes[k]?.name ?? "?";
 
 function refusal({refusal: why, at}) {
   const parameter = model.controls[at]?.name, start = model.startStates[at], setting = model.settings[at];

@@ -1,6 +1,7 @@
-// The page: settings go to the worker, a run comes back, pictures follow; the cursor moves by hand or by itself.
+// The page: settings go to the worker, a run comes back, pictures follow.
 
-let worker, run, waiting = false, wanted = false, cursor = 0, playing = null;
+const MOST_PANELS = 4;
+let worker, run, waiting = false, wanted = false;
 
 function startWorker() {
   const text = document.getElementById("worker").textContent;
@@ -33,7 +34,9 @@ function received(result) {
   if (result.refusal) {
     showRefusal(result);
   } else {
-    run = result;
+    run = {...result, failed: !["until", "final"].includes(model.reasons[result.reason].split(" ")[0])};
+    runs = [run];
+    zoomTo(...(zoomed && zoomed[1] <= span()[1] ? zoomed : []));
     if (model.scene.length) measureScene(run);
     redraw();
     showFacts(run);
@@ -45,69 +48,10 @@ function received(result) {
   if (wanted) request();
 }
 
-function redraw() {
-  if (!run) return;
-  readSizes();
-  drawRibbon(run);
-  drawPanels(run);
-  drawPhase(run);
-  show(cursor);
-}
-
-// The last point that is not after a time.
-function pointAt(t) {
-  let low = 0, high = run.times.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (run.times[middle] <= t) low = middle + 1; else high = middle;
-  }
-  return Math.max(0, low - 1);
-}
-
-// Show the run at a share of its time.
-function show(share, point) {
-  const end = span(run)[1], t = share * end, i = point ?? pointAt(t);
-  cursor = share;
-  $("cursor").value = Math.round(1000 * share);
+// `t` is between the point of the run and the next one, which is of the same arc or not.
+function sceneAt(t, [i]) {
   const next = run.times[i + 1] > run.times[i] ? (t - run.times[i]) / (run.times[i + 1] - run.times[i]) : 0;
-  const mode = modeOf(run.arcs[run.arcOf[i]].mode);
-  $("now").textContent = `t = ${format(run.times[i], 5)}, ${mode}`;
-  $("cursor").setAttribute("aria-valuetext", `t = ${format(run.times[i], 4)}, mode ${mode}`);
   drawScene(run, i, Math.min(1, Math.max(0, next)));
-  drawCursor(run, i);
-  const texts = [["t", run.times[i]], ...model.columns.map((name, k) => [withUnit(name), run.columns[k][i]])];
-  const row = (name, value) => element("tr", {}, element("th", {textContent: name, scope: "row"}), value);
-  const rows = texts.map(([name, x]) => row(name, cell(x)));
-  $("values").tBodies[0].replaceChildren(row("mode", element("td", {textContent: mode})), ...rows);
-}
-
-function pointed(canvas, made, a, b) {
-  if (!run || playing !== null) return;
-  if (canvas === $("phase")) {
-    const i = nearest(made, a, b);
-    show(run.times[i] / span(run)[1], i);
-  } else {
-    show(Math.min(1, Math.max(0, (a - made.box.left) / (made.box.right - made.box.left))));
-  }
-}
-
-// Played in real time where a run lasts 4 to 20 s, else within that.
-const playTime = () => Math.min(20, Math.max(4, span(run)[1])) / Number($("speed").value);
-
-function play(on) {
-  playing = null;
-  $("play").textContent = on ? "Pause" : "Play";
-  $("play").setAttribute("aria-pressed", String(on));
-  if (!on || !run) return;
-  if (cursor >= 1) cursor = 0;
-  let last = performance.now();
-  const step = (now) => {
-    if (playing === null) return;
-    show(Math.min(1, cursor + (now - last) / (1000 * playTime())));
-    last = now;
-    if (cursor < 1) playing = requestAnimationFrame(step); else play(false);
-  };
-  playing = requestAnimationFrame(step);
 }
 
 async function copyLink() {
@@ -121,18 +65,15 @@ async function copyLink() {
 
 function build() {
   buildControls();
-  buildPlots(redraw, pointed);
+  const [first = "t", second] = model.columns;
+  buildPlots(model.columns.slice(0, MOST_PANELS), [second ? [first, second] : ["t", first]], redraw, pointed);
+  followers.push(sceneAt);
   buildFacts();
   $("scene").hidden = !model.scene.length;
-  $("speed").append(...[0.25, 0.5, 1, 2, 4].map((value) => element("option", {value, textContent: `${value}\u00d7`, selected: value === 1})));
-  $("cursor").addEventListener("input", () => { if (run) { play(false); show($("cursor").valueAsNumber / 1000); } });
-  $("play").addEventListener("click", () => play(playing === null));
   $("copy").addEventListener("click", copyLink);
   changed.push(settingsChanged);
   window.addEventListener("hashchange", () => { readLink(); settingsChanged(); });
-  window.addEventListener("resize", redraw);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { readPalette(); redraw(); });
-  readPalette();
+  buildPlayer();
   readLink();
   model.controls.forEach((control) => showControl(control));
   startWorker();

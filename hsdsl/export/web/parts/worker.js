@@ -53,7 +53,7 @@ function run(given) {
   const refusal = wasm.run(), view = read();
   if (refusal) return {refusal, ...view};
   const rows = new Float64Array(wasm.memory.buffer, view.rowTimesAt, view.rows);
-  const arcs = table(view.arcAt, view.arcs, model.layouts.arc).map(({first, mode, kind}) => ({start: rows[first], mode, kind}));
+  const arcs = table(view.arcAt, view.arcs, model.layouts.arc).map(({first, jump, mode, kind}) => ({start: rows[first], jump, mode, kind}));
   arcs.forEach((arc, i) => { arc.end = i + 1 < arcs.length ? arcs[i + 1].start : rows[rows.length - 1]; });
   return {refusal, ...view, arcs, times: doubles(view.timesAt, view.points), arcOf: doubles(view.arcOfAt, view.points),
     columns: columns(view), transitions: transitions(view), notes: table(view.noteAt, view.notes, model.layouts.note),

@@ -24,10 +24,11 @@ function cell(x) {
   return made;
 }
 
+const modeOf = (k) => model.modes[k]?.name ?? "?";
 const withUnit = (name) => model.units[name] ? `${name} [${model.units[name]}]` : name;
 const palette = {}; // the colours of the style sheet
 
 function readPalette() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["ink", "text", "faint", "line", "curve", "focus", "ground"]) palette[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["ink", "text", "faint", "line", "curve", "focus", "ground", "alarm", ...Array.from({length: 7}, (_, k) => `run-${k}`)]) palette[name] = style.getPropertyValue(`--${name}`).trim();
 }

@@ -66,13 +66,14 @@ function frame(canvas, across, up, {title = "", bottom = true, left = 58} = {}) 
 }
 
 // A curve through the points of a run; it is cut where an arc ends, or a number is none.
-function trace({context, box, x, y}, arcOf, xs, ys) {
+function trace({context, box, x, y}, arcOf, xs, ys, {colour, dashes}) {
   context.save();
   context.beginPath();
   context.rect(box.left, box.top - 1, box.right - box.left, box.bottom - box.top + 2);
   context.clip();
-  context.strokeStyle = palette.curve;
+  context.strokeStyle = colour;
   context.lineWidth = 1.4;
+  context.setLineDash(dashes);
   context.lineJoin = "round";
   context.beginPath();
   let arc = -1;

@@ -1,0 +1,73 @@
+"""``hsdsl plot``: saved runs, or models' own experiments, in one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from typer import Argument, Option
+
+from hsdsl.cli.completion import model_files
+from hsdsl.cli.console import say
+from hsdsl.cli.options import AllowPath, Limit, Phases, answering, check_target, names_of, option, pairs_of
+from hsdsl.cli.saved import run_of
+from hsdsl.errors import UsageError
+
+RUNS = "Saved runs (.npz), or model files, each of which is run as its own experiment says."
+OUT = "The picture: .png, .svg, or .html, an interactive page."
+OUTPUTS = "Only these states and outputs over time, in this order."
+LABEL = "The name of a run in the legend, in the order of the runs; else its file's. Once for each run."
+MODEL = "The model of saved runs: for units, and levels of guards where all runs have one."
+TITLE = "The title; else that of the model."
+
+
+def plot(
+    runs: Annotated[list[Path], Argument(metavar="RUN...", help=RUNS, autocompletion=model_files)],
+    out: Annotated[Path, option("FILE", OUT)],
+    outputs: Annotated[str | None, option("A,B", OUTPUTS)] = None,
+    phase: Phases = None,
+    labels: Annotated[list[str] | None, Option("--label", metavar="TEXT", help=LABEL)] = None,
+    title: Annotated[str | None, option("TEXT", TITLE)] = None,
+    model: Annotated[Path | None, option("MODEL", MODEL, complete=model_files)] = None,
+    allow_path: AllowPath = None,
+    limit: Limit = None,
+) -> None:
+    """Draw runs in one picture."""
+    with answering(False, allow_path, limit):
+        check_target(out, "--out", (".png", ".svg", ".html"))
+        if labels and len(labels) != len(runs):
+            raise UsageError(f"--label: expected {len(runs)}, one for each run, got {len(labels)}")
+        found = [run_of(path, {}) for path in runs]
+        executions = [run for run, _ in found]
+        from hsdsl.plot import plot
+        from hsdsl.plot.view import names_of as known_names
+
+        options: dict[str, Any] = {} if model is None else _look(model, executions)
+        if model is None and len(executions) == 1:
+            options = executions[0].view()
+        known = known_names(executions)
+        options |= {
+            "columns": None if outputs is None else names_of(outputs),
+            "phases": pairs_of(phase, known),
+            "labels": labels or _labels(runs),
+            "title": title,
+        }
+        plot(executions, out, **options)
+        say(f"wrote {out}")
+
+
+def _look(path: Path, runs: list[Any]) -> dict[str, Any]:
+    """Units, and the levels of guards where all runs have the same; those of runs with other parameters differ."""
+    from hsdsl.model import load
+    from hsdsl.model.options import parameters_of
+
+    model = load(path)
+    looks = [model.look(parameters_of(run.overrides)) for run in runs]
+    same = all(look["guards"] == looks[0]["guards"] for look in looks)
+    return looks[0] | ({} if same else {"guards": ()})
+
+
+def _labels(runs: list[Path]) -> list[str]:
+    """The files' names, with their folders where names repeat."""
+    names = [path.stem for path in runs]
+    return names if len(set(names)) == len(names) else [str(path) for path in runs]

@@ -1,0 +1,98 @@
+"""What a picture shows of runs: columns, pairs of a phase plot, levels of guards, units, title, labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
+from hsdsl.names import did_you_mean
+from hsdsl.plot.curves import GuardLine
+from hsdsl.program import Program
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class View:
+    """What is shown of one run, or of several in one picture.
+
+    Attributes
+    ----------
+    columns : sequence of str or None
+        The states and outputs over time, in this order; None for all.
+    phases : sequence of pairs or None
+        States or outputs against each other, across and up; None for one pair where all modes have the same two states.
+    guards : sequence of GuardLine
+        Levels at which transitions fire.
+    units : mapping
+        Units of states and outputs, and of time under the name ``t``.
+    title : str or None
+        Replaces the model's title (or its path, where it has none).
+    labels : sequence of str
+        A name for each of several runs.
+    program : Program or None
+        The model, whose mode graph is in a page.
+    """
+
+    columns: Sequence[str] | None = None
+    phases: Sequence[Pair] | None = None
+    guards: Sequence[GuardLine] = ()
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    title: str | None = None
+    labels: Sequence[str] = ()
+    program: Program | None = None
+
+    def names(self, runs: Sequence[Execution]) -> list[str]:
+        """Return the columns over time.
+
+        Raises
+        ------
+        UsageError
+            A run has none of the name; the closest one is suggested.
+        """
+        known = names_of(runs)
+        return known if self.columns is None else [checked(name, known) for name in dict.fromkeys(self.columns)]
+
+    def pairs(self, runs: Sequence[Execution]) -> list[Pair]:
+        """Return the pairs of phase plots.
+
+        Raises
+        ------
+        UsageError
+            As :meth:`names`.
+        """
+        known = names_of(runs)
+        if self.phases is not None:
+            return [(checked(across, known), checked(up, known)) for across, up in dict.fromkeys(self.phases)]
+        states = list(dict.fromkeys(name for run in runs for name in run.states))
+        shown = len(states) == 2 and all(len(arc.states) == 2 for run in runs for arc in run.arcs)
+        return [(states[0], states[1])] if shown and set(states) <= set(self.names(runs)) else []
+
+    def called(self, runs: Sequence[Execution]) -> list[str]:
+        """Return a label for each run.
+
+        Raises
+        ------
+        UsageError
+            There are labels, but not one for each.
+        """
+        if self.labels and len(self.labels) != len(runs):
+            raise UsageError(f"expected {len(runs)} labels, one for each run, got {len(self.labels)}")
+        return list(self.labels) or [f"run {k}" for k in range(1, len(runs) + 1)]
+
+
+def names_of(runs: Iterable[Execution]) -> list[str]:
+    """Return the states of all runs, then their outputs."""
+    kept = list(runs)
+    states = [name for run in kept for name in run.states]
+    return list(dict.fromkeys([*states, *(name for run in kept for name in run.output_names)]))
+
+
+def checked(name: str, known: Sequence[str]) -> str:
+    """Refuse a name that is not among those known."""
+    if name not in known:
+        hint = did_you_mean(name, known) or f"there are {', '.join(known) or 'none'}"
+        raise UsageError(f"no state or output is called {name}", hint)
+    return name
