@@ -201,7 +201,8 @@ class Program:
     ``contacts`` are motions along guards of modes: each has the name, states and walls of its mode and, in the place of
     the edge that it is in contact with, one that releases it.
 
-    ``initial_uses`` says that initial values use each other.
+    Where initial values use each other, ``initial_order`` has their states, each behind those that it uses, and
+    ``initial_values`` in this order a routine of the parameters and ``initial_states`` for each.
 
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
     """
@@ -224,7 +225,8 @@ class Program:
     switches: tuple[Switch, ...] = ()
     switching: Routines = NOTHING
     scaled_states: tuple[str, ...] = ()
-    initial_uses: bool = False
+    initial_order: tuple[int, ...] = ()
+    initial_values: Routines = NOTHING
     contacts: tuple[ModeProgram, ...] = ()
 
     @property

@@ -184,23 +184,19 @@ class Initial:
         """The values, each behind those that it uses."""
         return self.written or self.values
 
-    def following(self, given: Iterable[str]) -> tuple[tuple[str, sp.Expr], ...]:
-        """The other values over parameters and the symbols of the states whose values are given."""
-        known: dict[Any, Any] = {symbol(name): symbol(name) for name in given}
-        for name, value in self.in_order:
-            known.setdefault(symbol(name), sp.sympify(value).xreplace(known))
-        names = (name for name, _ in self.values)
-        return tuple((name, known[symbol(name)]) for name in names if known[symbol(name)] != symbol(name))
-
 
 def started(mode: str, names: Iterable[str], in_order: Sequence[tuple[str, sp.Expr]]) -> Initial:
     """Where a run starts, of values over parameters and earlier ones; ``names`` are the states in file order."""
-    known: dict[Any, Any] = {}
+    names, known = tuple(names), dict[Any, Any]()
+    others, written = dict[Any, Any](), list[tuple[str, Any]]()
     for name, value in in_order:
         known[symbol(name)] = sp.sympify(value).xreplace(known)
-    used = set().union(*(sp.sympify(value).free_symbols for _, value in in_order))
-    written = tuple(in_order) if used & known.keys() else ()
-    return Initial(mode, tuple((name, known[symbol(name)]) for name in names), written)
+        if name in names:
+            written.append((name, sp.sympify(value).xreplace(others)))
+        else:
+            others[symbol(name)] = sp.sympify(value).xreplace(others)
+    uses = any(value.free_symbols & known.keys() for _, value in written)
+    return Initial(mode, tuple((name, known[symbol(name)]) for name in names), tuple(written) if uses else ())
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -82,7 +81,8 @@ def _lower(system: HybridSystem) -> lowered.Program:
         switches=switch_programs(switches),
         switching=print_routines(switch_routines(switches, names.shared), names.data),
         scaled_states=tuple(name for name, _ in experiment.scale),
-        initial_uses=bool(system.initial.written),
+        initial_order=_initial_order(system),
+        initial_values=print_routines(_initial_values(system, names), ()),
     )
 
 
@@ -115,15 +115,13 @@ def _contact(
     return replace(program, edges=edges, push_order=order)
 
 
-def lower_expressions(
-    system: HybridSystem, expressions: dict[str, sp.Expr], states: Sequence[str] = ()
-) -> lowered.Routines:
-    """Lower expressions of parameters (what overrides are made of) and states: each a routine of all of them."""
+def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:
+    """Lower expressions of parameters (what overrides are made of): each a routine of all parameters."""
     names = number(system)
-    own = {symbol(state): symbol(f"x{i}") for i, state in enumerate(states)}
-    arguments, meaning = (*names.parameters, *own.values()), names.shared | own
     with deep_stack():
-        return print_routines([Definition(k, arguments, (e.xreplace(meaning),)) for k, e in expressions.items()], ())
+        return print_routines(
+            [Definition(k, names.parameters, (e.xreplace(names.shared),)) for k, e in expressions.items()], ()
+        )
 
 
 def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
@@ -145,6 +143,20 @@ def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
 def _sampled(given: SampledInput) -> lowered.SampledInput:
     exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
     return lowered.SampledInput(given.name, given.hold, given.times if exact else None, given.values if exact else None)
+
+
+def _initial_order(system: HybridSystem) -> tuple[int, ...]:
+    places = {name: i for i, (name, _) in enumerate(system.initial.values)}
+    return tuple(places[name] for name, _ in system.initial.written)
+
+
+def _initial_values(system: HybridSystem, names: Names):
+    """Each initial value over parameters and others, where they use each other."""
+    states = {symbol(name): symbol(f"x{i}") for i, (name, _) in enumerate(system.initial.values)}
+    arguments = (*names.parameters, *states.values())
+    places = {argument: i for i, argument in enumerate(arguments)}
+    for i, (_, value) in zip(_initial_order(system), system.initial.written, strict=True):
+        yield Definition(f"initial_{i}", arguments, (replaced(value, names.shared | states, {}),), places=places)
 
 
 def _constants(system: HybridSystem, names: Names):

@@ -248,8 +248,8 @@ def initial_columns(
             numbers[name] = columns.given(varied[name], f"initial.{name}")
         elif name in shared:
             numbers[name] = columns.expression(shared[name], f"initial.{name}")
-    if columns.values.program.initial_uses and numbers:
-        numbers |= _following(columns, numbers)
+    if columns.values.program.initial_order and numbers:
+        numbers = _following(columns, numbers) | numbers
     else:
         in_file = columns.constant("initial", "initial")
         numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False)) | numbers
@@ -257,23 +257,18 @@ def initial_columns(
 
 
 def _following(columns: InstanceTable, given: Mapping[str, Sequence[Number]]) -> dict[str, Sequence[Number]]:
-    """The initial values that are not given, from those that are."""
-    from hsdsl.lower import lower_expressions
-
-    system = columns.values.system
-    if len(given) == len(system.initial.values):
-        return {}
-    names, expressions = zip(*system.initial.following(given), strict=True)
-    routines = lower_expressions(system, {f"value_{i}": e for i, e in enumerate(expressions)}, tuple(given))
-    made = compile_routines(routines, columns.values.kernel.arithmetic, "initial")()
-    joined = InstanceTable(
-        columns.values,
-        [(*row, *own) for row, *own in zip(columns.rows, *given.values(), strict=True)],
-        strict=columns.strict,
-    )
-    found: dict[str, Sequence[Number]] = {
-        name: [row[0] for row in joined.of(made[i], f"initial.{name}")] for i, name in enumerate(names)
-    }
-    for instance, why in joined.refused.items():
-        columns.refuse(instance, why)
-    return found
+    """The initial values of the file, those that use a given one computed from it."""
+    program, arithmetic = columns.values.program, columns.values.kernel.arithmetic
+    routines = compile_routines(program.initial_values, arithmetic, "initial")()
+    zero: Sequence[Number] = [arithmetic.zero] * len(columns.rows)
+    numbers: dict[str, Sequence[Number]] = {name: given.get(name, zero) for name in program.initial_states}
+    for i, routine in zip(program.initial_order, routines, strict=True):
+        name = program.initial_states[i]
+        if name in given:
+            continue
+        rows = [(*row, *own) for row, *own in zip(columns.rows, *numbers.values(), strict=True)]
+        joined = InstanceTable(columns.values, rows, strict=columns.strict)
+        numbers[name] = [row[0] for row in joined.of(routine, f"initial.{name}")]
+        for instance, why in joined.refused.items():
+            columns.refuse(instance, why)
+    return numbers
