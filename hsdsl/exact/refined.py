@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hsdsl.errors import UsageError
-from hsdsl.execution import Arc, Array, Execution, Transition
+from hsdsl.execution import Arc, Array, Execution, Transition, Verdict
 
 FEWEST, MOST = 4, 14
 ATTEMPTS = 4
@@ -65,6 +65,9 @@ def precise(model: Simulated, digits: int = 10, **options: Any) -> Execution:
     options = {"max_transitions": 1000, "precision": digits + 20, **options}
     for _ in range(ATTEMPTS):
         coarse, fine = (_run(model, exponent, finer, options) for finer in ("", f"/{FINER}"))
+        assert coarse.assessment is not None
+        verdict = coarse.assessment(coarse, fine)
+        coarse, fine = without_strips(coarse, verdict), without_strips(fine, verdict)
         error = difference(coarse, fine)
         if error <= 10.0**-digits:
             return _rounded(fine, error, SOURCE.format(precision=digits + 20, tolerance=f"1e-{exponent}/{FINER}"))
@@ -77,11 +80,11 @@ def _run(model: Simulated, exponent: int, finer: str, options: dict[str, Any]) -
     run = model.simulate(scheme="relaxed", method="auto", **sizes, **options)
     if not run.stop.complete or (run.transitions and run.transitions[-1].resumed is None):
         raise UsageError(f"a reference must get to its end, between transitions: {run.stop.message}")
-    return without_strips(run)
+    return run
 
 
-def without_strips(run: Execution) -> Execution:
-    """Take the strips out of a relaxed run: everything after a strip is earlier by its duration."""
+def without_strips(run: Execution, verdict: Verdict) -> Execution:
+    """Take the strips out of a relaxed run with this verdict: all after a strip is earlier by its duration."""
     rows: list[int] = []
     arcs: list[Arc] = []
     transitions: list[Transition] = []
@@ -103,7 +106,7 @@ def without_strips(run: Execution) -> Execution:
         delay = delay + (transition.resumed - transition.time)
     columns = {name: getattr(run, name)[rows] for name in ("values", "outputs", "depth", "coefficients")}
     end = times[rows[-1]]
-    ends = {"final": replace(run.final, time=end), "stop": replace(run.stop, time=end)}
+    ends = {"final": replace(run.final, time=end), "stop": replace(run.stop, time=end), "verdict": verdict}
     return replace(run, times=times[rows], arcs=tuple(arcs), transitions=tuple(transitions), **ends, **columns)
 
 

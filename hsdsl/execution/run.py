@@ -21,7 +21,7 @@ from hsdsl.names import visible
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
-Assessment = Callable[["Execution", bool], Verdict]
+Assessment = Callable[["Execution", "Execution | None"], Verdict]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,8 +57,8 @@ class Execution(Deferred):
     sampler : callable or None
         A faster way to the same values at many times, of a compiled run.
     assessment : callable or None
-        ``assessment(execution, estimated) -> Verdict``: the verdict, where ``estimated`` holds it against a finer run
-        also where steps are fixed; without it the verdict stays what it is.
+        ``assessment(execution, finer) -> Verdict``: the verdict, held against a finer run, or against its own
+        ``finer`` where that is None and steps are not fixed; without it the verdict stays what it is.
     repetition : callable or None
         ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.refinement`).
     differentiation : callable or None
@@ -208,7 +208,7 @@ class Execution(Deferred):
         """Return the same execution with its verdict held against the finer run, also where steps are fixed."""
         if self.assessment is None:
             return self
-        return replace(self, verdict=self.assessment(self, True))
+        return replace(self, verdict=self.assessment(self, self.finer))
 
     def sensitivity(self, wrt: str | Sequence[str]) -> Any:
         """Return the derivatives of this run by parameters and initial states (see `Model.sensitivity`).

@@ -114,7 +114,7 @@ def _arcs(execution: Execution) -> tuple[Arc, ...]:
 def _verdict(execution: Execution) -> Verdict:
     assert execution.assessment is not None
     began = time.perf_counter()
-    verdict = execution.assessment(execution, False)
+    verdict = execution.assessment(execution, None)
     execution.seconds["verdict"] = time.perf_counter() - began
     return verdict
 
@@ -178,9 +178,11 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
     }
 
 
-def _assessment(problem: Problem, notes: Callable[[], Diagnostics], execution: Execution, estimated: bool) -> Verdict:
+def _assessment(
+    problem: Problem, notes: Callable[[], Diagnostics], execution: Execution, finer: Execution | None
+) -> Verdict:
     if problem.settings.one_stop is not None:
         return Verdict("unknown", TWO_STEP)
     from hsdsl.simulate.verdict import RunView, assess  # not every run needs one
 
-    return assess(RunView(problem, execution, estimated), notes())
+    return assess(RunView(problem, execution, finer), notes())

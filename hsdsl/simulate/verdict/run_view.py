@@ -28,15 +28,16 @@ class RunView:
 
     Attributes
     ----------
-    estimated : bool
-        Whether the run is held against a finer one although its steps are fixed.
+    against : Execution or None
+        A finer run that shows the errors of this one. Where it is None and steps are chosen by a tolerance, the same
+        run is repeated, finer.
     upto : float
         Until when the run can be relied on.
     """
 
     problem: Problem
     execution: Execution
-    estimated: bool = False
+    against: Execution | None = None
     upto: float = inf
 
     @property
@@ -67,9 +68,10 @@ class RunView:
 
     @cached_property
     def errors(self) -> Errors | None:
-        """How wrong the run is, by a finer one; None where steps are fixed and no estimate is requested."""
-        tolerance = self.problem.settings.tolerance
-        finer = self.execution.finer if tolerance is not None or self.estimated else None
+        """How wrong the run is, by a finer one; None where steps are fixed and no finer run is given."""
+        tolerance, finer = self.problem.settings.tolerance, self.against
+        if finer is None and tolerance is not None:
+            finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":
             return None
         end = self.times[-1]
