@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hsdsl.completion import contact
+from hsdsl.completion import contacts
 from hsdsl.expression.stack import deep_stack
 from hsdsl.lower import LoweredMode, number
 from hsdsl.lower.routines import Definition, print_routines
@@ -33,8 +33,8 @@ def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
     with deep_stack():
         whole, switches = with_switches(system)
         names = number(whole, switches.symbols)
-        held = (contact(mode, k) for mode in whole.modes for k in range(len(mode.edges)))
-        flows = (*whole.modes, *(motion.mode for motion in held if motion is not None))
+        held = (motion.mode for mode in whole.modes for motion in contacts(mode).values())
+        flows = (*whole.modes, *held)
         return tuple(_slopes(LoweredMode(mode, names)) for mode in flows)
 
 

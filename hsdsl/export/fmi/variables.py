@@ -13,6 +13,7 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.text import compile_routines
 from hsdsl.elaborate.inputs import switch_name
+from hsdsl.execution import Execution
 from hsdsl.export.c.tuning import derived, structural
 from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
@@ -20,6 +21,7 @@ from hsdsl.simulate import Problem
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
 _FIRST = re.compile(r"\ba(\d+)\b")
+_SHARES = np.linspace(0, 1, 257)  # of a run, at which it is compared with a finer one
 
 
 @dataclass(frozen=True)
@@ -112,14 +114,22 @@ def _states(source: Source) -> tuple[Variable, ...]:
 
 def nominals(source: Source) -> list[float]:
     """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
-    run = source.model.simulate(**source.arguments)
-    sizes: dict[str, float] = {}
-    for arc in run.arcs:
-        rows = np.abs(run.values[arc.first : arc.last + 1, : len(arc.states)])
-        for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
-            sizes[name] = max(size, sizes.get(name, 0.0))
-    given = source.problem.settings.scale
-    return [float(given.get(name) or _power(sizes.get(name, 0.0))) for name in source.problem.program.all_states]
+    run, given = source.model.simulate(**source.arguments), source.problem.settings.scale
+    return [float(given.get(name) or _power(_size(run, name))) for name in source.problem.program.all_states]
+
+
+def _size(run: Execution, name: str) -> float:
+    """How large a state gets in a run; 0 where it is round-off, of which the finer run has other digits."""
+    rows = [np.abs(run.values[a.first : a.last + 1, a.states.index(name)]) for a in run.arcs if name in a.states]
+    size = float(np.concatenate(rows).max()) if rows else 0.0
+    finer = run.finer
+    if finer is None or size == 0:
+        return size
+    end = min(float(run.time_span[1]), float(finer.time_span[1]))
+    both = [np.asarray(each.sample(_SHARES * end)[name], dtype=float) for each in (run, finer)]
+    sizes = np.fmax(*np.abs(both))
+    changes = np.abs(both[0] - both[1])[sizes > 0] / sizes[sizes > 0]
+    return 0.0 if len(changes) and not np.nanmedian(changes) < 1 / 2 else size
 
 
 def _power(size: float) -> float:
