@@ -6,6 +6,7 @@ import ast
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,16 @@ modes:
 initial: {mode: import, x: b/8}
 experiment: {until: 4}
 """
+
+
+def slow_or_campaign(campaign: bool) -> pytest.MarkDecorator:
+    return pytest.mark.campaign if campaign else pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def _no_compiled_code_is_left() -> Iterator[None]:
+    yield
+    jax.clear_caches()  # else each test adds its own to the memory
 
 
 def hostile(path: Path) -> Path:
@@ -124,8 +135,7 @@ def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
         module.parameters({"U": 1})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("setting", range(len(SETTINGS)))
+@pytest.mark.parametrize("setting", [pytest.param(k, marks=slow_or_campaign(k > 0)) for k in range(len(SETTINGS))])
 @pytest.mark.parametrize("name", NAMES)
 def test_every_model(name: str, setting: int, tmp_path: Path) -> None:
     model, settings = hsdsl.load(MODELS / f"{name}.yaml"), SETTINGS[setting]
@@ -133,9 +143,14 @@ def test_every_model(name: str, setting: int, tmp_path: Path) -> None:
     assert_same(module, ran(module), model.simulate(**settings))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ("located", "relaxed"))
-@pytest.mark.parametrize("name", MEANING)
+@pytest.mark.parametrize(
+    ("name", "scheme"),
+    [
+        pytest.param(name, scheme, marks=slow_or_campaign(k % 2 == i))  # one scheme of each case in turn
+        for k, name in enumerate(MEANING)
+        for i, scheme in enumerate(("located", "relaxed"))
+    ],
+)
 def test_the_meaning(name: str, scheme: str, tmp_path: Path) -> None:
     model, settings = hsdsl.load(CASES / f"{name}.yaml"), {"scheme": scheme, "method": "rk4", "step": 1e-2}
     module = imported(model, tmp_path, **settings)
@@ -166,12 +181,16 @@ def test_rest_ends_and_outputs_and_samples_follow(tmp_path: Path) -> None:
     assert np.allclose(found.outputs, found.x[0] + found.x[1] ** 2 / 2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings", "by"),
     [
-        ("oscillator-with-stop-1", {"scheme": "located", "method": "rk4", "step": 1e-3, "until": 6}, 1e-6),
-        ("pronking-runner", {"initial": {"w": -0.4}}, 1e-5),
+        pytest.param(
+            "oscillator-with-stop-1",
+            {"scheme": "located", "method": "rk4", "step": 1e-3, "until": 6},
+            1e-6,
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("pronking-runner", {"initial": {"w": -0.4}}, 1e-5, marks=pytest.mark.campaign),
     ],
 )
 def test_derivatives_through_impacts_are_differences(name: str, settings: Any, by: float, tmp_path: Path) -> None:

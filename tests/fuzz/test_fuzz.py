@@ -39,7 +39,7 @@ def test_a_short_campaign(guard, kind):
             targets.feed(kind, data, rng, Path(guard.folder), 0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", campaign.KINDS)
 def test_a_longer_campaign(kind):
     result = campaign.run(campaign.parsed(["--kind", kind, "--inputs", "5000", "--seed", "7"]))
@@ -66,7 +66,7 @@ def test_any_document(guard, data):
 
 
 @pytest.mark.slow
-@settings(max_examples=2000, **LIMITS)
+@settings(max_examples=500, **LIMITS)
 @given(st.one_of(strategies.DOCUMENTS, strategies.BYTES))
 def test_many_documents(guard, data):
     fed(guard, "documents", data, 0.1)
