@@ -15,6 +15,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Samples
 from hsdsl.report import as_json, dumps
 
+FORMAT, VERSION = "hsdsl table", 2  # sidecars of version 1 name neither
 LIBRARIES = ("hsdsl", "numpy", "mpmath", "sympy")
 
 
@@ -47,6 +48,8 @@ def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
         raise UsageError(f"cannot read {os.fspath(table)} and its sidecar: {error.strerror or error}") from None
     if sidecar is None:
         raise UsageError(f"{path} is damaged, or not the sidecar of a table")
+    if sidecar.get("version", 1) > VERSION:
+        raise UsageError(f"a later version of hsdsl wrote {path}; this one reads {VERSION}", "update hsdsl")
     if sidecar.get("table_sha256") != checksum:
         raise UsageError(f"{path} does not belong to {os.fspath(table)}, which was changed or replaced since")
     return sidecar
@@ -64,6 +67,7 @@ def _parsed(path: Path) -> dict[str, Any] | None:
     try:
         content: Any = json.loads(path.read_bytes())
         known = isinstance(content["table"]["file"], str) and isinstance(content["versions"], dict)
+        known = known and type(content.get("version", 1)) is int
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     return cast("dict[str, Any]", content) if known else None
@@ -81,6 +85,8 @@ def write_sidecar(execution: Execution, table: Samples, name: str, written: Path
     """
     run = as_json(execution)
     content = {
+        "format": FORMAT,
+        "version": VERSION,
         "model": run.pop("model"),
         "sha256": execution.digest,
         "title": execution.title,

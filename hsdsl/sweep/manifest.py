@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -27,6 +27,7 @@ class Manifest:
 
     ``digest`` is the checksum of the model with its data, ``arguments`` are those of every run, ``states`` and
     ``outputs`` the names that have columns, ``chunk`` the number of rows of a file.
+    ``tag`` is a checksum of all that decides what is in the rows; each file of the dataset carries it.
     """
 
     model: str
@@ -40,12 +41,7 @@ class Manifest:
     outputs: tuple[str, ...]
     chunk: int
     made_with: dict[str, str]
-
-    @property
-    def tag(self) -> str:
-        """A name for all that decides what is in the rows: each file of the dataset carries it."""
-        text = json.dumps([self.plain()[key] for key in DECIDING], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+    tag: str = ""
 
     @property
     def chunks(self) -> int:
@@ -62,6 +58,7 @@ class Manifest:
         content = {
             "format": FORMAT,
             "version": VERSION,
+            "tag": self.tag,
             "hsdsl": self.made_with.get("hsdsl", ""),
             "versions": self.made_with,
             "model": self.model,
@@ -113,7 +110,9 @@ def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator
 
 def new(**fields: Any) -> Manifest:
     """A manifest of what this version of hsdsl writes."""
-    return Manifest(**fields, made_with=versions())
+    untagged = Manifest(**fields, made_with=versions())
+    text = json.dumps([untagged.plain()[key] for key in DECIDING], sort_keys=True)
+    return replace(untagged, tag=hashlib.sha256(text.encode()).hexdigest())
 
 
 def read(folder: Path) -> Manifest:
@@ -152,5 +151,5 @@ def _parsed(content: Mapping[str, Any]) -> Manifest:
     return Manifest(
         str(content["model"]), str(content["sha256"]), content["title"], dict(content["units"]), variation,
         Recording(**content["record"]), dict(content["settings"]), tuple(content["states"]), tuple(content["outputs"]),
-        chunk, dict(content["versions"]),
+        chunk, dict(content["versions"]), str(content["tag"]),
     )  # fmt: skip
