@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -35,21 +36,34 @@ Point = dict[sp.Symbol, float]
 class Contact:
     """Motion of a mode along the guards of some of its edges, ``edges`` by their numbers.
 
-    ``mode`` is the mode with the constrained flow. The first of its edges are those of the mode itself, but those in
-    contact release the state: their surfaces are the pushes with which the flow presses on the guards, negative. Edges
-    beyond the mode's own are where an `if` may end. What follows is of the last edge: ``ends`` says of each of its ends
-    of an `if` under which condition it is one.
+    ``base`` is the mode. ``rows`` has the flow of the states whose flow is another one, by the states' numbers;
+    ``releases`` the edges that take the place of those in contact, by their numbers: their surfaces are the pushes with
+    which the flow presses on the guards, negative. ``further`` edges, beyond the mode's own, are where an `if` may end.
+    What follows is of the last edge: ``ends`` says of each of its ends of an `if` under which condition it is one.
     ``push`` is the derivative of the guard along the flow that presses, of this ``order``: 1, or 2 where the first one,
     ``rate``, is zero on it. ``landing`` is the state that repeated resets take a state near the guard to.
     """
 
     edges: tuple[int, ...]
     order: int
-    mode: Mode
+    base: Mode
+    rows: dict[int, sp.Expr]
+    releases: dict[int, Edge]
+    further: tuple[Edge, ...]
     rate: sp.Expr
     push: sp.Expr
     landing: tuple[sp.Expr, ...]
     ends: tuple[sp.Basic, ...]
+
+    @property
+    def mode(self) -> Mode:
+        """The mode with the constrained flow."""
+        flow, texts, edges = list(self.base.flow), list(self.base.flow_texts), list(self.base.edges)
+        for i, row in self.rows.items():
+            flow[i], texts[i] = row, text_of(row)
+        for k, edge in self.releases.items():
+            edges[k] = edge
+        return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
 
 
 def contacts(mode: Mode) -> dict[frozenset[int], Contact]:
@@ -67,8 +81,20 @@ def contacts(mode: Mode) -> dict[frozenset[int], Contact]:
                 if k > max(few) and all(_apart(singles[one], singles[frozenset((j,))], mode) for j in few):
                     found = contact(every[few].mode, k)
                     if found is not None:
-                        every[few | one] = replace(found, edges=(*every[few].edges, k))
+                        every[few | one] = _joined(every[few], found)
     return every
+
+
+def _joined(first: Contact, second: Contact) -> Contact:
+    """Both motions together, the second one being derived from the mode of the first."""
+    return replace(
+        second,
+        edges=(*first.edges, *second.edges),
+        base=first.base,
+        rows=first.rows | second.rows,
+        releases=first.releases | second.releases,
+        further=first.further + second.further,
+    )
 
 
 def _apart(one: Contact, other: Contact, mode: Mode) -> bool:
@@ -91,65 +117,116 @@ def contact(mode: Mode, k: int) -> Contact | None:
     edge = mode.edges[k]
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived:
         return None
-    states = [symbol(name) for name in mode.states]
-    if not _is_small((*mode.flow, *edge.reset, edge.surface.residual)):
-        return None
-    constrained = _constrained(states, mode, edge)
+    near = _Nearby(mode, edge)
+    constrained = _constrained(near) if near.changed and near.is_small() else None
     if constrained is None:
         return None
-    flow, landing, at = constrained
-    push, order = _push(states, mode.flow, edge, at)
+    rows, landing, at = constrained
+    push, order = _push(near, at)
     if order is None:
         return None
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
-                      reset=tuple(states), reset_texts=mode.states)  # fmt: skip
+                      reset=_symbols(mode.states), reset_texts=mode.states)  # fmt: skip
     further, ends = _ends_of_condition(release, edge.condition)
-    edges = (*mode.edges[:k], release, *mode.edges[k + 1 :], *further)
-    held = replace(mode, flow=flow, flow_texts=tuple(map(text_of, flow)), edges=edges)
-    rate = cancelled(along(edge.surface.residual, states, mode.flow))
-    return Contact((k,), order, held, rate, push, landing, tuple(ends))
+    rate = cancelled(near.along(near.guard))
+    return Contact((k,), order, mode, rows, {k: release}, tuple(further), rate, push, landing, tuple(ends))
 
 
-def _constrained(states: list[sp.Symbol], mode: Mode, edge: Edge):
-    """The flow that stays where a reset keeps the state, the way there, and a point; None where there is none."""
-    changed = [i for i, (x, r) in enumerate(zip(states, edge.reset, strict=True)) if x != r]
-    moved = sp.Matrix([edge.reset[i] - states[i] for i in changed])
-    if not changed or (at := _fixed_point(states, [edge.surface.residual, *moved], mode.flow)) is None:
+@lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
+def _symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
+    return tuple(map(symbol, states))
+
+
+@lru_cache(maxsize=16)
+def _rows(states: tuple[str, ...], flow: tuple[sp.Expr, ...]) -> dict[sp.Symbol, sp.Expr]:
+    return dict(zip(_symbols(states), flow, strict=True))
+
+
+class _Nearby:
+    """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
+
+    ``changed`` has the numbers of these states, ``moved`` what the reset adds to each.
+    """
+
+    def __init__(self, mode: Mode, edge: Edge) -> None:
+        self.states, self.edge, self.guard = _symbols(mode.states), edge, sp.sympify(edge.surface.residual)
+        self._flow = _rows(mode.states, mode.flow)
+        pairs = zip(self.states, edge.reset, strict=True)
+        self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x]
+        self.moved = sp.Matrix([edge.reset[i] - self.states[i] for i in self.changed])
+
+    def flow(self, x: sp.Symbol) -> sp.Expr:
+        """The rate of time or of a state."""
+        return sp.S.One if x == TIME else self._flow[x]
+
+    def among(self, value: sp.Basic) -> list[sp.Symbol]:
+        """The time, and the states in the order of their names, that a value depends on."""
+        return sorted((x for x in value.free_symbols if x == TIME or x in self._flow), key=lambda x: x.name)
+
+    def along(self, value: sp.Expr) -> sp.Expr:
+        """The derivative of an expression along the flow."""
+        return along(value, self.among(value), self.flow)
+
+    def flows(self) -> list[sp.Expr]:
+        """The flows that the motion depends on: of what guard and reset depend on, and of what their flows do."""
+        found = dict.fromkeys(self.among(sp.Tuple(self.guard, *self.moved)))
+        further = [y for x in found for y in self.among(sp.sympify(self.flow(x)))]
+        return [self.flow(x) for x in dict.fromkeys((*found, *further))]
+
+    def is_small(self) -> bool:
+        """Whether all of this written out is short enough to be differentiated twice as trees."""
+        sizes: dict[sp.Basic, int] = {}
+
+        def size(expr: sp.Basic) -> int:
+            if expr not in sizes:
+                sizes[expr] = 1 + sum(map(size, expr.args))
+            return sizes[expr]
+
+        return sum(map(size, map(sp.sympify, (*self.flows(), *self.moved, self.guard)))) <= MOST_NODES
+
+
+def _constrained(near: _Nearby):
+    """The rows of the flow that stays where a reset keeps the state, the way there, and a point; None without one."""
+    if (at := _fixed_point(near)) is None:
         return None
-    slopes = moved.jacobian([TIME, *states])
-    own = slopes[:, [1 + i for i in changed]]
+    moved, own = near.moved, [near.states[i] for i in near.changed]
+    among = list(dict.fromkeys((*near.among(sp.Tuple(*moved)), *own)))
+    slopes = moved.jacobian(among)
+    own = moved.jacobian(own)
     rank = _rank(own, at)
     if not 0 < rank <= MOST_DIRECTIONS or _rank(slopes, at) > rank:
         return None
-    part, size = sp.eye(len(changed)), sp.trace(own)
+    part, size = sp.eye(len(near.changed)), sp.trace(own)
     for k in range(2, rank + 1):  # Faddeev and LeVerrier: own part / size projects along the reset's directions
-        part = own * part - size * sp.eye(len(changed))
+        part = own * part - size * sp.eye(len(near.changed))
         size = sp.trace(own * part) / k
     if abs(_number(size, at)) <= SMALL:  # the reset does not contract: a shear
         return None
-    held = list(mode.flow)
-    for i, correction in zip(changed, part * slopes * sp.Matrix([1, *mode.flow]), strict=True):
-        held[i] = cancelled(held[i] - correction / size)
-    landing = list[sp.Expr](states)
-    for i, correction in zip(changed, part * moved, strict=True):
+    rows: dict[int, sp.Expr] = {}
+    for i, correction in zip(near.changed, part * slopes * sp.Matrix(list(map(near.flow, among))), strict=True):
+        rows[i] = cancelled(near.flow(near.states[i]) - correction / size)
+    landing = list[sp.Expr](near.states)
+    for i, correction in zip(near.changed, part * moved, strict=True):
         landing[i] = cancelled(landing[i] - correction / size)
-    return tuple(held), tuple(landing), at
+    return rows, tuple(landing), at
 
 
-def _push(states: list[sp.Symbol], flow: Sequence[sp.Expr], edge: Edge, at: Point):
+def _push(near: _Nearby, at: Point):
     """The first derivative of a guard along the flow that the reset takes back, and which one it is."""
-    rate = along(edge.surface.residual, states, flow)
-    for order, value in ((1, edge.surface.residual), (2, rate)):
-        slopes = [sp.diff(value, x) for x in states]
-        back = [sum(g * sp.diff(r - x, y) for g, x, r in zip(slopes, states, edge.reset, strict=True)) for y in states]
+    rate = near.along(near.guard)
+    moved = {near.states[i]: change for i, change in zip(near.changed, near.moved, strict=True)}
+    for order, value in ((1, near.guard), (2, rate)):
+        slopes = [(sp.diff(value, x), moved[x]) for x in near.among(value) if x in moved]
+        by = near.among(sp.Tuple(*(change for _, change in slopes)))
+        back = [sum(g * sp.diff(change, y) for g, change in slopes) for y in by if y != TIME]
         if any(abs(_number(b, at)) > SMALL for b in back):
-            return cancelled(along(value, states, flow)), order
+            return cancelled(near.along(value)), order
     return rate, None
 
 
-def along(value: sp.Expr, states: list[sp.Symbol], flow: Sequence[sp.Expr]) -> sp.Expr:
-    """The derivative of an expression along a flow."""
-    return sp.diff(value, TIME) + sum(sp.diff(value, x) * f for x, f in zip(states, flow, strict=True))
+def along(value: sp.Expr, among: Sequence[sp.Symbol], flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
+    """The derivative of an expression of ``among`` along a flow."""
+    return sp.Add(*(sp.diff(value, x) * flow(x) for x in among))
 
 
 def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> tuple[list[Edge], list[sp.Basic]]:
@@ -184,38 +261,29 @@ def cancelled(value: sp.Expr) -> sp.Expr:
     return sp.S.Zero if over == 0 else min((value, shorter), key=sp.count_ops)
 
 
-def _is_small(expressions: Sequence[sp.Expr]) -> bool:
-    """Whether expressions written out are short enough to be differentiated twice as trees."""
-    sizes: dict[sp.Basic, int] = {}
-
-    def size(expr: sp.Basic) -> int:
-        if expr not in sizes:
-            sizes[expr] = 1 + sum(map(size, expr.args))
-        return sizes[expr]
-
-    return sum(map(size, map(sp.sympify, expressions))) <= MOST_NODES
-
-
-def _fixed_point(states: list[sp.Symbol], equations: list[sp.Expr], further: Sequence[sp.Expr]) -> Point | None:
-    """A random point where equations hold, by Newton's method; None where none is found."""
-    names: set[sp.Symbol] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *further)), states)
+def _fixed_point(near: _Nearby) -> Point | None:
+    """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
+    equations, flows = [near.guard, *near.moved], near.flows()
+    free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
+    names = set[sp.Symbol]().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
     draw = random.Random(1)
     at = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
-    slopes = sp.Matrix(equations).jacobian(states)
+    slopes = sp.Matrix(equations).jacobian(free) if free else sp.zeros(len(equations), 0)
     for _ in range(MOST_ROUNDS):
         values = np.array([_number(e, at) for e in equations])
         if not np.all(np.isfinite(values)):
             return None
         step = np.linalg.pinv(_numbers(slopes, at), rcond=SMALL) @ values
-        for name, change in zip(states, step.tolist(), strict=True):
+        for name, change in zip(free, step.tolist(), strict=True):
             at[name] -= change
-        if np.max(np.abs(step)) <= SMALL:
+        if not free or np.max(np.abs(step)) <= SMALL:
             return at
     return None
 
 
 def _number(value: sp.Expr, at: Point) -> float:
-    number = sp.sympify(value).xreplace({name: sp.Float(number) for name, number in at.items()}).evalf()
+    number = sp.sympify(value)
+    number = number.xreplace({name: sp.Float(at[name]) for name in number.free_symbols if name in at}).evalf()
     return float(number) if number.is_Number and number.is_real else math.nan
 
 

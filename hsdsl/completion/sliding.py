@@ -87,7 +87,8 @@ def _opposite(out: Edge, back: Edge) -> bool:
 def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
     states = [symbol(state) for state in a.states]
     r = out.surface.residual
-    outwards, inwards = (cancelled(along(r, states, mode.flow)) for mode in (a, b))
+    flows = ({TIME: sp.S.One} | dict(zip(states, mode.flow, strict=True)) for mode in (a, b))
+    outwards, inwards = (cancelled(along(r, (TIME, *states), flow.__getitem__)) for flow in flows)
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
     pressing = cancelled(outwards - inwards)
