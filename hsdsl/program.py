@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal
 
 JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
@@ -100,6 +101,8 @@ class EdgeProgram:
     """An edge; indices count modes in file order.
 
     ``conditional`` says whether it has an `if`, and ``condition_text`` how that is written.
+    ``changes`` are the states of the target that the reset gives a value, by number, and ``change_texts`` how that is
+    written; the others keep theirs, which is so only where the mode has the same states as the target.
     ``contact`` is the number, among `Program.flows`, of the motion along its guard; None where there is none.
     ``releases`` says that the edge ends such a motion.
     """
@@ -111,10 +114,19 @@ class EdgeProgram:
     conditional: bool
     priority: int
     text: str
-    reset_texts: tuple[str, ...]
+    changes: tuple[int, ...]
+    change_texts: tuple[str, ...]
     condition_text: str = ""
     contact: int | None = None
     releases: bool = False
+
+    @property
+    def reset_texts(self) -> tuple[str, ...]:
+        """How the value of each state of the target is written: one that keeps its value by its name."""
+        texts = list(self.target_states)
+        for state, text in zip(self.changes, self.change_texts, strict=True):
+            texts[state] = text
+        return tuple(texts)
 
 
 @dataclass(frozen=True)
@@ -140,11 +152,11 @@ class ModeProgram:
     surfaces       m values r
     magnitudes     m values |L| + |R|, the part of the round-off bound that r alone cannot show
     outputs        k values, NaN where the mode does not define the output
-    gradient_K     n + 1 slopes (dr/dt, dr/dx0, ...) of surface K
+    gradient_K     slopes of surface K by the arguments ``slopes[K]``, numbered t, x0, ...: the others are zero
     rate_K         one value, L_f r = dr/dt + grad r . f of surface K
     condition_K_I  one boolean, part I of the `if` of edge K, which holds where all its parts do
-    reset_K        values of edge K's target states
-    spread_K       the size max(|R_i|, sum |dR_i/dx_k| s_k) of the numbers each target state is
+    reset_K        values of those target states that edge K ``changes``
+    spread_K       the size max(|R_i|, sum |dR_i/dx_k| s_k) of the numbers each of these is
                    computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
     ============== =========================================================================
 
@@ -170,6 +182,7 @@ class ModeProgram:
     walls: tuple[str, ...]
     flow_texts: tuple[str, ...]
     routines: Routines
+    slopes: tuple[tuple[int, ...], ...]
     affine: bool
     jacobian: Jacobian
     tape: Tape | None
@@ -177,6 +190,15 @@ class ModeProgram:
     diagnosis: Routines
     push_order: int = 0
     slides: tuple[str, ...] = ()
+
+    @cached_property
+    def conditions(self) -> tuple[tuple[str, ...], ...]:
+        """The names of the routines of each edge's condition."""
+        parts: list[list[str]] = [[] for _ in self.edges]
+        for name in self.routines.names:
+            if name.startswith("condition_"):
+                parts[int(name.split("_")[1])].append(name)
+        return tuple(map(tuple, parts))
 
     @property
     def jumps(self) -> bool:

@@ -99,7 +99,11 @@ class Language:
         ValueError
             It is none.
         """
-        return _Printer(self, names).expression(ast.parse(text, "<hsdsl tape>", mode="eval").body)
+        return self.expression_of(ast.parse(text, "<hsdsl tape>", mode="eval").body, names)
+
+    def expression_of(self, node: ast.expr, names: Mapping[str, str]) -> str:
+        """Print the tree of one such expression, likewise."""
+        return _Printer(self, names).expression(node)
 
 
 class _Printer:

@@ -12,7 +12,7 @@ from typing import Any
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.backends.text import compile_routines
 from hsdsl.kernel import ModeKernel, Routine, Taylor, Vector
-from hsdsl.program import Program
+from hsdsl.program import EdgeProgram, Program
 
 
 class PythonKernel:
@@ -69,17 +69,15 @@ class PythonKernel:
             self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
         program = self._program.flows[mode]
-        edges, surfaces = len(program.edges), len(program.edges) + len(program.walls)
+        n, zero = len(program.states), self.arithmetic.zero
+        slopes = (spread_out(bound[f"gradient_{k}"], row, n + 1, zero) for k, row in enumerate(program.slopes))
         return ModeKernel(
             **{name: bound[name] for name in PLAIN},
-            gradients=tuple(bound[f"gradient_{k}"] for k in range(surfaces)),
-            rates=tuple(bound[f"rate_{k}"] for k in range(surfaces)),
-            conditions=tuple(
-                conjunction([bound[name] for name in routines.names if name.startswith(f"condition_{k}_")])
-                for k in range(edges)
-            ),
-            resets=tuple(bound[f"reset_{k}"] for k in range(edges)),
-            spreads=tuple(bound[f"spread_{k}"] for k in range(edges)),
+            gradients=tuple(slopes),
+            rates=tuple(bound[f"rate_{k}"] for k in range(len(program.slopes))),
+            conditions=tuple(conjunction([bound[name] for name in parts]) for parts in program.conditions),
+            resets=tuple(changed(bound[f"reset_{k}"], edge, 1) for k, edge in enumerate(program.edges)),
+            spreads=tuple(changed(bound[f"spread_{k}"], edge, n + 1) for k, edge in enumerate(program.edges)),
         )
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
@@ -100,7 +98,7 @@ class PythonKernel:
             text = program.jacobian.routines
             self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
         size = len(program.states) ** 2
-        return _spread_out(self._jacobians[mode](*data)[0], program.jacobian.places, size, self.arithmetic.zero)
+        return spread_out(self._jacobians[mode](*data)[0], program.jacobian.places, size, self.arithmetic.zero)
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""
@@ -109,7 +107,22 @@ class PythonKernel:
         return tuple(zip(program.expressions, functions, strict=True))
 
 
-def _spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number) -> Routine:
+def changed(routine: Routine, edge: EdgeProgram, first: int) -> Routine:
+    """Put what an edge changes in its place among the values that its target's states have as arguments."""
+    count = len(edge.target_states)
+    if len(edge.changes) == count:
+        return routine
+
+    def whole(*arguments: Number) -> Vector:
+        found = list(arguments[first : first + count])
+        for place, value in zip(edge.changes, routine(*arguments), strict=True):
+            found[place] = value
+        return tuple(found)
+
+    return whole
+
+
+def spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number) -> Routine:
     """Put a routine's values in their places among zeros."""
     if len(places) == size:
         return routine

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 
-from hsdsl.program import Program, Routines
+from hsdsl.program import ModeProgram, Program, Routines
 
 
 def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
@@ -15,6 +16,35 @@ def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
     for node in found.values():
         node.body = [part for part in node.body if not _names_a_parameter(part)]
     return found
+
+
+def mode_definitions(mode: ModeProgram) -> dict[str, ast.FunctionDef]:
+    """The routines of a mode; gradients, resets and spreads with an entry for each state, also where that is trivial."""
+    found, n = definitions(mode.routines), len(mode.states)
+    states, sizes = [f"x{i}" for i in range(n)], [f"s{i}" for i in range(n)]
+    for name, definition in found.items():
+        names = ["t", *states, *(sizes if name.startswith("spread") else [])]
+        definition.args = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+    for k, places in enumerate(mode.slopes):
+        _fill(found[f"gradient_{k}"], places, [_name("q_0_1")] * (n + 1))
+    for k, edge in enumerate(mode.edges):
+        count = len(edge.target_states)
+        for name, letter in ((f"reset_{k}", "x"), (f"spread_{k}", "s")):
+            _fill(found[name], edge.changes, [_name(f"{letter}{i}") for i in range(count)])
+    return found
+
+
+def _name(name: str) -> ast.expr:
+    return ast.Name(name, ast.Load())
+
+
+def _fill(definition: ast.FunctionDef, places: Sequence[int], whole: list[ast.expr]) -> None:
+    """Put a routine's results in their places among others."""
+    last = definition.body[-1]
+    assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+    for place, value in zip(places, last.value.elts, strict=True):
+        whole[place] = value
+    last.value.elts = whole
 
 
 def _names_a_parameter(part: ast.stmt) -> bool:

@@ -200,6 +200,9 @@ class LoweredMode:
         self._done: dict[sp.Basic, sp.Basic] = {}
         self.flow = self.place(mode.flow)
         self.residuals = self.place(s.residual for s in mode.surfaces)
+        self._places = {argument: i for i, argument in enumerate(self.arguments)}
+        self._sizes = tuple(symbol(f"s{i}") for i in range(len(self.states)))
+        self._slopes = [Gradient((residual,), self.arguments) for residual in self.residuals]
 
     def place(self, expressions) -> tuple[sp.Basic, ...]:
         """Expressions of the file's names over numbered symbols."""
@@ -213,11 +216,12 @@ class LoweredMode:
             name=mode.name,
             states=mode.states,
             final=mode.final,
-            edges=tuple(_edge(edge, indices) for edge in mode.edges),
+            edges=tuple(_edge(edge, mode, indices) for edge in mode.edges),
             walls=tuple(wall.text for wall in mode.walls),
             flow_texts=mode.flow_texts,
             routines=print_routines(self._routines(), data),
-            affine=all(r.is_polynomial(*self.arguments) and self._has_constant_slopes(r) for r in self.residuals),
+            slopes=tuple(tuple(self._places[a] for a in slopes.sparse[0]) for slopes in self._slopes),
+            affine=all(map(self._is_affine, self.residuals, self._slopes)),
             jacobian=self._jacobian(),
             tape=make_tape(self.flow, self.residuals, self.states, data),
             expressions=tuple(texts),
@@ -225,10 +229,11 @@ class LoweredMode:
             slides=mode.slides or (),
         )
 
-    def _has_constant_slopes(self, residual: sp.Basic) -> bool:
-        slopes = Gradient((residual,), self.arguments)
-        own = set(self.arguments)
-        return not slopes.statements and not any(slope.free_symbols & own for slope in slopes.sparse[0].values())
+    def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
+        own = residual.free_symbols & self._places.keys()
+        if slopes.statements or any(slope.free_symbols & own for slope in slopes.sparse[0].values()):
+            return False
+        return residual.is_polynomial(*own)
 
     def _jacobian(self) -> lowered.Jacobian:
         """The derivatives of the flow; of derived states by derived ones alone: the others would be second ones."""
@@ -245,9 +250,8 @@ class LoweredMode:
         return lowered.Jacobian(print_routines((definition,), self.names.data), places)
 
     def _diagnosis(self, expressions):
-        places = {argument: i for i, argument in enumerate(self.arguments)}
         for k, result in enumerate(self.place(expressions)):
-            yield Definition(f"expression_{k}", self.arguments, (result,), places=places)
+            yield Definition(f"expression_{k}", self.arguments, (result,), places=self._places)
 
     def _routines(self):
         mode, arguments = self.mode, self.arguments
@@ -257,28 +261,43 @@ class LoweredMode:
         sides = self.place(absolute(s.left) + absolute(s.right) for s in mode.surfaces)
         yield Definition("magnitudes", arguments, sides)
         yield Definition("outputs", arguments, outputs)
-        for k, residual in enumerate(self.residuals):
-            slope = Gradient((residual,), arguments)
-            row, along = slope.sparse[0], dict(zip(arguments, (sp.S.One, *self.flow), strict=True))
-            rate = sp.Add(*(d * along[argument] for argument, d in row.items()))
-            yield Definition(f"gradient_{k}", arguments, slope.rows[0], slope.statements)
-            yield Definition(f"rate_{k}", arguments, (rate,), slope.statements)
+        along = dict(zip(arguments, (sp.S.One, *self.flow), strict=True))
+        for k, slopes in enumerate(self._slopes):
+            row = slopes.sparse[0]
+            rate = sp.Add(*(slope * along[argument] for argument, slope in row.items()))
+            yield self._few(f"gradient_{k}", row.values(), slopes.statements)
+            yield self._few(f"rate_{k}", (rate,), slopes.statements)
         for k, edge in enumerate(mode.edges):
             condition = sp.true if edge.condition is None else edge.condition
             for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
-                yield Definition(f"condition_{k}_{i}", arguments, self.place([part]))
-        scales = {state: symbol(f"s{i}") for i, state in enumerate(self.states)}
+                yield self._few(f"condition_{k}_{i}", self.place([part]))
+        scales = dict(zip(self.states, self._sizes, strict=True))
+        given = self._places | {s: len(arguments) + i for i, s in enumerate(self._sizes)}
         for k, edge in enumerate(mode.edges):
-            reset = self.place(edge.reset)
-            yield Definition(f"reset_{k}", arguments, reset)
-            own = len(reset) - edge.derived
-            changes = Gradient(reset[:own], self.states)
+            changed = changed_by(edge, mode)
+            own = [i for i in changed if i < len(edge.reset) - edge.derived]
+            reset = self.place(edge.reset[i] for i in changed)
+            yield self._few(f"reset_{k}", reset)
+            changes = Gradient(reset[: len(own)], self.states)
             spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=False))
-            spreads += tuple(map(absolute, reset[own:]))
-            yield Definition(f"spread_{k}", (*arguments, *scales.values()), spreads, changes.statements)
+            spreads += tuple(map(absolute, reset[len(own) :]))
+            yield Definition(f"spread_{k}", (), spreads, changes.statements, given)
+
+    def _few(self, name: str, results, statements=()) -> Definition:
+        """A routine that names the few arguments it uses."""
+        return Definition(name, self.arguments, tuple(results), statements, self._places)
 
 
-def _edge(edge: Edge, indices: dict[str, int]) -> lowered.EdgeProgram:
+def changed_by(edge: Edge, mode: Mode) -> tuple[int, ...]:
+    """The states that an edge's reset changes, by their numbers in the target; all of another mode's."""
+    if edge.target_states != mode.states:
+        return tuple(range(len(edge.target_states)))
+    pairs = zip(map(symbol, mode.states), edge.reset, strict=True)
+    return tuple(i for i, (x, r) in enumerate(pairs) if r is not x and r != x)
+
+
+def _edge(edge: Edge, mode: Mode, indices: dict[str, int]) -> lowered.EdgeProgram:
+    changed = changed_by(edge, mode)
     return lowered.EdgeProgram(
         name=edge.name,
         source=indices[edge.source],
@@ -287,7 +306,8 @@ def _edge(edge: Edge, indices: dict[str, int]) -> lowered.EdgeProgram:
         conditional=edge.condition is not None,
         priority=edge.priority,
         text=edge.surface.text,
-        reset_texts=edge.reset_texts,
+        changes=changed,
+        change_texts=tuple(edge.reset_texts[i] for i in changed),
         condition_text=edge.condition_text or "",
     )
 

@@ -15,7 +15,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.python import PythonKernel, conjunction
+from hsdsl.backends.python import PythonKernel, changed, conjunction, spread_out
 from hsdsl.kernel import ModeKernel, Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import structures
@@ -144,17 +144,20 @@ class CompiledKernel(PythonKernel):
 
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states, row by row."""
-        table = self._compiled.mode(mode)
+        table, program = self._compiled.mode(mode), self._program.flows[mode]
         n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
-        return _routine(table.jacobian, numbers, n, n * n)
+        rows = table.jacobian
+        return spread_out(_routine(rows.values, numbers, n, rows.count), program.jacobian.places, n * n, 0.0)
 
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments."""
         table, outputs = self._compiled.mode(mode), len(self._program.outputs)
         n, m = table.dimension, table.surfaces
         numbers = (Double * max(1, len(data)))(*data)
-        edges = structures.array_at(structures.Edge, table.edge, table.edges)
-        gradients, rates = (structures.addresses(start, m) for start in (table.gradients, table.rates))
+        edges, program = structures.array_at(structures.Edge, table.edge, table.edges), self._program.flows[mode]
+        pairs = list(zip(edges, program.edges, strict=True))
+        gradients = structures.array_at(structures.Sparse, table.gradients, m)
+        rates = structures.addresses(table.rates, m)
 
         def bound(address: Address, results: int, arguments: int = n) -> Routine:
             return _routine(address, numbers, arguments, results)
@@ -164,13 +167,16 @@ class CompiledKernel(PythonKernel):
             surfaces=bound(table.values, m),
             magnitudes=bound(table.magnitudes, m),
             outputs=bound(table.outputs, outputs),
-            gradients=tuple(bound(gradient, n + 1) for gradient in gradients),
+            gradients=tuple(
+                spread_out(bound(row.values, row.count), places, n + 1, 0.0)
+                for row, places in zip(gradients, program.slopes, strict=True)
+            ),
             rates=tuple(bound(rate, 1) for rate in rates),
             conditions=tuple(
                 conjunction([bound(part, 1) for part in structures.addresses(e.condition, e.parts)]) for e in edges
             ),
-            resets=tuple(bound(e.reset, e.target_dimension) for e in edges),
-            spreads=tuple(bound(e.spread, e.target_dimension, 2 * n) for e in edges),
+            resets=tuple(changed(bound(e.reset, e.changes), edge, 1) for e, edge in pairs),
+            spreads=tuple(changed(bound(e.spread, e.changes, 2 * n), edge, n + 1) for e, edge in pairs),
         )
 
 

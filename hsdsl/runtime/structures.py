@@ -57,7 +57,7 @@ def _read() -> tuple[dict[str, Any], dict[str, tuple[Any, ...]]]:
 
 
 STRUCTURES, ENUMERATIONS = _read()
-Mode, Edge, Model = (STRUCTURES[name] for name in ("hs_mode", "hs_edge", "hs_model"))
+Mode, Edge, Model, Sparse = (STRUCTURES[f"hs_{name}"] for name in ("mode", "edge", "model", "sparse"))
 Row, Collocation, Method = (STRUCTURES[name] for name in ("hs_row", "hs_collocation", "hs_method"))
 Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline", "hs_interpolation", "hs_settings"))
 Visited, Task = STRUCTURES["hs_visited"], STRUCTURES["hs_task"]

@@ -2,6 +2,7 @@
 
 from hsdsl.backends.c.source import (
     constant_bodies,
+    derivatives,
     lines,
     model_source,
     routine_functions,
@@ -9,4 +10,4 @@ from hsdsl.backends.c.source import (
     width,
 )
 
-__all__ = ["constant_bodies", "lines", "model_source", "routine_functions", "switching_bodies", "width"]
+__all__ = ["constant_bodies", "derivatives", "lines", "model_source", "routine_functions", "switching_bodies", "width"]

@@ -51,6 +51,17 @@ def function_body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
     return "\n".join(f"  {line}" for line in C.body(definition, names))
 
 
+def expression_of(node: ast.expr, names: Mapping[str, str]) -> str:
+    """Print the tree of one expression of the language of routines.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    return C.expression_of(node, names)
+
+
 def expression(text: str, names: Mapping[str, str]) -> str:
     """Print one expression of the language of routines.
 

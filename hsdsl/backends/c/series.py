@@ -1,6 +1,7 @@
 """A tape as C functions that write Taylor coefficients: coefficient 0 of every line, then a loop over the others.
 
-The constants of a tape are arguments, so that modes which differ in numbers alone share one function.
+The constants of a tape are arguments, so that modes which differ in numbers alone share one function. Of a large tape
+each coefficient is written by pieces (`pieces`), which the functions of motions along guards call too.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 
+from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
 from hsdsl.backends.c.printer import expression
 from hsdsl.backends.tape import Language, coefficient_of, value_of
 from hsdsl.program import Tape
@@ -45,11 +47,29 @@ static int NAME(const hs_real *restrict c, int order, hs_real *restrict lines) {
   return bad;
 }}
 """
+_PIECE = """\
+static HS_APART int {name}(const hs_real *restrict c, int k, int length, hs_real *restrict lines) {{
+  int bad = 0;
+  (void)c, (void)k, (void)length, (void)lines;
+{body}
+  return bad;
+}}
+"""
+_CALLS = """\
+static int NAME(const hs_real *c, int k, int length, hs_real *lines) {{
+  return {calls};
+}}
+"""
 
 
 def line_count(tape: Tape, dimension: int) -> int:
     """How many lines there are: time, the states, operations."""
     return 1 + dimension + len(tape.operations)
+
+
+def is_large(tape: Tape, dimension: int) -> bool:
+    """Whether a tape's lines are written in pieces."""
+    return line_count(tape, dimension) > LARGE
 
 
 def flow_lines(tape: Tape, dimension: int) -> str:
@@ -66,9 +86,9 @@ def flow_lines(tape: Tape, dimension: int) -> str:
         return "l0[k]" if line == 0 else f"w{line}" if line < first else f"v{line}"
 
     own = range(first, first + tape.needed)
-    values = [f"l{i}[0] = {value(i)};" for i in states] + _values(tape, own, first, value)
+    values = [f"l{i}[0] = {value(i)};" for i in states] + _straight(_values(tape, own, first, value))
     values += [f"hs_real w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
-    coefficients = _coefficients(tape, own, first, newest)
+    coefficients = _straight(_coefficients(tape, own, first, newest))
     coefficients += [f"const hs_real u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
     coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
     return _filled(_FLOW, values, coefficients)
@@ -85,28 +105,56 @@ def surface_lines(tape: Tape, dimension: int) -> str:
     def newest(line: int) -> str:
         return f"v{line}" if line in own else f"l{line}[k]"
 
-    return _filled(_SURFACES, _values(tape, own, first, value), _coefficients(tape, own, first, newest))
+    values, coefficients = (each(tape, own, first, name) for each, name in ((_values, value), (_coefficients, newest)))
+    return _filled(_SURFACES, _straight(values), _straight(coefficients))
 
 
-def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[str]:
-    found: list[str] = []
+def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> tuple[str, list[str]]:
+    """Write a function ``NAME`` for coefficient k of ``own`` lines, then k + 1 of ``states``, and its pieces.
+
+    States are lines too. The pieces are functions of a name that begins with ``NAME_``.
+    """
+    first = dimension + 1
+
+    def ordered(texts: list[tuple[int, str]]) -> list[Assignment]:
+        places = {line: place for place, (line, _) in enumerate(texts)}
+        needs = {i: [places[j] for j in tape.operations[i - first].lines if j in places and j < i] for i, _ in texts}
+        return [Assignment(f"l{i}[k]", text, needs[i]) for i, text in texts]
+
+    values = ordered(_values(tape, own, first, "l{}[0]".format))
+    coefficients = ordered(_coefficients(tape, own, first, "l{}[k]".format))
+    after = [Assignment(f"l{i}[k + 1]", f"l{tape.flow[i - 1]}[k] * hs_inverse[k + 1]") for i in states]
+    parts: list[str] = []
+    calls: list[str] = []
+    for kind, assignments in (("values", values), ("coefficients", coefficients), ("states", after)):
+        names = list[str]()
+        for body in pieces(assignments):
+            names.append(f"NAME_{kind}_{len(names)}")
+            parts.append(_PIECE.format(name=names[-1], body="\n".join(f"  {line}" for line in body)))
+        calls.append("(" + " || ".join(f"{name}(c, k, length, lines)" for name in names) + ")")
+    values_text, coefficients_text, states_text = calls
+    return _CALLS.format(calls=f"(k ? {coefficients_text} : {values_text}) || {states_text}"), parts
+
+
+def _straight(texts: list[tuple[int, str]]) -> list[str]:
+    """The statements for lines that are variables too, ``v``."""
+    return [part for i, text in texts for part in (f"const hs_real v{i} = {text};", f"l{i}[@] = v{i};")]
+
+
+def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
+    found: list[tuple[int, str]] = []
     language = _language("c{}".format, "n{}".format, "q_0_1")
     for i in lines:
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
         names[f"c{operation.constant}"] = f"c[{operation.constant}]"
-        found.append(f"const hs_real v{i} = {expression(value_of(operation, language), names)};")
-        found.append(f"l{i}[0] = v{i};")
+        found.append((i, expression(value_of(operation, language), names)))
     return found
 
 
-def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[str]:
-    found: list[str] = []
+def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
     language = _language("c[{}]".format, name, "0.0")
-    for i in lines:
-        found.append(f"const hs_real v{i} = {coefficient_of(i, tape.operations[i - first], language)};")
-        found.append(f"l{i}[k] = v{i};")
-    return found
+    return [(i, coefficient_of(i, tape.operations[i - first], language)) for i in lines]
 
 
 def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: str) -> Language:
@@ -126,6 +174,6 @@ def _filled(template: str, values: list[str], coefficients: list[str]) -> str:
     used = sorted({0, *(int(i) for text in (*values, *coefficients) for i in _LINE.findall(text))})
     return template.format(
         pointers="\n".join(f"  hs_real *const l{i} = lines + {i} * length;" for i in used),
-        values="\n".join(f"  {text}" for text in values),
-        coefficients="\n".join(f"    {text}" for text in coefficients),
+        values="\n".join(f"  {text.replace('[@]', '[0]')}" for text in values),
+        coefficients="\n".join(f"    {text.replace('[@]', '[k]')}" for text in coefficients),
     )

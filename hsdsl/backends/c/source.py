@@ -12,8 +12,9 @@ from itertools import count
 from textwrap import dedent
 
 from hsdsl.backends.c.printer import function_body
-from hsdsl.backends.c.series import flow_lines, line_count, surface_lines
-from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
+from hsdsl.backends.c.routine import routine_function
+from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, surface_lines
+from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"^ +p\d+ = given\[\d+\]\n", re.MULTILINE)
@@ -23,23 +24,6 @@ _HEAD = """\
 #include "hs.h"
 #include "hs_series.h"
 
-"""
-_FUNCTION = """\
-static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
-  int bad = 0;
-  (void)p, (void)t, (void)x, (void)out;
-{body}
-  return bad;
-}}
-"""
-_JACOBIAN = """\
-static int NAME(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
-  static const int place[] = {{{places}}};
-  int i = {count};
-  if ({routine}(p, t, x, out)) return 1;
-  for (int k = {size}; k-- > 0;) out[k] = i > 0 && place[i - 1] == k ? out[--i] : 0.0;
-  return 0;
-}}
 """
 _SERIES = """\
 static int NAME(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines) {{
@@ -55,6 +39,29 @@ static int NAME(const hs_real *p, int order, hs_real *lines) {{
   return order > HS_MOST_ORDER || {constants}{core}(c, order, lines);
 }}
 """
+_PIECEWISE = """\
+static int NAME(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines) {{
+  hs_real c[{size}] = {{0.0}};
+  const int length = order + 2;
+  (void)p;
+  if (order > HS_MOST_ORDER{constants}) return 1;
+  hs_begin_series({dimension}, length, t, x, lines);
+  for (int k = 0; k <= order; k++)
+    if ({parts}) return 1;
+  return 0;
+}}
+"""
+_PIECEWISE_SURFACES = """\
+static int NAME(const hs_real *p, int order, hs_real *lines) {{
+  hs_real c[{size}] = {{0.0}};
+  const int length = order + 2;
+  (void)p;
+  if (order > HS_MOST_ORDER{constants}) return 1;
+  for (int k = 0; k <= order; k++)
+    if ({parts}) return 1;
+  return 0;
+}}
+"""
 
 
 def model_source(program: Program) -> str:
@@ -66,7 +73,8 @@ def model_source(program: Program) -> str:
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
-        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, {table}}};\n"
+        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, "
+        f"{derivatives(program)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -80,6 +88,11 @@ def width(program: Program) -> int:
 def lines(program: Program) -> int:
     """How many lines the largest tape has."""
     return max((line_count(m.tape, len(m.states)) for m in program.flows if m.tape), default=0)
+
+
+def derivatives(program: Program) -> int:
+    """How many derivatives of a flow are not zero everywhere, of the mode with most."""
+    return max(len(m.jacobian.places) for m in program.flows)
 
 
 def constant_bodies(program: Program) -> dict[str, str]:
@@ -114,10 +127,7 @@ def routine_functions(routines: Routines, program: Program, prefix: str) -> str:
     writer = _Writer(program)
     found: list[str] = []
     for name, text in _DEFINITION.findall(routines.source):
-        definition = ast.parse(dedent(f"    def routine{text}")).body[0]
-        assert isinstance(definition, ast.FunctionDef)
-        body = function_body(definition, writer.data | _arguments(definition))
-        found.append(_FUNCTION.format(name=f"{prefix}{name}", body=body))
+        found.append(routine_function(f"{prefix}{name}", text, writer.data))
     return "".join(found)
 
 
@@ -138,11 +148,11 @@ class _Writer:
         fields = [
             *map(str, (len(mode.states), len(mode.edges), len(surfaces), int(mode.final))),
             *(routine[name] for name in ("flow", "surfaces", "magnitudes", "outputs")),
-            self.pointers(routine[f"gradient_{k}"] for k in surfaces),
+            self.table("hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in surfaces]),
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
-            self.jacobian(mode.jacobian, len(mode.states) ** 2),
+            self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
@@ -150,14 +160,9 @@ class _Writer:
         ]
         return f"{{{', '.join(fields)}}}"
 
-    def jacobian(self, jacobian: Jacobian, size: int) -> str:
-        """Write the derivatives of a flow: the routine of those that are not zero, and their places among zeros."""
-        routine = self.routines(jacobian.routines)["jacobian"]
-        count = len(jacobian.places)
-        if count == size:
-            return routine
-        places = ", ".join(map(str, jacobian.places)) or "0"
-        return self.shared("jacobian", _JACOBIAN.format(routine=routine, places=places, count=count, size=size))
+    def sparse(self, routine: str, places: Sequence[int]) -> str:
+        """Write a routine with the places of its values."""
+        return f"{{{routine}, {len(places)}, {self.table('int', 'places', list(map(str, places)))}}}"
 
     def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""
@@ -165,23 +170,46 @@ class _Writer:
         texts, size = dict[str, str](_DEFINITION.findall(tape.constants.source)), max(1, own + further)
         first = f"{self.function(texts['flow'])}(p, 0.0, 0, c) || " if own else ""
         second = f"{self.function(texts['surfaces'])}(p, 0.0, 0, c + {own}) || " if further else ""
+        found = [str(-1 if line is None else line) for line in tape.surfaces]
+        if is_large(tape, dimension):
+            return (*self.piecewise(tape, dimension, size, first, first + second), self.table("int", "line", found))
         core = self.shared("flow_lines", flow_lines(tape, dimension))
         series = _SERIES.format(size=size, constants=first, core=core)
         core = self.shared("surface_lines", surface_lines(tape, dimension))
         surface_series = _SURFACE_SERIES.format(size=size, constants=first + second, core=core)
-        found = [str(-1 if line is None else line) for line in tape.surfaces]
         return (
             self.shared("series", series),
             self.shared("surface_series", surface_series),
-            self.table("int", "surface_line", found),
+            self.table("int", "line", found),
         )
 
+    def piecewise(self, tape: Tape, dimension: int, size: int, first: str, every: str) -> tuple[str, str]:
+        """Write the functions of a large tape; ``first`` gives the constants of the flow, ``every`` those of all."""
+        start, end = dimension + 1 + tape.needed, line_count(tape, dimension)
+        parts = [
+            self.core(piecewise(tape, dimension, range(dimension + 1, start), range(1, dimension + 1))),
+            self.core(piecewise(tape, dimension, range(start, end), ())),
+        ]
+        flow, surfaces = (f"{part}(c, k, length, lines)" for part in parts)
+        constants = [f" || {text.removesuffix(' || ')}" if text else "" for text in (first, every)]
+        given = {"size": size, "dimension": dimension}
+        return (
+            self.shared("series", _PIECEWISE.format(**given, constants=constants[0], parts=flow)),
+            self.shared("surface_series", _PIECEWISE_SURFACES.format(**given, constants=constants[1], parts=surfaces)),
+        )
+
+    def core(self, written: tuple[str, list[str]]) -> str:
+        """Write a function and its pieces."""
+        whole, parts = written
+        return self.shared("lines", "".join((*parts, whole)))
+
     def edge(self, k: int, edge: EdgeProgram, mode: ModeProgram, routine: dict[str, str]) -> str:
-        parts = [routine[name] for name in mode.routines.names if name.startswith(f"condition_{k}_")]
+        parts = [routine[name] for name in mode.conditions[k]]
         numbers = (edge.target, len(edge.target_states), int(edge.conditional), edge.priority, len(parts))
         return (
             f"{{{', '.join(map(str, numbers))}, {self.pointers(parts)}, "
-            f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, "
+            f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, {len(edge.changes)}, "
+            f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
             f"{-1 if edge.contact is None else edge.contact}, {int(edge.releases)}}}"
         )
 
@@ -213,15 +241,5 @@ class _Writer:
     def function(self, text: str) -> str:
         if text not in self.functions:
             self._names[text] = name = f"routine_{len(self.functions)}"
-            definition = ast.parse(dedent(f"    def routine{text}")).body[0]
-            assert isinstance(definition, ast.FunctionDef)
-            body = function_body(definition, self.data | _arguments(definition))
-            self.functions[text] = _FUNCTION.format(name=name, body=body)
+            self.functions[text] = routine_function(name, text, self.data)
         return self._names[text]
-
-
-def _arguments(definition: ast.FunctionDef) -> dict[str, str]:
-    if not definition.args.args:
-        return {}
-    time, *others = (argument.arg for argument in definition.args.args)
-    return {time: time} | {name: f"x[{i}]" for i, name in enumerate(others)}

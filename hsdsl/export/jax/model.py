@@ -8,7 +8,7 @@ from hsdsl.backends.c.source import width
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
 from hsdsl.export.jax.language import function
 from hsdsl.export.jax.values import values_text
-from hsdsl.export.routines import data_names, definitions
+from hsdsl.export.routines import data_names, mode_definitions
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.numbers import table_numbers
@@ -41,7 +41,7 @@ def _functions(source: Source) -> Iterable[str]:
     program = source.problem.program
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
     for j, mode in enumerate(flows(source)):
-        for name, definition in definitions(mode.routines).items():
+        for name, definition in mode_definitions(mode).items():
             spread = ", s" if name.startswith("spread") else ""
             yield function(f"mode_{j}_{name}", definition, data, f"p, t, x{spread}")
 

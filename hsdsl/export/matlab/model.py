@@ -11,9 +11,10 @@ from hsdsl.export.matlab.language import KEYWORDS, body, helpers, reserved
 from hsdsl.export.matlab.method import method_text
 from hsdsl.export.matlab.settings import run_fields
 from hsdsl.export.matlab.text import cell, comment, string, strings, vector
+from hsdsl.export.routines import definitions, mode_definitions
 from hsdsl.export.source import Source
 from hsdsl.names import visible
-from hsdsl.program import ModeProgram, Program, Routines
+from hsdsl.program import ModeProgram, Program
 
 _LAST = """
 function k = enabled(m, x, t, p)
@@ -58,13 +59,6 @@ end
 def parameter_fields(program: Program) -> dict[str, str]:
     """The field of each parameter in the structure of parameters."""
     return identifiers(program.parameters, KEYWORDS)
-
-
-def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
-    """The routines of a text by their names."""
-    (bind,) = ast.parse(routines.source).body
-    assert isinstance(bind, ast.FunctionDef)
-    return {node.name: node for node in bind.body if isinstance(node, ast.FunctionDef)}
 
 
 def data_names(program: Program) -> dict[str, str]:
@@ -119,7 +113,7 @@ class ModelText:
 
     def mode(self, number: int, mode: ModeProgram) -> None:
         """The functions of a mode."""
-        found = definitions(mode.routines)
+        found = mode_definitions(mode)
         edges = range(len(mode.edges))
         for name in ("flow", "surfaces", "magnitudes", "outputs"):
             self.add(name, self.function(f"{name}_{number}", found[name], mode))

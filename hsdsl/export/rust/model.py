@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hsdsl.backends.c.source import width
-from hsdsl.export.routines import data_names, definitions, parameters_in
+from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
 from hsdsl.export.rust.language import array, function, literal, numbers, string
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
@@ -48,7 +48,7 @@ def _sizes(program: Program, table: ButcherTableau) -> str:
 def _functions(program: Program) -> Iterable[str]:
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
     for j, mode in enumerate(program.modes):
-        for name, definition in definitions(mode.routines).items():
+        for name, definition in mode_definitions(mode).items():
             yield function(f"mode_{j}_{name}", definition, data)
 
 

@@ -10,11 +10,12 @@
 /* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
   const int n = run->here.dimension;
-  if (run->here.table->jacobian(run->here.p, t, x, run->jacobian)) return RAISED;
-  for (int i = 0; i < n; i++) {
-    hs_real size = fabs(slope[i]);
-    for (int j = 0; j < n; j++) size = size + fabs(run->jacobian[i * n + j]) * run->scales[j];
-    run->flow_sizes[i] = size;
+  const hs_sparse *const rows = &run->here.table->jacobian;
+  if (rows->values(run->here.p, t, x, run->jacobian)) return RAISED;
+  for (int i = 0; i < n; i++) run->flow_sizes[i] = fabs(slope[i]);
+  for (int k = 0; k < rows->count; k++) {
+    hs_real *const size = &run->flow_sizes[rows->place[k] / n];
+    *size = *size + fabs(run->jacobian[k]) * run->scales[rows->place[k] % n];
   }
   return 0;
 }
@@ -23,7 +24,7 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
   int still = 1;
-  if (here->table->edge[k].reset(here->p, t, x, run->after)) return RAISED;
+  if (hs_changed(&here->table->edge[k], here->table->edge[k].reset, here->p, t, x, x, run->after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
     still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
   return still ? condition(run, k, t, x) : 0;
@@ -32,12 +33,13 @@ static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
 /* Whether the flow is tangent to surface k, to round-off. */
 static int is_tangent(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
-  hs_real rate;
-  if (here->table->flow(here->p, t, x, run->end) || here->table->gradients[k](here->p, t, x, run->gradient) ||
+  const hs_sparse *const row = &here->table->gradients[k];
+  hs_real rate, size = 0.0;
+  if (here->table->flow(here->p, t, x, run->end) || row->values(here->p, t, x, run->gradient) ||
       here->table->rates[k](here->p, t, x, &rate) || flow_sizes(run, t, x, run->end))
     return RAISED;
-  hs_real size = fabs(run->gradient[0]);
-  for (int s = 0; s < here->dimension; s++) size = size + fabs(run->gradient[s + 1]) * run->flow_sizes[s];
+  for (int i = 0; i < row->count; i++)
+    size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
   return fabs(rate) <= ZERO_UNITS * HS_UNIT * size;
 }
 

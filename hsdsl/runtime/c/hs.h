@@ -22,6 +22,12 @@ typedef double hs_real;
 #endif
 typedef double hs_time;
 
+#if defined(__GNUC__)
+#define HS_APART __attribute__((noinline)) /* a piece of a routine: a compiler takes long for large functions */
+#else
+#define HS_APART
+#endif
+
 typedef int hs_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
 
 /* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
@@ -33,6 +39,13 @@ typedef int hs_series(const hs_real *p, int order, hs_real t, const hs_real *x, 
 /* The same of the further lines, which surfaces need: coefficients 0 to order. */
 typedef int hs_surface_series(const hs_real *p, int order, hs_real *lines);
 
+/* Values that are not zero everywhere, and their places. */
+typedef struct {
+  hs_routine *values;
+  int count;
+  const int *place;
+} hs_sparse;
+
 typedef struct {
   int target;           /* index of the target mode */
   int target_dimension; /* number of states it is entered with */
@@ -40,8 +53,10 @@ typedef struct {
   int priority;
   int parts; /* of the condition, which holds where all parts do */
   hs_routine *const *condition;
-  hs_routine *reset;
+  hs_routine *reset; /* of the states that it changes: the others keep their values, where there are any */
   hs_routine *spread;
+  int changes;
+  const int *change;
   int contact;  /* index of the motion along its guard, behind the modes; -1 for none */
   int releases; /* whether it ends such a motion */
 } hs_edge;
@@ -55,13 +70,13 @@ typedef struct {
   hs_routine *values; /* of the surfaces */
   hs_routine *magnitudes;
   hs_routine *outputs;
-  hs_routine *const *gradients;
+  const hs_sparse *gradients; /* by time, place 0, and the states */
   hs_routine *const *rates;
   const hs_edge *edge;
   hs_series *series; /* 0 where the flow is kinked; then a mode has no other series */
   hs_surface_series *surface_series;
   const int *surface_line; /* for each surface; -1 where it is kinked */
-  hs_routine *jacobian;    /* of the flow by the states, row by row */
+  hs_sparse jacobian;      /* of the flow by the states, row by row */
   int affine;              /* whether every surface's gradient is the same everywhere */
   int jumps;               /* whether the flow has `sign` or `floor` */
   const int *state;        /* for each state its number among those of all modes */
@@ -78,7 +93,25 @@ typedef struct {
   int data; /* numbers in `p` */
   int lines; /* of series, of the mode with most */
   int states; /* of all modes, by name */
+  int derivatives; /* of a flow that are not zero everywhere, of the mode with most */
   const hs_mode *mode;
 } hs_model;
+
+/* Put the values that `out` begins with in their places among `size` numbers; the others are zero. */
+static inline void hs_spread_out(const hs_sparse *sparse, int size, hs_real *out) {
+  int i = sparse->count;
+  for (int k = size; k-- > 0;) out[k] = i > 0 && sparse->place[i - 1] == k ? out[--i] : (hs_real)0.0;
+}
+
+/* What an edge's routine, its reset or its spread, makes of the values `before` of the states, to `out`. */
+static inline int hs_changed(const hs_edge *edge, hs_routine *routine, const hs_real *p, hs_real t, const hs_real *x,
+                             const hs_real *before, hs_real *out) {
+  if (routine(p, t, x, out)) return 1;
+  int i = edge->changes;
+  if (i == edge->target_dimension) return 0;
+  for (int k = edge->target_dimension; k-- > 0;)
+    out[k] = i > 0 && edge->change[i - 1] == k ? out[--i] : before[k];
+  return 0;
+}
 
 #endif

@@ -69,4 +69,12 @@ static inline hs_real hs_power(int k, const hs_real *z, const hs_real *a, hs_rea
   return hs_div(total, k * a[0], bad);
 }
 
+/* Begin the lines of time and of n states at (t, x). */
+static inline void hs_begin_series(int n, int length, hs_real t, const hs_real *x, hs_real *lines) {
+  lines[0] = t;
+  lines[1] = 1.0;
+  for (int k = 2; k < length; k++) lines[k] = 0.0;
+  for (int i = 0; i < n; i++) lines[(i + 1) * length] = x[i];
+}
+
 #endif

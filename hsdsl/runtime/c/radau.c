@@ -60,7 +60,9 @@ static void radau_scales(hs_run *run, hs_time t, hs_real h, int closer) {
 
 HS_INLINE int derive(hs_run *run, hs_time t) {
   hs_radau *const radau = &run->radau;
-  if (run->here.table->jacobian(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
+  const hs_sparse *const rows = &run->here.table->jacobian;
+  if (rows->values(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
+  hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
   swap(&radau->rows, &radau->fresh);
   radau->derived = 1;
   radau->derived_at = t;

@@ -175,7 +175,7 @@ typedef struct {
   hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
   hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
   int *lifted;
-  hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: width * width */
+  hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: model->derivatives */
   hs_real **k;          /* stages, then the flow at the end */
   hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */

@@ -94,14 +94,15 @@ static int degree_without_zeros(const hs_real *c, int degree) {
   return degree;
 }
 
-/* A surface that is affine, with these slopes by time and the states, along a piece of n states over h: the sum of the
-   absolute coefficients. Those of powers 1 and up go to c, c[0] is there. */
-HS_INLINE hs_real affine_curve(const hs_polynomial *piece, const int n, int w, hs_real h, const hs_real *slopes,
-                               hs_real *c, int *degree) {
+/* A surface that is affine, with these slopes by time and the states, along a piece over h: the sum of the absolute
+   coefficients. Those of powers 1 and up go to c, c[0] is there. */
+HS_INLINE hs_real affine_curve(const hs_polynomial *piece, int w, hs_real h, const hs_sparse *row,
+                               const hs_real *slopes, hs_real *c, int *degree) {
+  const int timed = row->count && row->place[0] == 0;
   hs_real sizes = fabs(c[0]);
   for (int m = 1; m <= piece->degree; m++) {
-    hs_real power = m == 1 ? slopes[0] * h : 0.0;
-    for (int s = 0; s < n; s++) power = power + slopes[s + 1] * piece->c[(m - 1) * w + s];
+    hs_real power = m == 1 && timed ? slopes[0] * h : 0.0;
+    for (int i = timed; i < row->count; i++) power = power + slopes[i] * piece->c[(m - 1) * w + row->place[i] - 1];
     c[m] = power;
     sizes = sizes + fabs(power);
   }
@@ -210,10 +211,11 @@ static int affine_curves(hs_run *run, hs_real share) {
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
     hs_real *const c = coefficients_of(found, 0, k);
-    if (mode->gradients[k](run->here.p, span->t, run->x, run->gradient)) return RAISED;
+    const hs_sparse *const row = &mode->gradients[k];
+    if (row->values(run->here.p, span->t, run->x, run->gradient)) return RAISED;
     c[0] = run->values[k];
     const hs_real sizes =
-        affine_curve(&span->piece, run->here.dimension, run->width, span->h, run->gradient, c, degree_of(found, 0, k));
+        affine_curve(&span->piece, run->width, span->h, row, run->gradient, c, degree_of(found, 0, k));
     *off_of(found, 0, k) = share * sizes;
     found->certain[k] = 1;
   }

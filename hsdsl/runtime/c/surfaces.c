@@ -50,17 +50,27 @@ static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) 
   return 0;
 }
 
+/* The slopes of surface k by time and all states, to run->gradient. */
+static int gradient_of(hs_run *run, int k, hs_time t, const hs_real *x) {
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  hs_spread_out(row, run->here.dimension + 1, run->gradient);
+  return 0;
+}
+
 /* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
 static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise) {
   const hs_mode_state *here = &run->here;
-  const int n = here->dimension;
   if (here->table->magnitudes(here->p, t, x, run->magnitudes)) return RAISED;
   hs_real total = run->magnitudes[k];
+  const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
-  if (!here->table->gradients[k](here->p, t, x, g) && hs_finite(sum(g, n + 1))) {
-    total = total + fabs(g[0]) * fabs(t);
+  if (!row->values(here->p, t, x, g) && hs_finite(sum(g, row->count))) {
     const int scaled = entry || run->active_surfaces[k];
-    for (int s = 0; s < n; s++) total = total + fabs(g[s + 1]) * hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0);
+    for (int i = 0; i < row->count; i++) {
+      const int s = row->place[i] - 1;
+      total = total + fabs(g[i]) * (s < 0 ? fabs(t) : hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0));
+    }
   }
   *noise = ROUNDOFF_UNITS * HS_UNIT * total;
   return 0;
@@ -127,8 +137,9 @@ static void leave(hs_run *run, hs_time t, const hs_real *x) {
 /* |grad r| in (t, x). */
 static int norm_of(hs_run *run, hs_time t, const hs_real *x, int k, hs_real *norm) {
   hs_real total = 0.0;
-  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
-  for (int s = 0; s <= run->here.dimension; s++) total = total + run->gradient[s] * run->gradient[s];
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  for (int i = 0; i < row->count; i++) total = total + run->gradient[i] * run->gradient[i];
   *norm = sqrt(total);
   return 0;
 }
@@ -203,9 +214,11 @@ static int beyond_within(hs_run *run, hs_trial *trial, int k) {
 }
 
 static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_real *flow, hs_real *rate) {
-  if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
-  *rate = run->gradient[0];
-  for (int s = 0; s < run->here.dimension; s++) *rate = *rate + run->gradient[s + 1] * flow[s];
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  *rate = 0.0;
+  for (int i = 0; i < row->count; i++)
+    *rate = *rate + run->gradient[i] * (row->place[i] ? flow[row->place[i] - 1] : 1.0);
   return 0;
 }
 

@@ -11,7 +11,7 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   hs_real r, off = 0.0, norm = 0.0;
   const hs_time time = crossing->time;
   const hs_real *const q = crossing->state, *const g = run->gradient + 1;
-  if (here->table->gradients[k](here->p, time, q, run->gradient)) return RAISED;
+  if (gradient_of(run, k, time, q)) return RAISED;
   for (int i = 0; i < n; i++) off = off + fabs(g[i]) * (run->control.tolerance * hs_max(run->scales[i], fabs(q[i])));
   for (int i = 0; i < n; i++) norm = norm + g[i] * g[i];
   if (!(norm > 0)) return 0;

@@ -42,9 +42,9 @@ static int fixed_point(hs_run *run, int k, hs_time t) {
   const int n = here->dimension;
   hs_real *const x = run->z, *const one = run->after, *const two = run->at;
   for (int i = 0; i < MOST_ROUNDS; i++) {
-    if (edge->reset(here->p, t, x, one)) return RAISED;
+    if (hs_changed(edge, edge->reset, here->p, t, x, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
-    if (edge->reset(here->p, t, one, two)) return RAISED;
+    if (hs_changed(edge, edge->reset, here->p, t, one, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
   }
   return 0;
@@ -57,7 +57,7 @@ static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
   for (int i = 0; i < MOST_CORRECTIONS_TO_GUARD; i++) {
     hs_real r, noise;
     if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
-    if (run->here.table->gradients[k](run->here.p, t, x, run->gradient)) return RAISED;
+    if (gradient_of(run, k, t, x)) return RAISED;
     if (fabs(r) <= noise) break;
     hs_real across = r * 0;
     for (int s = 0; s < n; s++) {

@@ -49,6 +49,18 @@ void fmu_enter(fmu *unit, int mode, int edge, const double *after) {
   if (target->final) unit->now.ended = 1;
 }
 
+/* All slopes of surface k, by time and the states. */
+static int gradient_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *out) {
+  if (mode->gradients[k].values(p, t, x, out)) return 1;
+  hs_spread_out(&mode->gradients[k], mode->dimension + 1, out);
+  return 0;
+}
+
+/* The state behind the reset of edge k. */
+static int reset_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
+  return hs_changed(&mode->edge[k], mode->edge[k].reset, p, t, x, x, after);
+}
+
 /* Sizes of states, and from them the margins of the present mode's surfaces. */
 static int set_margins(fmu *unit) {
   fmu_data *const now = &unit->now;
@@ -59,7 +71,7 @@ static int set_margins(fmu *unit) {
     now->scale[i] = hs_max(hs_max(now->scale[i], fmu_nominal[i]), fabs(now->state[i]));
   fmu_local(unit, x);
   for (int k = 0; k < mode->surfaces; k++) {
-    if (mode->gradients[k](p, now->time, x, gradient)) return 1;
+    if (gradient_of(mode, k, p, now->time, x, gradient)) return 1;
     double size = fabs(gradient[0]) * hs_max(10 * length_of(), fabs(now->time));
     for (int s = 0; s < mode->dimension; s++) size = size + fabs(gradient[s + 1]) * now->scale[mode->state[s]];
     if (!hs_finite(size)) return 1;
@@ -107,7 +119,7 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
 /* The point of surface k that is nearest to x, relative to the sizes of states. */
 static int projected(const fmu *unit, const hs_mode *mode, int k, const double *p, double t, double *x) {
   double g[PROBLEM_WIDTH + 2], r[PROBLEM_SURFACES + 1], total = 0.0;
-  if (mode->values(p, t, x, r) || mode->gradients[k](p, t, x, g)) return 1;
+  if (mode->values(p, t, x, r) || gradient_of(mode, k, p, t, x, g)) return 1;
   for (int s = 0; s < mode->dimension; s++) {
     const double size = unit->now.scale[mode->state[s]];
     total = total + g[s + 1] * size * g[s + 1] * size;
@@ -187,7 +199,7 @@ static int fixed_point(const hs_mode *mode, int k, const double *p, double t, do
   double one[PROBLEM_WIDTH + 1], two[PROBLEM_WIDTH + 1];
   for (int i = 0; i < MOST_RESETS; i++) {
     int same = 1;
-    if (mode->edge[k].reset(p, t, x, one) || mode->edge[k].reset(p, t, one, two)) return 1;
+    if (reset_of(mode, k, p, t, x, one) || reset_of(mode, k, p, t, one, two)) return 1;
     for (int s = 0; s < mode->dimension; s++) {
       const double bend = two[s] - 2 * one[s] + x[s];
       const double next = bend != 0 ? x[s] - (one[s] - x[s]) * (one[s] - x[s]) / bend : two[s];
@@ -224,7 +236,7 @@ static const char *make(fmu *unit, int k, const double *p, double *x, int entry)
   double after[PROBLEM_WIDTH + 1], t = now->time;
   const int source = now->mode;
   if (!entry && taken_back(unit, mode, k, p, &t, x)) return "not_finite";
-  if (mode->edge[k].reset(p, t, x, after)) return "not_finite";
+  if (reset_of(mode, k, p, t, x, after)) return "not_finite";
   for (int s = 0; s < mode->edge[k].target_dimension; s++)
     if (!hs_finite(after[s])) return "not_finite";
   fmu_enter(unit, source, k, after);
