@@ -1,7 +1,7 @@
 """Chains of masses between walls, each with springs and dampers to its neighbours and a stop of its own: large models.
 
-    python tests/chains.py 50 > chain.yaml        50 masses, 100 states, 50 transitions
-    python tests/chains.py 200 1e4 > chain.yaml   the same with dampers that make the chain stiff
+python tests/chains.py 50 > chain.yaml        50 masses, 100 states, 50 transitions
+python tests/chains.py 200 1e4 > chain.yaml   the same with dampers that make the chain stiff
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -159,7 +160,7 @@ class _Nearby:
         """The rate of time or of a state."""
         return sp.S.One if x == TIME else self._flow[x]
 
-    def among(self, value: sp.Basic) -> list[sp.Symbol]:
+    def among(self, value: sp.Basic) -> list[Any]:
         """The time, and the states in the order of their names, that a value depends on."""
         return sorted((x for x in value.free_symbols if x == TIME or x in self._flow), key=lambda x: x.name)
 
@@ -265,9 +266,9 @@ def _fixed_point(near: _Nearby) -> Point | None:
     """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
     equations, flows = [near.guard, *near.moved], near.flows()
     free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
-    names = set[sp.Symbol]().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
+    names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
     draw = random.Random(1)
-    at = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
+    at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
     slopes = sp.Matrix(equations).jacobian(free) if free else sp.zeros(len(equations), 0)
     for _ in range(MOST_ROUNDS):
         values = np.array([_number(e, at) for e in equations])

@@ -19,7 +19,7 @@ def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
 
 
 def mode_definitions(mode: ModeProgram) -> dict[str, ast.FunctionDef]:
-    """The routines of a mode; gradients, resets and spreads with an entry for each state, also where that is trivial."""
+    """The routines of a mode; gradients, resets and spreads with an entry for each state."""
     found, n = definitions(mode.routines), len(mode.states)
     states, sizes = [f"x{i}" for i in range(n)], [f"s{i}" for i in range(n)]
     for name, definition in found.items():

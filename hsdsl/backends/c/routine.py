@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from textwrap import dedent
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces

@@ -148,7 +148,9 @@ class _Writer:
         fields = [
             *map(str, (len(mode.states), len(mode.edges), len(surfaces), int(mode.final))),
             *(routine[name] for name in ("flow", "surfaces", "magnitudes", "outputs")),
-            self.table("hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in surfaces]),
+            self.table(
+                "hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in surfaces]
+            ),
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
