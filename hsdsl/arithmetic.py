@@ -60,6 +60,11 @@ class Arithmetic:
         return self.functions["sqrt"](x)
 
 
+def below(number: Any, bound: Any, one: Any, other: Any) -> Any:
+    """Choose between two numbers."""
+    return one if number < bound else other
+
+
 def _float_sign(x: float) -> float:
     return float((x > 0.0) - (x < 0.0))
 
@@ -102,6 +107,7 @@ FLOAT64 = Arithmetic(
         "sign": _float_sign,
         "heaviside": _float_heaviside,
         "floor": _float_floor,
+        "below": below,
         "min": min,
         "max": max,
         "pi": math.pi,
@@ -163,6 +169,7 @@ def multiprecision(digits: int) -> Arithmetic:
             "sign": context.sign,
             "heaviside": heaviside,
             "floor": context.floor,
+            "below": below,
             "min": min,
             "max": max,
             "pi": +context.pi,

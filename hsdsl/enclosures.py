@@ -228,6 +228,18 @@ def _constant(value: Fraction) -> Range:
     return Range(nearest, nearest) if Fraction(nearest) == value else _outwards(nearest, nearest)
 
 
+def _below(number: Any, bound: Any, one: Any, other: Any) -> Range:
+    """Choose between two numbers, element by element; both where that is undecided."""
+    s, c, a, b = map(as_range, (number, bound, one, other))
+    never: Any = s.low >= c.high
+    surely: Any = s.high < c.low
+    least, most = np.minimum(a.low, b.low), np.maximum(a.high, b.high)
+    return Range(
+        np.select([never, surely], [b.low, a.low], least),
+        np.select([never, surely], [b.high, a.high], most),
+    )
+
+
 def _step(function: Callable[[Any], Any]) -> Callable[[Any], Range]:
     """An increasing function that needs no rounding."""
     return lambda value: Range(function(as_range(value).low), function(as_range(value).high))
@@ -266,6 +278,7 @@ ENCLOSED = Arithmetic(
         "max": _extreme(np.maximum),
         "sign": _step(np.sign),
         "floor": _step(np.floor),
+        "below": _below,
         "heaviside": _step(lambda x: 0.5 * (1.0 + np.sign(x))),
         "pi": _PI,
         "e": _outwards(np.e, np.e),

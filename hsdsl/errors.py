@@ -189,6 +189,12 @@ CODES: dict[str, str] = {
     "HS320": "both a step and a tolerance",
     "HS321": "a setting outside its range",
     "HS322": "a scale of a name that is not a state",
+    # systems of parts
+    "HS350": "an instance or an automaton that does not exist",
+    "HS351": "an input or a parameter of an instance that does not fit its automaton",
+    "HS352": "definitions of parts that need each other in a circle",
+    "HS353": "a part whose transitions cannot be what is written",
+    "HS354": "a name that a mode of a part does not define",
     # what is imported
     "HS331": "a file that is not a model of SpaceEx",
     "HS332": "a part of a SpaceEx model that no model of this language can keep",

@@ -75,6 +75,26 @@ class maximum(_Kinked):
         return (1 + (1 if argindex == 1 else -1) * sign(x - y)) / 2
 
 
+class below(_Kinked):
+    """The third of four where the first is below the second, a number; else the fourth.
+
+    The first is constant along a flow: the number of a part's mode, or a truth in a reset. So it jumps nowhere.
+    """
+
+    nargs = 4
+
+    @classmethod
+    def eval(cls, number, bound, one, other):
+        """Choose where the number is known."""
+        if one == other:
+            return one
+        return (one if number < bound else other) if number.is_Rational else None
+
+    def _eval_derivative(self, s):
+        number, bound, one, other = self.args
+        return below(number, bound, one.diff(s), other.diff(s))
+
+
 class sinh(sp.sinh):
     """The hyperbolic sine, real."""
 

@@ -16,6 +16,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
+from hsdsl.parts import Part
+
 JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 Hold = Literal["zero", "linear"]
 
@@ -39,7 +41,8 @@ class Operation:
     ``offset`` (u + c), ``scale`` (c u), ``mul`` (u v), ``square`` (u u), ``div`` (u / v), ``under`` (c / u), ``sqrt``
     (of u), ``pow`` (u**c), ``slope`` (time from the point of expansion, times u'), or the name of a function of u with
     the slope of u as the second line and its derivative by u as the third; ``atan2`` has lines y and x, its derivatives
-    by them, and their slopes. A derivative may be a later line: coefficient k asks it for those before k.
+    by them, and their slopes. ``below`` is the second line where the first, which no flow changes, is below c, else the
+    third. A derivative may be a later line: coefficient k asks it for those before k.
 
     ``degree`` is given where the series that its sum goes along (the first line, of ``div`` the second) is a polynomial
     of time alone: then no more than so many coefficients of it count. The sine of something linear in time costs one
@@ -223,6 +226,8 @@ class Program:
     ``contacts`` are motions along guards of modes: each has the name, states and walls of its mode and, in the place of
     the edge that it is in contact with, one that releases it.
 
+    A system of parts has one mode, whose last states are the numbers of the modes of ``parts`` (`hsdsl.parts`).
+
     Where initial values use each other, ``initial_order`` has their states, each behind those that it uses, and
     ``initial_values`` in this order a routine of the parameters and ``initial_states`` for each.
 
@@ -250,6 +255,7 @@ class Program:
     initial_order: tuple[int, ...] = ()
     initial_values: Routines = NOTHING
     contacts: tuple[ModeProgram, ...] = ()
+    parts: tuple[Part, ...] = ()
 
     @property
     def flows(self) -> tuple[ModeProgram, ...]:

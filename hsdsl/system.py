@@ -18,6 +18,7 @@ from typing import Any, Literal
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
+from hsdsl.parts import Part
 
 TIME = sp.Symbol("t", real=True)
 ZERO, ONE = sp.S.Zero, sp.S.One
@@ -267,6 +268,7 @@ class HybridSystem:
     reference: tuple[Reference, ...]
     files: dict[str, bytes] = field(repr=False)  # content of the data files, by names relative to the model
     scene: tuple[Shape, ...] = ()
+    parts: tuple[Part, ...] = ()  # of a composed system, whose last states are the numbers of their modes
     definitions: tuple[Definition, ...] = ()  # for people: they are substituted everywhere
     functions: tuple[FunctionText, ...] = ()
 

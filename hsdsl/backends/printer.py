@@ -151,6 +151,9 @@ class _Printer:
         raise ValueError(f"a routine names {name}, which nothing defines")
 
     def call(self, name: str, arguments: list[str]) -> str:
+        if name == "below" and len(arguments) == 4:
+            number, bound, body, other = arguments
+            return self.language.choose.format(test=f"({number} < {bound})", body=body, other=other)
         if name in FUNCTIONS:
             return self.language.call.format(name=name, arguments=", ".join(arguments))
         if name not in _FOLDED or not arguments:

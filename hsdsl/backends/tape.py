@@ -28,6 +28,7 @@ VALUES = {
     "sqrt": "sqrt({u})",
     "pow": "pow({u}, {c})",
     "atan2": "atan2({u}, {v})",
+    "below": "below({u}, {c}, {v}, {w})",
 }
 VALUE = "{kind}({u})"  # of a function
 COEFFICIENTS = {
@@ -45,6 +46,7 @@ COEFFICIENTS = {
     "sqrt": "{call}root(k, {Z}, {u}{bad})",
     "pow": "{call}power(k, {Z}, {U}, {c}{bad})",
     "atan2": "({call}behind(k, {A}, {G}) + {call}behind(k, {B}, {W})) * {call}inverse[k]",
+    "below": "{call}below({U}[0], {c}, {v}, {w})",
 }
 COEFFICIENT = "{call}behind(k, {V}, {G}) * {call}inverse[k]"
 # where a sum goes along a polynomial of time
@@ -110,5 +112,5 @@ def coefficient_of(line: int, operation: Operation, language: Language) -> str:
 
 
 def _operands(operation: Operation, language: Language, name: Callable[[int], str]) -> dict[str, str]:
-    named = dict(zip("uv", map(name, operation.lines), strict=False))
+    named = dict(zip("uvw", map(name, operation.lines), strict=False))
     return named if operation.constant is None else named | {"c": language.constant(operation.constant)}

@@ -14,6 +14,8 @@ from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.functions import define_functions, named_functions
 from hsdsl.elaborate.inputs import define_inputs, switch_name
 from hsdsl.elaborate.modes import elaborate_modes, elaborate_outputs
+from hsdsl.elaborate.parts import Parts
+from hsdsl.elaborate.parts.files import read_automata
 from hsdsl.elaborate.reference import elaborate_reference
 from hsdsl.elaborate.resolver import ExpressionResolver, resolved_expression
 from hsdsl.elaborate.scene import elaborate_scene, scene_of
@@ -26,7 +28,8 @@ from hsdsl.expression.syntax import ExpressionError
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
 from hsdsl.names import SINCE
-from hsdsl.schema import ModelDocument, read
+from hsdsl.parts import Part
+from hsdsl.schema import ModelDocument, SystemDocument, read
 from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem, switch_parameter
 
@@ -91,7 +94,9 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
         findings = Findings(files.path)
         text = decode(files.path, files.text)
         root = compose(text, findings)
-        symbols = SymbolTable(read(root, findings), ExpressionResolver(findings), files, drivable=drivable)
+        data = read_automata(root, files, findings)
+        document = read(root, findings)
+        symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
         try:
             with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
                 system = _system(symbols)
@@ -119,12 +124,18 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     functions = define_functions(symbols)
     parameters = define_parameters(symbols)
     inputs = define_inputs(symbols)
-    define_lets(symbols)
-    outputs = elaborate_outputs(symbols)
-    modes = elaborate_modes(symbols, outputs)
-    scene, numbers = elaborate_scene(symbols)
-    modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
-    initial = elaborate_initial(symbols)
+    parts: tuple[Part, ...] = ()
+    if isinstance(document, SystemDocument) and (document.system or document.automata):
+        whole = Parts(symbols, document)
+        parameters, parts = parameters + whole.parameters, whole.parts
+        modes, scene, initial = whole.modes, whole.scene, whole.initial
+    else:
+        define_lets(symbols)
+        outputs = elaborate_outputs(symbols)
+        modes = elaborate_modes(symbols, outputs)
+        scene, numbers = elaborate_scene(symbols)
+        modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
+        initial = elaborate_initial(symbols)
     experiment = elaborate_experiment(symbols)
     units = elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
@@ -144,6 +155,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         reference=reference,
         files=symbols.data,
         scene=scene,
+        parts=parts,
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
     )

@@ -24,19 +24,35 @@ def define_parameters(symbols: SymbolTable) -> tuple[Parameter, ...]:
     scope = Scope(ChainMap(refused, earlier, symbols.scope((), _ONLY_PARAMETERS, hint=_UNDER_LET).values))  # pyright: ignore[reportArgumentType]
     parameters: list[Parameter] = []
     for name in definition_order(symbols.document.parameters, "parameters", refused):
-        entry = symbols.document.parameters[name]
-        entry = entry if isinstance(entry, ParameterEntry) else ParameterEntry.model_construct(value=entry)
-        value = symbols.number(entry.value, scope, finite_now=True)
-        earlier[name] = None if value is None else Value(symbol(name), value.number)
-        symbols.values[name] = symbols.of_functions[name] = earlier[name]
-        bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
-        if value is not None:
-            _check_bounds(symbols, name, entry.value, value, *bounds)
-            least, most = (None if bound is None else bound.expr for bound in bounds)
-            unit = symbols.text(entry.unit) or symbols.text(symbols.document.units.get(name))
-            about = symbols.text(entry.about)
-            parameters.append(Parameter(name, value.expr, entry.value.value, unit, least, most, about))
+        meaning, parameter = define_parameter(symbols, name, symbols.document.parameters[name], scope)
+        symbols.values[name] = symbols.of_functions[name] = earlier[name] = meaning
+        parameters += [] if parameter is None else [parameter]
     return tuple(parameters)
+
+
+def define_parameter(
+    symbols: SymbolTable,
+    name: str,
+    given: Scalar | ParameterEntry,
+    scope: Scope,
+    override: Scalar | None = None,
+    outside: Scope | None = None,
+) -> tuple[Value | None, Parameter | None]:
+    """What the name of a parameter means, and the parameter; ``override`` is its value, read in the scope ``outside``.
+
+    Both are None where its value is broken.
+    """
+    entry = given if isinstance(given, ParameterEntry) else ParameterEntry.model_construct(value=given)
+    scalar = entry.value if override is None else override
+    value = symbols.number(scalar, scope if override is None else outside or scope, finite_now=True)
+    bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
+    if value is None:
+        return None, None
+    _check_bounds(symbols, name, scalar, value, *bounds)
+    least, most = (None if bound is None else bound.expr for bound in bounds)
+    unit = symbols.text(entry.unit) or symbols.text(symbols.document.units.get(name))  # pyright: ignore[reportArgumentType]
+    parameter = Parameter(name, value.expr, scalar.value, unit, least, most, symbols.text(entry.about))
+    return Value(symbol(name), value.number), parameter
 
 
 def _check_bounds(

@@ -9,6 +9,7 @@ from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
 from hsdsl.names import SINCE, did_you_mean, shown
+from hsdsl.parts import numbers_of
 from hsdsl.schema import ModeDocument, TransitionDocument
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Edge, Surface
@@ -50,10 +51,11 @@ def _names(symbols: SymbolTable, source: Key, transitions: list[TransitionDocume
         elif name is not None:
             given.add(name)
     counts: dict[str, int] = {}
-    return [symbols.text(t.name) or _unnamed(f"{source}->{t.to.value}", counts, given) for t in transitions]
+    return [symbols.text(t.name) or unnamed(f"{source}->{t.to.value}", counts, given) for t in transitions]
 
 
-def _unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
+def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
+    """The name of a transition that has none: `SRC->DST`, `SRC->DST#2` and so on."""
     while True:
         counts[pair] = counts.get(pair, 0) + 1
         name = pair if counts[pair] == 1 else f"{pair}#{counts[pair]}"
@@ -97,6 +99,8 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
         return None
     if label.value in symbols.document.modes:
         return label.value
+    if symbols.parts:
+        return _product(symbols, label)
     message = f"there is no mode '{shown(label.value)}'"
     guarded = _GUARDED.fullmatch(label.value)
     hint = did_you_mean(label.value, symbols.document.modes)
@@ -104,6 +108,16 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
         hint = f"write {guarded.group(1)} alone, and if: {shown(guarded.group(2))}"
     symbols.report(label.place, "HS303", message, hint)
     return None
+
+
+def _product(symbols: SymbolTable, label: Scalar) -> str | None:
+    """The product mode that a label names."""
+    try:
+        numbers_of(symbols.parts, label.value)
+    except ValueError as problem:
+        symbols.report(label.place, "HS303", f"there is no mode '{shown(label.value)}': {problem}")
+        return None
+    return label.value
 
 
 def _check_reset(

@@ -108,6 +108,7 @@ class ExpressionResolver:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
         tree = _tree(text, expected, scope)
+        tree = tree if scope.expanded is None else scope.expanded(tree)
         known = self.names_known(scalar, tree, scope)
         if expected == "inequality" and not (isinstance(tree, Call) and scope.faults(tree)):
             the_comparison(tree, key, text)

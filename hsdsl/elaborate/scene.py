@@ -15,11 +15,11 @@ Numbers = list[tuple[Scalar | None, Value | None]]  # each with what it means to
 _ZERO = 0
 
 
-def elaborate_scene(symbols: SymbolTable) -> tuple[tuple[Shape, ...], Numbers]:
+def elaborate_scene(symbols: SymbolTable, scope: Scope | None = None) -> tuple[tuple[Shape, ...], Numbers]:
     """The shapes of a model, and the numbers of all of them."""
     shapes: list[Shape] = []
     numbers: Numbers = []
-    scope = output_scope(symbols)
+    scope = scope or output_scope(symbols)
     for document in symbols.document.scene:
         shapes.append(Shape(document.kind, len(document.points)))
         scalars = [*(scalar for point in document.points for scalar in point), *document.sizes]

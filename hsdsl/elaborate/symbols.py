@@ -11,6 +11,7 @@ from hsdsl.elaborate.resolver import ExpressionResolver, all_of
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.files import ModelFiles
 from hsdsl.names import SINCE, closest
+from hsdsl.parts import Part
 from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
@@ -31,7 +32,7 @@ class SymbolTable:
     a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
     reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
     that were used. ``drivable`` says that inputs of time stay inputs. ``of_functions`` has the names that functions of
-    the file may use, with the parameters that are defined so far.
+    the file may use, with the parameters that are defined so far. ``parts`` are those of a system.
     """
 
     document: ModelDocument
@@ -45,6 +46,7 @@ class SymbolTable:
     data: dict[str, bytes] = field(default_factory=dict)
     drivable: bool = False
     of_functions: Meanings = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         document = self.document
@@ -65,6 +67,8 @@ class SymbolTable:
         self.values.update(dict.fromkeys(self.undeclared))
 
     def _undeclared(self) -> list[str]:
+        if not self.document.modes:
+            return []
         start = self.document.initial
         mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
         if mode is None or mode.flow is None:

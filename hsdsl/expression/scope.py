@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -82,12 +82,13 @@ class Scope:
 
     ``values`` has the meaning of each name: a value, a function, a refusal, or None where its own definition is broken.
     ``states`` are those of the mode of the expression, None where every state may be used; ``place`` names the mode in
-    sentences.
+    sentences. ``expanded`` writes sums over parts out; None where there are no parts, and names have no dots.
     """
 
     values: Mapping[str, Meaning]
     states: frozenset[str] | None = None
     place: str = "here"
+    expanded: Callable[[Tree], Tree] | None = None
 
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
@@ -120,6 +121,8 @@ class Scope:
         if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
             message = f"`{node.name}` is a function and needs its arguments"
             return ExpressionError.at(node, "HS112", message, f"write {node.name}(...)")
+        if self.expanded is None and "." in node.name:
+            return _dotted(node, node.name)
         if node.name not in self.values:
             message = f"nothing here is called '{shown(node.name)}'"
             return ExpressionError.at(node, "HS111", message, self._hint(node.name))
@@ -138,6 +141,8 @@ class Scope:
         return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:
+        if "." in node.function:
+            return _dotted(node, node.function)
         known = self.values.get(node.function)
         if isinstance(known, Function) and known.tree is None:
             return None
@@ -174,6 +179,12 @@ class Scope:
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
+
+
+def _dotted(node: Name | Call, name: str) -> ExpressionError:
+    at = node.start + name.index(".")
+    hint = "write the name or the function alone: sin(x)"
+    return ExpressionError("HS109", "names have no dots in an expression", at, at + 1, hint)
 
 
 def _product_or_value(node: Call) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, Protocol
 
@@ -169,3 +169,22 @@ def walk(tree: Tree) -> Iterator[Tree]:
         node = waiting.pop()
         yield node
         waiting.extend(reversed(children(node)))
+
+
+def mapped(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
+    """A node with other nodes directly below it."""
+    match tree:
+        case Number() | Name() | Truth():
+            return tree
+        case Negative() | Not():
+            return replace(tree, operand=change(tree.operand))
+        case Sum():
+            return replace(tree, terms=tuple((minus, change(term)) for minus, term in tree.terms))
+        case Product():
+            return replace(tree, factors=tuple((below, change(factor)) for below, factor in tree.factors))
+        case Power():
+            return replace(tree, base=change(tree.base), exponent=change(tree.exponent))
+        case Call():
+            return replace(tree, arguments=tuple(map(change, tree.arguments)))
+        case Comparison() | Logic():
+            return replace(tree, operands=tuple(map(change, tree.operands)))

@@ -16,6 +16,7 @@ LARGEST_INTEGER = 10**18
 _MOST_DIGITS = 1000
 _NUMBER = re.compile(r"0[xX][0-9a-fA-F]+|0[oO][0-7]+|([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/(),<>]")
+_MEMBER = re.compile(r"(\[[^\[\]\n]{1,100}\])?\.([^\W\d]\w*)")  # of an instance of a part
 _GROUPED = re.compile(r"[0-9]+(_[0-9]+)+")
 
 
@@ -95,6 +96,8 @@ def _name(text: str, at: int) -> Token | None:
     end = at + 1
     while end < len(text) and ("a" + text[end]).isidentifier() and text[end] not in LOOKALIKES:
         end += 1
+    member = _MEMBER.match(text, end)
+    end = member.end() if member and member.group(2).isidentifier() else end
     return Token("name", normalised(text[at:end]), at, end)
 
 

@@ -18,7 +18,7 @@ from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
-from hsdsl.functions import absolute, maximum
+from hsdsl.functions import absolute, below, maximum, rebuilt
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
@@ -70,6 +70,7 @@ def _lower(system: HybridSystem) -> lowered.Program:
         inputs=tuple(_sampled(i) for i in system.inputs),
         modes=modes,
         contacts=contacts,
+        parts=system.parts,
         outputs=system.outputs,
         units=system.units,
         initial_mode=indices[system.initial.mode],
@@ -230,6 +231,10 @@ class LoweredMode:
         )
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
+        """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
+        if residual.has(below):
+            residual = _every_choice(residual)
+            slopes = Gradient((residual,), self.arguments)
         own = residual.free_symbols & self._places.keys()
         if slopes.statements or any(slope.free_symbols & own for slope in slopes.sparse[0].values()):
             return False
@@ -322,6 +327,15 @@ def _labelled(mode: Mode):
             yield f"the condition of {edge.name}", edge.condition
     for wall in mode.walls:
         yield f"the domain's {wall.text}", wall.residual
+
+
+def _every_choice(expr: sp.Basic) -> sp.Basic:
+    """A sum with a term of its own for each of the expressions that numbers of modes choose from."""
+    if not expr.has(below):
+        return expr
+    if isinstance(expr, below):
+        return sum(sp.Dummy() * _every_choice(choice) for choice in expr.args[2:])
+    return rebuilt(expr, tuple(map(_every_choice, expr.args)))
 
 
 def _spread(value: sp.Expr, slopes, scales):

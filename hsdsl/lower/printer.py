@@ -23,6 +23,7 @@ _NAMES = {
     "Abs": "abs",
     "minimum": "min",
     "maximum": "max",
+    "below": "below",
     "Min": "min",
     "Max": "max",
     **{name: name for name in FUNCTIONS if name not in ("abs", "min", "max", "sqrt")},

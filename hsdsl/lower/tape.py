@@ -21,7 +21,7 @@ from hsdsl.program import Operation, Tape
 from hsdsl.system import TIME
 
 _ONE = sp.Integer(1)
-_WITHOUT_SUM = ("constant", "add", "sub", "neg", "offset", "scale", "slope", "square", "sqrt", "pow", "atan2")
+_WITHOUT_SUM = ("constant", "add", "sub", "neg", "offset", "scale", "slope", "square", "sqrt", "pow", "atan2", "below")
 _POLYNOMIAL = ("constant", "add", "sub", "neg", "offset", "scale", "slope", "mul")  # of polynomials
 
 
@@ -86,6 +86,9 @@ class _Writer:
         if expr.is_Pow:
             return self._power(expr.base, expr.exp)
         name = type(expr).__name__
+        if name == "below":
+            number, bound, one, other = expr.args
+            return self._operation("below", self.line(number), self.line(one), self.line(other), constant=bound)
         if name not in _DERIVATIVES:
             raise Kinked(name)
         return _DERIVATIVES[name](self, *map(self.line, expr.args))

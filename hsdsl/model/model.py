@@ -16,6 +16,7 @@ from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import ARGUMENTS, Options, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
+from hsdsl.model.visible import visible_run
 from hsdsl.names import SINCE, did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.simulate import Prepared
@@ -177,7 +178,7 @@ class Model:
         if ready is None:
             ready = self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True)))
             self._prepared.keep(key, ready)
-        run = ready.simulate(watch, self.pipeline.seconds)
+        run = visible_run(ready.simulate(watch, self.pipeline.seconds), ready)
         run.__dict__["differentiation"] = partial(self._differentiate, arguments)
         run.__dict__["look"] = partial(self.look, parameters)
         return run

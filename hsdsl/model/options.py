@@ -15,7 +15,7 @@ from hsdsl import decimals
 from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO, METHODS, Method
-from hsdsl.names import did_you_mean
+from hsdsl.names import closest, did_you_mean
 from hsdsl.simulate import SCHEMES
 
 KEYS = (
@@ -169,10 +169,11 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
             hint = "for example --set c=0.8 or --set initial.v=20"
             raise UsageError(f"--set: expected NAME=VALUE, got '{pair}'", hint)
         group, dot, rest = name.partition(".")
-        if dot and group not in ("initial", "experiment"):
+        if dot and group not in groups and closest(group, groups):
             hint = did_you_mean(group, ("initial", "experiment"))
             raise UsageError(f"--set reaches NAME, initial.NAME and experiment.NAME, not '{name}'", hint)
-        groups[group if dot else ""][rest if dot else name] = value
+        known = dot and group in groups  # else a parameter of a part, by its full name
+        groups[group if known else ""][rest if known else name] = value
     parameters, initial, settings = groups.values()
     return parameters, initial, settings
 
@@ -196,4 +197,4 @@ def as_written(value: Any) -> Any:
 
 def parameters_of(overrides: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters among recorded overrides."""
-    return {name: value for name, value in overrides.items() if "." not in name}
+    return {name: value for name, value in overrides.items() if not name.startswith(("initial.", "experiment."))}

@@ -19,6 +19,7 @@ from hsdsl.model import automatic, engines, program_cache
 from hsdsl.model.options import FILE, KEYS, Options, overrides_of, recorded, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
+from hsdsl.parts import numbered
 from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
@@ -142,7 +143,9 @@ class Pipeline:
     @property
     def columns(self) -> list[str]:
         """Names of all states and outputs."""
-        return list(dict.fromkeys((*self.program.all_states, *self.program.outputs)))
+        hidden = numbered(self.program.parts)
+        names = (*self.program.all_states, *self.program.outputs)
+        return list(dict.fromkeys(name for name in names if name not in hidden))
 
     def resolve(self, settings: Mapping[str, Any] | None = None, call: Mapping[str, Any] | None = None) -> Options:
         """Resolve the options of the file, of ``settings`` and of a call."""

@@ -30,7 +30,7 @@ from hsdsl.program import Program
 KIND = "programs"
 _PACKAGE = Path(__file__).parents[1]
 # what a program depends on, besides the modules of the package itself
-_READERS = ("files", "source", "schema", "expression", "elaborate", "completion", "lower", "model")
+_READERS = ("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model")
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 Row = list[Any]
 Part = tuple[tuple[str, ...], ...]  # names that a model is reduced to, and then those that the rest is reduced to

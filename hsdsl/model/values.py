@@ -17,6 +17,7 @@ from hsdsl.backends.text import compile_routines
 from hsdsl.errors import UsageError
 from hsdsl.model.options import KEYS
 from hsdsl.names import did_you_mean
+from hsdsl.parts import numbers_of
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show
 
@@ -209,9 +210,37 @@ def _elsewhere(name: str, program: Program) -> str | None:
 
 def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...], Row]:
     """The initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
+    overrides = start_of_parts(values.program, overrides)
     index, states = initial_layout(values, overrides)
     columns = initial_columns(values.alone(), states, overrides, {})
     return index, states, tuple(column[0] for column in columns)
+
+
+def start_of_parts(program: Program, overrides: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Overrides of initial modes, `NAME.mode` of a part or `mode` of the whole, as numbers of modes.
+
+    Raises UsageError: there is no such mode, or one of its states has no value.
+    """
+    if not program.parts:
+        return overrides
+    given: dict[str, Any] = dict(overrides)
+    whole = given.pop("mode", None)
+    try:
+        numbers: dict[str, int] = {} if whole is None else dict(numbers_of(program.parts, str(whole)))
+    except ValueError as problem:
+        raise UsageError(f"the model has no mode '{whole}': {problem}") from None
+    for part in program.parts:
+        mode = given.pop(f"{part.name}.mode", None)
+        if mode is not None and mode not in part.modes:
+            raise UsageError(f"{part.name} has no mode '{mode}'", did_you_mean(str(mode), part.modes))
+        if mode is not None and part.is_numbered:
+            numbers[part.name] = part.modes.index(mode) + 1
+        if part.name in given:
+            raise UsageError(f"'{part.name}' is a part of the model", f"write initial.{part.name}.mode")
+        for name in part.states[numbers.get(part.name, part.start + 1) - 1]:
+            if name not in given and name not in part.states[part.start]:
+                raise UsageError(f"no value is given for {name}", f"--set initial.{name}=VALUE")
+    return given | numbers
 
 
 def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:

@@ -10,6 +10,7 @@ from hsdsl.execution import Execution
 from hsdsl.names import shown, visible
 from hsdsl.program import EdgeProgram, ModeProgram, Program
 from hsdsl.report.graph_layout import STUB, Box, Layout, Line, laid_out
+from hsdsl.report.visited import visited_part
 
 SIZE, PITCH, LETTER, INSIDE = 13, 18.0, 7.85, 12.0  # of the font, between lines, of a letter, from text to border
 LONGEST, MOST_LINES, MOST_MODES = 34, 7, 6  # of a line; of a flow's lines; of modes whose flow is in their box
@@ -32,6 +33,7 @@ CSS = """
 
 def mode_graph(program: Program, execution: Execution | None = None) -> str:
     """The graph and its table, as HTML; every text of the model is escaped. Without a run nothing is counted."""
+    program = visited_part(program, execution)
     edges = [edge for mode in program.modes for edge in mode.edges]
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""

@@ -1,32 +1,44 @@
 """The shape of a model file: pydantic documents, their faults in the language's own words, and the JSON Schema."""
 
 from hsdsl.schema.documents import (
+    AutomatonDocument,
+    AutomatonFile,
     ExperimentDocument,
     FunctionDocument,
     InputFile,
     InputSamples,
+    InstanceDocument,
     ModeDocument,
     ModelDocument,
     ParameterEntry,
+    PartModeDocument,
+    PartTransitionDocument,
     ReferenceDocument,
     ReferenceStateDocument,
     ReferenceTransitionDocument,
+    SystemDocument,
     TransitionDocument,
 )
 from hsdsl.schema.jsonschema import json_schema
 from hsdsl.schema.read import read
 
 __all__ = [
+    "AutomatonDocument",
+    "AutomatonFile",
     "ExperimentDocument",
     "FunctionDocument",
     "InputFile",
     "InputSamples",
+    "InstanceDocument",
     "ModeDocument",
     "ModelDocument",
     "ParameterEntry",
+    "PartModeDocument",
+    "PartTransitionDocument",
     "ReferenceDocument",
     "ReferenceStateDocument",
     "ReferenceTransitionDocument",
+    "SystemDocument",
     "TransitionDocument",
     "json_schema",
     "read",

@@ -267,15 +267,119 @@ class ModelDocument(Document):
     )
 
 
+class PartTransitionDocument(TransitionDocument):
+    """An edge that leaves a mode of a part."""
+
+    when: Inequality | None = optional(  # pyright: ignore[reportIncompatibleVariableOverride]
+        "One inequality, such as `x >= x_max`: the surface at which the transition fires.", "x >= x_max", "h <= 0"
+    )
+    on: OptionalLabel = optional(
+        "A transition of another instance, instead of `when`: this one fires together with it. The name of an "
+        "automaton stands for all of its instances.",
+        "a.too_warm",
+        "leg[index - 1].touchdown",
+    )
+    to: OptionalLabel = optional("The mode entered; left out, the mode stays.", "free")  # pyright: ignore[reportIncompatibleVariableOverride]
+    reset: OpenTable[Expression] = mapping(
+        "State: its value after the transition, in terms of the values before it. States not named keep their value. "
+        "States of other instances can be set as well.",
+        {"v": "-c*v", "body.v": 0},
+    )
+
+
+class PartModeDocument(ModeDocument):
+    """A mode of a part."""
+
+    transitions: Items[PartTransitionDocument] = items(  # pyright: ignore[reportIncompatibleVariableOverride]
+        "The edges that leave the mode.", [{"when": "x >= 1", "to": "free", "reset": {"v": "-v"}}]
+    )
+
+
+class AutomatonDocument(Document):
+    """A kind of part: modes with what they need to know of the rest of the model."""
+
+    parameters: Table[Parameter] = mapping("Parameters, which each instance may set.", {"power": 30})
+    inputs: Items[ArgumentName] = items("Names that each instance connects to an expression.", ["beside"])
+    let: Table[Expression] = mapping("Named subexpressions.", {"gain": "wall*(beside - T)"})
+    outputs: Table[Expression] = mapping("Name: expression, recorded as `instance.name`.", {"energy": "v**2/2"})
+    modes: ModeTable[PartModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
+
+
+class AutomatonFile(Document):
+    """A kind of part that is in a file of its own."""
+
+    file: Label = required(
+        "A YAML file with the keys of an automaton, by its path from the model's own folder, inside it.", "leg.yaml"
+    )
+
+
+def _kind_of_automaton(value: Any) -> str:
+    return "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"
+
+
+Automaton = Annotated[
+    Annotated[AutomatonDocument, Tag("<mapping>")] | Annotated[AutomatonFile, Tag("<file>")],
+    Discriminator(_kind_of_automaton),
+]
+
+
+class PartInitialDocument(Document):
+    """Where an instance starts."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[AnyKey, Expression]  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    mode: OptionalLabel = optional("The mode it starts in; of an automaton with one mode it is left out.", "on")
+
+
+class InstanceDocument(Document):
+    """A part of the system: an automaton with its numbers and connections."""
+
+    automaton: Label = required("Which automaton.", "room")
+    initial: PartInitialDocument = optional(
+        "Where it starts: `mode`, and a value for each of its states.", {"mode": "on", "T": 20}
+    )
+    inputs: OpenTable[Expression] = mapping("Each input of the automaton: an expression.", {"beside": "b.T"})
+    parameters: OpenTable[Expression] = mapping("Parameters that differ from the automaton's.", {"power": 20})
+    count: Whole | None = optional("How many: `NAME[1]`, `NAME[2]` and so on, with `index` in expressions.", 20)
+    at_ends: OpenTable[Expression] = mapping(
+        "Name: what `NAME[0].name` and those behind the last one are; `index` is the number beyond the end.", {"x": 0}
+    )
+
+
+class SystemDocument(ModelDocument):
+    """A controlled hybrid system, as modes or as a system of parts."""
+
+    modes: ModeTable[ModeDocument] = mapping("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
+    initial: InitialDocument = optional(
+        "Where a run starts: `mode`, and a value for each of its states.", {"mode": "fall", "h": 10, "v": 0}
+    )
+    automata: Table[Automaton] = mapping(
+        "Kinds of parts by name, each with its modes, or in a file.",
+        {"clock": {"modes": {"run": {"flow": {"s": 1}}}}, "leg": {"file": "leg.yaml"}},
+    )
+    system: Table[InstanceDocument] = mapping(
+        "The parts of the model by name: their automata, numbers and connections. A model has either these or `modes`.",
+        {"a": {"automaton": "room", "initial": {"mode": "on", "T": 20}, "inputs": {"beside": "b.T"}}},
+    )
+
+
 # the document of each kind of mapping by its path, and a phrase for it; `*` is any key or index
 SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
-    (): (ModelDocument, "a model"),
+    (): (SystemDocument, "a model"),
     ("parameters", "*"): (ParameterEntry, "a parameter"),
     ("functions", "*"): (FunctionDocument, "a function"),
     ("inputs", "*", "<samples>"): (InputSamples, "an input"),
     ("inputs", "*", "<file>"): (InputFile, "an input"),
     ("modes", "*"): (ModeDocument, "a mode"),
     ("modes", "*", "transitions", "*"): (TransitionDocument, "a transition"),
+    ("automata", "*", "<file>"): (AutomatonFile, "an automaton"),
+    ("automata", "*", "<mapping>"): (AutomatonDocument, "an automaton"),
+    ("automata", "*", "<mapping>", "parameters", "*"): (ParameterEntry, "a parameter"),
+    ("automata", "*", "<mapping>", "modes", "*"): (PartModeDocument, "a mode"),
+    ("automata", "*", "<mapping>", "modes", "*", "transitions", "*"): (PartTransitionDocument, "a transition"),
+    ("system", "*"): (InstanceDocument, "an instance"),
+    ("system", "*", "initial"): (PartInitialDocument, "`initial`"),
     ("scene", "*", "<point>"): (PointShape, "a point"),
     ("scene", "*", "<line>"): (LineShape, "a line"),
     ("scene", "*", "<circle>"): (CircleShape, "a circle"),

@@ -239,6 +239,7 @@ Hold = Annotated[
 ]
 
 Name = Annotated[Key, PlainValidator(_name), WithJsonSchema({"type": "string"})]
+
 StateName = Annotated[Key, PlainValidator(_state_name), WithJsonSchema({"type": "string"})]
 ModeName = Annotated[Key, PlainValidator(_mode_name), WithJsonSchema({"type": "string"})]
 ArgumentName = Annotated[Key, PlainValidator(_argument), WithJsonSchema({"type": "string"})]

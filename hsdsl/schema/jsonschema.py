@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsdsl.schema.documents import ModelDocument
+from hsdsl.schema.documents import SystemDocument
 
 _DRAFT = "http://json-schema.org/draft-07/schema#"
 
@@ -27,7 +27,7 @@ def json_schema() -> dict[str, Any]:
     dict
         A draft-7 schema: shared parts are under ``definitions``, and a ``$ref`` has no siblings.
     """
-    made = ModelDocument.model_json_schema(
+    made = SystemDocument.model_json_schema(
         by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
     )
     definitions = {_short(name): _draft_7(part) for name, part in sorted(made.pop("$defs").items())}
@@ -39,6 +39,7 @@ def json_schema() -> dict[str, Any]:
         "examples": reference.pop("examples"),
         "anyOf": [item, {"type": ["array", "null"], "items": item}],
     }
+    root["anyOf"] = [{"required": ["modes", "initial"]}, {"required": ["automata", "system"]}]
     return {"$schema": _DRAFT, **root, "definitions": definitions}
 
 

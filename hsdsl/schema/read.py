@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 
 from hsdsl.errors import Diagnostic, Findings, Span
 from hsdsl.names import shown
-from hsdsl.schema.documents import SHAPES, ModelDocument, keys_of
+from hsdsl.schema.documents import SHAPES, ModelDocument, SystemDocument, keys_of
 from hsdsl.schema.fields import described
 from hsdsl.schema.idioms import translate_idioms
 from hsdsl.schema.indentation import correct_indentation
@@ -37,9 +37,10 @@ def read(root: Node, findings: Findings) -> ModelDocument:
     correct_indentation(root, findings)
     translate_idioms(root, findings)
     correct_spelling(root, findings)
+    whole = SystemDocument if {"system", "automata"} & set(map(str, keys(root))) else ModelDocument
     for _ in range(_MOST_READINGS):
         try:
-            return ModelDocument.model_validate(_plain(root))
+            return whole.model_validate(_plain(root))
         except ValidationError as error:
             faults = _without_values_of_wrong_keys(error.errors(include_url=False))
         meant = [_key_meant(root, fault) for fault in faults]

@@ -84,7 +84,7 @@ def test_overrides_are_sorted_and_the_last_counts():
     assert split_overrides(pairs) == ({"c": "0.5"}, {"v": "2*c", "mode": "free"}, {"step": "1e-3"})
 
 
-@pytest.mark.parametrize("pair", ["c", "=1", "c=", "model.c=1", ""])
+@pytest.mark.parametrize("pair", ["c", "=1", "c=", "initail.c=1", ""])
 def test_malformed_overrides(pair):
     with pytest.raises(UsageError):
         split_overrides([pair])

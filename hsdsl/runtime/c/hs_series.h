@@ -45,6 +45,8 @@ static inline hs_real hs_symmetric(int k, const hs_real *a, int first) {
 
 static inline hs_real hs_square(int k, const hs_real *a) { return hs_symmetric(k, a, 0); }
 
+static inline hs_real hs_below(hs_real s, hs_real bound, hs_real a, hs_real b) { return s < bound ? a : b; }
+
 static inline hs_real hs_root(int k, const hs_real *z, hs_real a, int *bad) {
   return hs_div(a - hs_symmetric(k, z, 1), 2 * z[0], bad);
 }

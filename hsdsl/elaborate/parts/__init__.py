@@ -1,0 +1,145 @@
+# pyright: basic
+"""Systems of parts: instances of automata and their connections, to one hybrid system."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from typing import Any
+
+from hsdsl.elaborate.definitions import define_parameter
+from hsdsl.elaborate.parts.composition import FINAL, MODE, Composition
+from hsdsl.elaborate.parts.instances import Instance, roster_of
+from hsdsl.elaborate.parts.names import Board, Names
+from hsdsl.elaborate.scene import elaborate_scene
+from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
+from hsdsl.expression.scope import Refusal, Scope, Value, state
+from hsdsl.expression.selection import NO_VALUE, ZERO, whole
+from hsdsl.parts import Part, numbered
+from hsdsl.schema import SystemDocument
+from hsdsl.source import Key
+from hsdsl.system import Initial, Mode, Parameter, Shape
+
+__all__ = ["FINAL", "MODE", "Parts"]
+
+
+class Parts:
+    """The parts of a document with a `system`, parameters and inputs of the file being known.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        Those of the instances, by their full names.
+    parts : tuple of Part
+    modes : tuple of Mode
+        None of them where something is wrong, which is reported.
+    """
+
+    def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
+        self.symbols = symbols
+        self._refuse_modes(document)
+        self.roster = roster_of(symbols, document)
+        self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
+        instances = self.roster.instances.values()
+        self.parts: tuple[Part, ...] = tuple(one.part for one in instances)
+        symbols.parts = self.parts
+        self.parameters: tuple[Parameter, ...] = tuple(p for one in instances for p in self._parameters_of(one))
+        names = [one.full(name) for one in instances for name in one.states]
+        symbols.names |= dict.fromkeys(names, "states") | {p.name: "parameters" for p in self.parameters}
+        symbols.values |= {name: state(name) for name in names}
+        self.outputs, values = self._outputs(document)
+        symbols.all_outputs = self.outputs
+        self.scene: tuple[Shape, ...]
+        self.scene, scene = self._scene()
+        self._check_lets(document)
+        self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
+        self.initial = self._initial()
+
+    def _refuse_modes(self, document: SystemDocument) -> None:
+        """Report `modes` or `initial` next to a system."""
+        for key in ("modes", "initial"):
+            if key in document.model_fields_set and getattr(document, key):
+                place = next(iter(document.modes)).place if key == "modes" else document.initial.mode.place
+                message = f"a model has either `modes` or a `system`; here is `{key}` besides `system`"
+                self.symbols.report(place, "HS353", message, "give the parts their modes and initial values")
+
+    def _parameters_of(self, one: Instance) -> list[Parameter]:
+        """The parameters of an instance: those that are given to it, else those of its automaton."""
+        refused: Meanings = {}
+        earlier: Meanings = {} if one.index is None else {"index": Names(self.board, index=one.index)["index"]}
+        outer = self.symbols.parameter_scope("a parameter is an expression of earlier parameters").values
+        own = Scope(ChainMap(refused, earlier, outer))  # pyright: ignore[reportArgumentType]
+        given = {str(key): scalar for key, scalar in one.given.parameters.items()}
+        found: list[Parameter] = []
+        for name in definition_order(one.kind.parameters, "parameters", refused):
+            full, entry = one.full(name), one.kind.parameters[name]
+            override = given.get(str(name))
+            outside = ChainMap({"index": earlier["index"]} if one.index else {}, outer)  # pyright: ignore[reportArgumentType]
+            value, parameter = define_parameter(self.symbols, full, entry, own, override, Scope(outside))
+            earlier[name] = self.board.parameters[full] = value
+            found += [] if parameter is None else [parameter]
+        return found
+
+    def _outputs(self, document: SystemDocument):
+        """The outputs of the file and of the instances, and their values."""
+        file = Names(self.board, lenient=True)
+        values: dict[str, Any] = {str(n): self.symbols.number(s, file.scope) for n, s in document.outputs.items()}
+        for name in document.outputs:
+            if self.symbols.names.get(name) == "states":
+                self.symbols.report(name.place, "HS301", f"the output '{name}' has the name of a state", None)
+        for one in self.roster.instances.values():
+            for name in dict.fromkeys((*one.kind.outputs, *(key for _, mode in one.modes for key in mode.outputs))):
+                values[one.full(name)] = self._output_of(one, name)
+        exprs = tuple(None if value is None else value.expr for value in values.values())
+        return tuple(values), exprs
+
+    def _output_of(self, one: Instance, name: Key) -> Value | None:
+        """An output of an instance, that of the mode first; without a value in modes that lack one of its names."""
+        values: list[Value] = []
+        for mode, document in one.modes:
+            names = Names(self.board, one, mode, one.index)
+            own = document.outputs.get(name)
+            scalar = own or one.kind.outputs.get(name)
+            lacks = own is None and (scalar is None or self.board.lacks(scalar, names))
+            value = Value(NO_VALUE) if lacks or scalar is None else self.board.value(scalar, names)
+            if value is None:
+                return None
+            values.append(value)
+        return self.board.picked(one, values)
+
+    def _scene(self):
+        """The shapes of the file, and their numbers."""
+        scope = Names(self.board, lenient=True).scope
+        shapes, numbers = elaborate_scene(self.symbols, scope)
+        return shapes, tuple(0 if scalar is None else value and value.expr for scalar, value in numbers)
+
+    def _check_lets(self, document: SystemDocument) -> None:
+        """Work out every `let`, also those that nothing uses."""
+        for name in document.let:
+            Names(self.board)[name]
+        for one in self.roster.instances.values():
+            for mode, inner in one.modes:
+                for name in (*one.kind.inputs, *one.kind.let, *inner.let):
+                    meaning = Names(self.board, one, mode, one.index)[name]
+                    assert meaning is None or isinstance(meaning, (Value, Refusal))
+
+    def _initial(self) -> Initial:
+        """The initial state of the whole; states that the initial mode of a part lacks are 0."""
+        values: list[tuple[str, Any]] = []
+        sentence = "an initial value is an expression of parameters"
+        outer = self.symbols.parameter_scope(sentence).values
+        for one in self.roster.instances.values():
+            own: Meanings = {str(name): self.board.parameters.get(one.full(name)) for name in one.kind.parameters}
+            own |= {} if one.index is None else {"index": Names(self.board, index=one.index)["index"]}
+            scope = Scope(ChainMap(own, outer))  # pyright: ignore[reportArgumentType]
+            extra = one.given.initial.__pydantic_extra__ if one.given.initial else {}
+            given = {str(key): scalar for key, scalar in extra.items()}
+            for name in one.states:
+                value = self.symbols.number(given[name], scope, finite_now=True) if name in given else None
+                values.append((one.full(name), ZERO if value is None else value.expr))
+        starts = {
+            part.name: whole((one.start or 0) + 1)
+            for part, one in zip(self.parts, self.roster.instances.values(), strict=True)
+        }
+        ends = any(one.part.final[one.start or 0] for one in self.roster.instances.values())
+        values += [(name, starts[name]) for name in numbered(self.parts)]
+        return Initial(FINAL if ends else MODE, tuple(values))

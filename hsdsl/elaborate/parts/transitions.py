@@ -1,0 +1,204 @@
+# pyright: basic
+"""Transitions of parts: those with a surface of their own, and those that fire together with another."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.elaborate.edges import surface, unnamed
+from hsdsl.elaborate.parts.instances import Instance
+from hsdsl.elaborate.parts.names import MEMBER, Board, Names
+from hsdsl.expression.scope import Refusal
+from hsdsl.names import did_you_mean, shown
+from hsdsl.schema import PartModeDocument, PartTransitionDocument
+from hsdsl.source import ABSENT, Key, Scalar
+from hsdsl.system import Surface
+
+Event = tuple[str, str]  # an instance and the name of its transition
+
+
+@dataclass(frozen=True, eq=False)
+class PartTransition:
+    """A transition of an instance out of its mode ``source``, an index.
+
+    ``after`` has the events it fires together with, where it has no surface. ``resets`` maps states of the whole to
+    their values, and ``keys`` to where they are set; ``place`` is where a fault of it is reported.
+    """
+
+    one: Instance
+    source: int
+    target: int
+    name: str
+    surface: Surface | None
+    after: tuple[Event, ...]
+    condition: Any | None
+    condition_text: str | None
+    resets: dict[str, Any]
+    texts: dict[str, str]
+    keys: dict[str, Key]
+    priority: int
+    place: Scalar | Key
+
+    @property
+    def event(self) -> Event:
+        """What others may fire together with."""
+        return self.one.name, self.name
+
+
+def transitions_of(board: Board, one: Instance) -> list[PartTransition]:
+    """The transitions of an instance without faults, in the order of its modes."""
+    found: list[PartTransition] = []
+    for source, (mode, document) in enumerate(one.modes):
+        names = Names(board, one, mode, one.index)
+        for name, transition in zip(_labels(board, mode, document), document.transitions, strict=True):
+            made = _transition(board, names, source, name, transition)
+            if made is not None:
+                found.append(made)
+    return found
+
+
+def _labels(board: Board, mode: str, document: PartModeDocument) -> list[str]:
+    """The name of each transition of a mode; a name given twice is reported, once."""
+    given: set[str] = set()
+    for label in (transition.name for transition in document.transitions):
+        if label is not None and label.value in given:
+            board.report_once(label, "HS307", f"the mode '{mode}' has a transition '{shown(label.value)}' already",
+                              "give it another name")  # fmt: skip
+        given |= {label.value} if label is not None else set()
+    counts: dict[str, int] = {}
+    return [
+        t.name.value if t.name else unnamed(f"{mode}->{t.to.value if t.to else mode}", counts, given)
+        for t in document.transitions
+    ]
+
+
+def _transition(
+    board: Board, names: Names, source: int, name: str, document: PartTransitionDocument
+) -> PartTransition | None:
+    one, resolver = names.instance, board.symbols.resolver
+    assert one is not None
+    if (document.when is None) == (document.on is None):
+        which = "one of `when` and `on`, not both" if document.when else "either `when` or `on`"
+        board.report_once(document.when or document.to or document.name or one.key, "HS353",
+                          f"the transition '{name}' of '{one.automaton}' needs {which}", None)  # fmt: skip
+        return None
+    target = _target(board, one, source, document)
+    crossed, after = None, ()
+    if document.when is not None and not board.is_broken(document.when, names):
+        crossed = surface(resolver, document.when, names.scope, "when")
+        board.note(document.when, names, crossed)
+    elif document.on is not None:
+        after = _events(board, names, document.on)
+    condition = None
+    if document.condition is not None and not board.is_broken(document.condition, names):
+        condition = resolver.condition(document.condition, names.scope)
+        board.note(document.condition, names, condition)
+    resets, keys, texts, whole = _resets(board, names, document)
+    if target is None or not whole or (crossed is None and after is None):
+        return None
+    if document.condition is not None and condition is None:
+        return None
+    _check_entered(board, one, source, target, document, resets)
+    text = None if document.condition is None else document.condition.value
+    return PartTransition(one, source, target, name, crossed, after or (), condition, text, resets, texts, keys,
+                          document.priority, document.to or document.on or one.key)  # fmt: skip
+
+
+def _target(board: Board, one: Instance, source: int, document: PartTransitionDocument) -> int | None:
+    label, names = document.to, one.part.modes
+    if label is None or label.value == ABSENT:
+        return source if label is None else None
+    if label.value in names:
+        return names.index(label.value)
+    message = f"the automaton '{one.automaton}' has no mode '{shown(label.value)}'"
+    board.report_once(label, "HS303", message, did_you_mean(label.value, names))
+    return None
+
+
+def _events(board: Board, names: Names, label: Scalar) -> tuple[Event, ...] | None:
+    """The events that `on` names; none where their instance is beyond the ends."""
+    found = MEMBER.fullmatch(label.value)
+    if found is None:
+        board.report_once(label, "HS353", f"expected an instance and its transition, got '{shown(label.value)}'",
+                          "write on: INSTANCE.TRANSITION")  # fmt: skip
+        return None
+    base, index, name = found.groups()
+    several = board.roster.group(base) if index is None else None
+    try:
+        sender = None if several else board.instance(base, index, names)
+    except KeyError:
+        known = (*board.roster.instances, *board.roster.automata)
+        message = f"there is no instance '{shown(base)}'"
+        board.report_once(label, "HS350", message, did_you_mean(base, known))
+        return None
+    if isinstance(sender, Refusal):
+        board.report_once(label, sender.code, sender.message, sender.hint)
+        return None
+    if isinstance(sender, int):
+        return ()
+    senders = [other for other in several or [] if other is not names.instance] or ([sender] if sender else [])
+    known = [label for other in senders for mode, inner in other.modes for label in _labels(board, mode, inner)]
+    if senders and name not in known:
+        message = f"the automaton '{senders[0].automaton}' has no transition '{shown(name)}'"
+        board.report_once(label, "HS353", message, did_you_mean(name, known))
+        return None
+    if sender is names.instance and sender is not None:
+        message = f"'{label.value}' is a transition of '{sender.name}' itself"
+        board.report_once(label, "HS353", message, "a transition fires together with one of another instance")
+        return None
+    return tuple((other.name, name) for other in senders)
+
+
+def _resets(board: Board, names: Names, document: PartTransitionDocument):
+    """The states that a transition sets, with their values, places and texts; and whether all of them are whole."""
+    one = names.instance
+    assert one is not None
+    resets, keys, texts, whole = {}, {}, {}, True
+    for key, scalar in document.reset.items():
+        value = board.value(scalar, names)
+        full = one.full(key) if key in one.states else _foreign(board, names, key)
+        whole = whole and value is not None and full is not None
+        if full and value is not None:
+            resets[full], keys[full], texts[full] = value.expr, key, scalar.value
+    return {k: v for k, v in resets.items() if k}, keys, texts, whole
+
+
+def _foreign(board: Board, names: Names, key: Key) -> str | None:
+    """The full name of a state of another instance that a reset sets; empty where that is beyond the ends."""
+    one, found = names.instance, MEMBER.fullmatch(key)
+    assert one is not None
+    other: Any = None
+    with suppress(KeyError):
+        other = board.instance(found[1], found[2], names) if found else None
+    if isinstance(other, int):
+        return ""
+    if isinstance(other, Refusal):
+        board.report_once(key, other.code, other.message, other.hint)
+    elif other is None:
+        message = f"the automaton '{one.automaton}' has no state '{shown(key)}' to reset"
+        board.report_once(key, "HS306", message, did_you_mean(key, one.states))
+    elif found is not None and all(other.full(found[3]) in states for states in other.part.states):
+        return other.full(found[3])
+    elif found is not None:
+        message = f"'{found[3]}' is not a state of every mode of '{other.automaton}'"
+        board.report_once(key, "HS306", message, did_you_mean(found[3], other.states))
+    return None
+
+
+def _check_entered(
+    board: Board, one: Instance, source: int, target: int, document: PartTransitionDocument, resets: dict[str, Any]
+) -> None:
+    before, after = one.part.states[source], one.part.states[target]
+    for state in after:
+        if state not in before and state not in resets:
+            own = state.removeprefix(f"{one.name}.")
+            message = f"the transition to '{one.part.modes[target]}' gives its state '{own}' no value, and "
+            message += f"'{one.part.modes[source]}' has no such state"
+            board.report_once(document.to or one.key, "HS305", message, f"write reset: {{{own}: ...}}")
+    for state in resets:
+        if state.startswith(f"{one.name}.") and state in {s for states in one.part.states for s in states} - {*after}:
+            own = state.removeprefix(f"{one.name}.")
+            message = f"the mode '{one.part.modes[target]}' has no state '{own}' to reset"
+            board.report_once(document.to or one.key, "HS306", message, None)

@@ -1,0 +1,70 @@
+"""The parts of a composed system, and what the numbers of their modes are called.
+
+A system of parts is one mode over the states of all of them. The mode of a part with several is a number that no flow
+changes, 1 for the first: a state with the name of the part. So what a system costs grows with the sum of its parts'
+modes, and a product mode exists only where a run visits it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Part:
+    """An instance of an automaton: its name, the names of its modes, and the states that each of them has.
+
+    ``start`` is the index of the mode it starts in.
+    """
+
+    name: str
+    modes: tuple[str, ...]
+    states: tuple[tuple[str, ...], ...]
+    final: tuple[bool, ...]
+    start: int = 0
+
+    @property
+    def is_numbered(self) -> bool:
+        """Whether its mode is a state of the system."""
+        return len(self.modes) > 1
+
+    def number(self, state: Mapping[str, Any]) -> int:
+        """The index of the mode it is in, at a state of the system."""
+        return int(state[self.name]) - 1 if self.is_numbered else 0
+
+
+def numbered(parts: Sequence[Part]) -> tuple[str, ...]:
+    """The states that are numbers of modes."""
+    return tuple(part.name for part in parts if part.is_numbered)
+
+
+def product_name(parts: Sequence[Part], state: Mapping[str, Any]) -> str:
+    """What the product mode at a state of the system is called, as `a=on b=off`."""
+    return " ".join(f"{part.name}={part.modes[part.number(state)]}" for part in parts)
+
+
+def numbers_of(parts: Sequence[Part], name: str) -> dict[str, int]:
+    """The numbers of the product mode of this name.
+
+    Raises
+    ------
+    ValueError
+        It is none; the message says why.
+    """
+    given: dict[str, str] = {}
+    for item in name.split():
+        part, _, mode = item.partition("=")
+        given[part] = mode
+    for part in parts:
+        if given.get(part.name) not in part.modes:
+            raise ValueError(f"expected {part.name}= and one of {', '.join(part.modes)}")
+    if len(given) > len(parts):
+        raise ValueError("it names more than the parts of the model")
+    return {part.name: part.modes.index(given[part.name]) + 1 for part in parts if part.is_numbered}
+
+
+def present(parts: Sequence[Part], state: Mapping[str, Any]) -> frozenset[str]:
+    """The states that the product mode at a state of the system has."""
+    return frozenset(name for part in parts for name in part.states[part.number(state)])
