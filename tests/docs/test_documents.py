@@ -184,5 +184,26 @@ def test_commands_in_the_text_exist(name):
             assert not option.startswith("--") or option in options, f"{name}: hsdsl {found}"
 
 
+ROOTED = sorted(page for page in ROOT.glob("*.md"))  # mkdocs checks the links of the others
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+
+
+@pytest.mark.parametrize("page", ROOTED, ids=lambda page: page.name)
+def test_links_lead_to_files_and_headings(page):
+    for link in LINK.findall(page.read_text(encoding="utf-8")):
+        path, _, heading = link.partition("#")
+        if "://" in link:
+            continue
+        target = (page.parent / path) if path else page
+        assert target.exists(), f"{page.name}: {link}"
+        assert not heading or heading in headings(target), f"{page.name}: {link}"
+
+
+def headings(page: Path) -> set[str]:
+    """The anchors of a page's headings, as mkdocs names them."""
+    lines = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", line).strip().lower()) for line in lines}
+
+
 def test_tutorial_and_readme_have_examples_that_run():
     assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md"}
