@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-HEADERS = ("hs.h", "hs_simulate.h")
+HEADERS = ("hs.h", "hs_simulate.h", "hs_screen.h")
 FOLDER = Path(__file__).parent / "c"
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 ENUMERATION = re.compile(r"typedef enum \{([^}]*)\} (\w+);")
@@ -62,10 +62,22 @@ Row, Collocation, Method = (STRUCTURES[name] for name in ("hs_row", "hs_collocat
 Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline", "hs_interpolation", "hs_settings"))
 Visited, Task = STRUCTURES["hs_visited"], STRUCTURES["hs_task"]
 Sampling, Ensemble = STRUCTURES["hs_sampling"], STRUCTURES["hs_ensemble"]
+Operation, Formula, Formulas = (STRUCTURES[name] for name in ("hs_operation", "hs_formula", "hs_formulas"))
+Record, Screen = STRUCTURES["hs_record"], STRUCTURES["hs_screen"]
 ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_transition", "hs_note"))
-METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES = (
+METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, DOUBTS = (
     ENUMERATIONS[f"hs_{name}"]
-    for name in ("method_kind", "interpolant", "arc_kind", "scheme", "notice", "reason", "step_failure")
+    for name in (
+        "method_kind",
+        "interpolant",
+        "arc_kind",
+        "scheme",
+        "notice",
+        "reason",
+        "step_failure",
+        "operator",
+        "doubt",
+    )
 )
 
 

@@ -63,6 +63,16 @@ class Where(NamedTuple):
     arc: int
 
 
+class Made(NamedTuple):
+    """Numbers of transitions and notes, and addresses of what belongs to transitions, for C."""
+
+    transitions: int
+    notes: int
+    transition: int
+    before: int
+    after: int
+
+
 class Gathered:
     """Columns of a long run, as arrays; rows have as many states as the largest mode has that the run was in."""
 
@@ -82,6 +92,13 @@ class Gathered:
         rows, degree, width = of["coefficients"].shape
         places = [of[name].ctypes.data for name in ("times", "values", "outputs", "coefficients", "arc")]
         return Where(rows, len(of["arc"]), width, degree, of["outputs"].shape[1], *places)
+
+    @property
+    def made(self) -> Made:
+        """Where transitions are."""
+        of = self._arrays
+        places = [of[name].ctypes.data for name in ("transition", "before", "after")]
+        return Made(len(of["transition"]), len(of["note"]), *places)
 
 
 class Packed:
@@ -146,6 +163,14 @@ class Packed:
         pieces = recorded + NUMBER * n * (m + 1)  # behind the depths
         arc = pieces + NUMBER * n * degree * w
         return Where(n, self._counts.arcs, w, degree, m, times, values, recorded, pieces, arc)
+
+    @property
+    def made(self) -> Made:
+        """Where transitions are."""
+        _, arcs, k, notes, _ = self._counts
+        transition = self.where.arc + NUMBER * ARC_NUMBERS * arcs
+        before = transition + NUMBER * TRANSITION_NUMBERS * k
+        return Made(k, notes, transition, before, before + NUMBER * k * self._shape.width)
 
 
 Columns = Gathered | Packed

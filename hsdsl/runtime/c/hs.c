@@ -236,4 +236,12 @@ void hs_simulate(hs_task *task) {
 #include "pause.c"
 #if !defined(HS_FLOAT32)
 #include "ensemble.c"
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("O2")
+#endif
+#include "screen.c"
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif
 #endif

@@ -6,6 +6,7 @@ lead to the same point. A run shows its own neighbourhood of the execution, so e
 that the run allows itself.
 
 ==============  ==============================================================================
+`screen`        where a compiled look says that there is nothing to find; `formulas`: routines as it takes them
 `agreement`     the errors of a run, by the same run made finer
 `run_view`      an execution with its modes' routines; `place` is one state of it
 `steps`         its steps as polynomials, many at once, with routines over intervals
@@ -25,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hsdsl.execution import Stop, Transition, Verdict
+from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
@@ -55,10 +56,7 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
-    left, unknown, margins = [*diagnostics.departures, *slidings(run)], [*diagnostics.doubts], list[str]()
-    left += [sentence for sentence in accumulations(run) if not diagnostics.departures]
-    if run.stop.reason in LEFT:
-        left.append(run.stop.message)
+    left, unknown, margins = list(departures(run, diagnostics)), [*diagnostics.doubts], list[str]()
     if left:
         return Verdict("left", _once(left, unknown))
     found = list(reliability(run))
@@ -68,10 +66,22 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         margins += reasons
     left += _named(found, "left")
     unknown += _named(found, "unknown")
-    unknown += _unchecked(run, run.stop, run.transitions)
+    unknown += _unchecked(run, run.stop)
     if left:
         return Verdict("left", _once(left, unknown))
     return Verdict("unknown", _once(unknown, margins)) if unknown else Verdict("holds", _once(margins))
+
+
+def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
+    """How the run left what the theorem is about, as far as the run itself tells."""
+    yield from diagnostics.departures
+    if not diagnostics.departures and run.stop.reason not in LEFT and run.screen is not None:
+        return  # it neither slid nor made crowded transitions
+    yield from slidings(run)
+    if not diagnostics.departures:
+        yield from accumulations(run)
+    if run.stop.reason in LEFT:
+        yield run.stop.message
 
 
 def _once(*sentences: Sequence[str]) -> tuple[str, ...]:
@@ -88,13 +98,13 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
             yield f"and {len(same) - MOST_NAMED} more like the last"
 
 
-def _unchecked(run: RunView, stop: Stop, transitions: Sequence[Transition]) -> Iterator[str]:
+def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
     if stop.reason in INCOMPLETE:
         yield f"the run did not get to its end: {stop.message}"
     elif run.errors is None:
         yield "a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"
-    at_once = [t for t in transitions if t.entry]
-    if at_once:
+    if run.execution.enters_beyond:
+        at_once = [t for t in run.transitions if t.entry]
         first = at_once[0]
         yield (
             f"{len(at_once)} transition{'s' * (len(at_once) > 1)} fired at once on entry, the first {first.edge} at "

@@ -25,7 +25,7 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every transition that others were passed over for."""
     found: list[Finding] = []
     commuting: list[Number] = []
-    for made in run.relied_transitions:
+    for made in run.relied_transitions if run.doubts("choice") else ():
         if not made.alternatives:
             continue
         place = run.place(made.source, made.time, tuple(made.before.values()))

@@ -13,6 +13,7 @@ from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.screen import LOOK_AT_CROSSING
 
 
 def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
@@ -20,8 +21,10 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
     found: list[Finding] = []
     slowest: Number | None = None
     least: Number | None = None
-    ends = {arc.jump: arc for arc in run.flows}
-    made = [t for t in run.relied_transitions if not t.entry]
+    known = None if run.doubts("crossing") or run.screen is None else run.screen.crossings
+    made = run.relied_transitions if known is None else run.doubtful_transitions(LOOK_AT_CROSSING)
+    made = [t for t in made if not t.entry]
+    ends = {arc.jump: arc for arc in run.flows} if made else {}
     for transition in made:
         place, k = run.before(transition)
         try:
@@ -36,12 +39,17 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
             continue
         if margin is not None:
             least = margin if least is None else min(least, margin)
-    if slowest is None:
-        return found, ["no transition"] if not run.transitions else []
-    each = (
-        f"{len(made)} transition{'s' * (len(made) > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
-    )
-    return found, [each + (f", {times(least)} what the error could undo" if least is not None else "")]
+    if known is not None:
+        return found, _summary(run, *known)
+    return found, _summary(run, len(made), slowest, least)
+
+
+def _summary(run: RunView, count: int, slowest: Number | None, least: Number | None) -> list[str]:
+    """Say how many transitions the flow made, at which rates, and by which margin."""
+    if not count or slowest is None:
+        return ["no transition"] if not run.execution.made else []
+    each = f"{count} transition{'s' * (count > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
+    return [each + (f", {times(least)} what the error could undo" if least is not None else "")]
 
 
 def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:

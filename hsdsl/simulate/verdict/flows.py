@@ -7,7 +7,6 @@ halves with the part.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -19,22 +18,22 @@ from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.formulas import STEEP
 from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 14
 RESOLVED = 8  # an enclosure's own width has fallen by so much after three halvings
 Array = NDArray[np.float64]
-STEEP = re.compile(r"\b(?:sqrt|asin|acos|acosh)\(|\*\* *(?:\(|[a-zA-Z_]|\d*\.|\d+/)")
 
 
 def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at the flow of every mode along all steps in it."""
-    jumping = [mode for mode in visited(run) if mode.jumps]
+    jumping = [mode for mode in visited(run) if mode.jumps] if run.doubts("flow change") else []
     found = [_jumping(jumping)] if jumping else []
     if run.errors is None:
         return found, []
-    for steps in steps_of(run):
+    for steps in steps_of(run, doubtful="changing"):
         with np.errstate(all="ignore"):
             found += _named(run, "a change of the flow", "may not have been seen", *_unseen(run, steps))
             if any(STEEP.search(text) for text in run.problem.program.modes[steps.mode].flow_texts):

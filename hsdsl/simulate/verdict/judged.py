@@ -26,17 +26,16 @@ def may_hold(run: RunView, place: Place, k: int, row: int) -> bool:
 
 def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | None:
     """Say whether the error could make another execution of a surface that the run is close to, or beyond."""
-    value, shift, conditional = place.value(k), run.shift(place, k, row), has_condition(place, k)
-    if conditional and not may_hold(run, place, k, row):
+    value, shift = place.value(k), run.shift(place, k, row)
+    margin = abs(value) / shift if shift > 0 else run.arithmetic.zero + float("inf")
+    beyond = value > _level(run, place, k)
+    if not (beyond or margin < SAFE) or (has_condition(place, k) and not may_hold(run, place, k, row)):
         return None
-    where = f"the surface of {place.name(k)} at t = {show(place.t)}"
-    if value > _level(run, place, k):
+    if beyond:
         sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
         return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
-    margin = abs(value) / shift if shift > 0 else run.arithmetic.zero + float("inf")
-    if margin < SAFE:
-        return Finding("miss", "unknown", f"the run {how} {where}, {times(margin)} the error away")
-    return None
+    where = f"the surface of {place.name(k)} at t = {show(place.t)}"
+    return Finding("miss", "unknown", f"the run {how} {where}, {times(margin)} the error away")
 
 
 def _level(run: RunView, place: Place, k: int) -> Number:

@@ -18,6 +18,7 @@ from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.screen import LOOK_AT_RESET
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
 ROUNDS = 3  # of Newton's method, back onto a guard
@@ -29,7 +30,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
     if run.errors is None:
         return [], []
     found: list[Finding] = []
-    for arc in run.relied_flows:
+    for arc in run.doubtful_flows("landing"):
         place = run.at_row(arc, arc.first)
         made = run.transitions[arc.jump - 1] if arc.jump else None
         for k in range(len(place.mode.edges) + len(place.mode.walls)):
@@ -37,7 +38,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
                 found += _on(run, arc, place, k, made)
             except DOMAIN_ERRORS:
                 continue  # `misses` looks along the arc
-    for made in run.relied_transitions:
+    for made in run.doubtful_transitions(LOOK_AT_RESET):
         try:
             found += _continuous(run, made)
         except DOMAIN_ERRORS:

@@ -52,26 +52,36 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
     found: list[Finding] = []
     passed: dict[str, list[Number]] = {}
     nearest: Miss | None = None
-    for steps in steps_of(run):
+    for steps in steps_of(run, doubtful="turning"):
         turning = _turning(run, steps)
         found += filter(None, (_turned(run, run.arc_of(each.row), each) for each in turning[:MOST_LOOKED_AT]))
         if len(turning) > MOST_LOOKED_AT:
             more = f"{len(turning) - MOST_LOOKED_AT} more turning points close to surfaces were not looked at"
             found.append(Finding("misses", "unknown", more))
-        found += transparent(run, steps, passed)
-        nearest = min(filter(None, (nearest, _nearest(run, steps))), default=None)
-    for arc in run.relied_flows:
+    passing, near = run.doubts("transparent"), run.doubts("nearest")
+    for steps in steps_of(run) if passing or near else ():
+        if passing:
+            found += transparent(run, steps, passed)
+        if near:
+            nearest = min(filter(None, (nearest, _nearest(run, steps))), default=None)
+    for arc in run.doubtful_flows("ending"):
         try:
             found += at_its_end(run, arc, run.crossed.get(arc.last))
         except DOMAIN_ERRORS:
             sentence = f"a surface of {arc.mode} has no value close to t = {show(run.times[arc.last])}"
             found.append(Finding("no value", "unknown", sentence))
-    margins = (
-        [f"the nearest miss is of {nearest.name} at t = {show(nearest.time)}, by {times(nearest.margin)} the error"]
-        if nearest and not found
-        else []
-    )
-    return [*found, *at_the_end(run)], [*margins, *(passed_at(name, at) for name, at in passed.items())]
+    margins = _margins(run, nearest) if not found else []
+    ended = at_the_end(run) if run.doubts("ending") else ()
+    return [*found, *ended], [*margins, *(passed_at(name, at) for name, at in passed.items())]
+
+
+def _margins(run: RunView, nearest: Miss | None) -> list[str]:
+    """Say which turning point comes closest to its surface."""
+    if not run.doubts("nearest") and run.screen is not None:
+        return run.screen.nearest_miss
+    if nearest is None:
+        return []
+    return [f"the nearest miss is of {nearest.name} at t = {show(nearest.time)}, by {times(nearest.margin)} the error"]
 
 
 def _turning(run: RunView, steps: Parts) -> list[Open]:

@@ -26,8 +26,8 @@ def reliability(run: RunView) -> Iterator[Finding]:
 
 def _unreliable(run: RunView) -> tuple[float, str] | None:
     """From when on the run is unreliable, and why; None where it is not."""
-    if run.errors is None:
-        return None
+    if run.errors is None or run.screen is not None:
+        return None  # there is a screen only where both runs agree
     found: list[tuple[float, str]] = []
     if run.errors.parted is not None:
         found.append((run.errors.parted, "from there a finer run makes other transitions"))

@@ -20,6 +20,7 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.screen import Screen, screened
 
 
 @dataclass(eq=False)
@@ -74,8 +75,17 @@ class RunView:
             finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":
             return None
-        end = self.times[-1]
+        end = self.execution.times[-1]
         return Errors(self.execution, finer, float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(end)))
+
+    @cached_property
+    def screen(self) -> Screen | None:
+        """Where a compiled screen finds that a closer look is needed; None where there is none."""
+        return None if self.errors is None else screened(self.problem, self.execution, self.errors.finer)
+
+    def doubts(self, *words: str) -> bool:
+        """Whether a closer look is needed at something that the screen names."""
+        return self.screen is None or self.screen.doubts(*words)
 
     @cached_property
     def sizes(self) -> dict[str, float]:
@@ -86,6 +96,20 @@ class RunView:
             for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
                 found[name] = max(found.get(name, 0.0), size)
         return found
+
+    def doubtful_flows(self, name: str) -> list[Arc]:
+        """Those of them that the screen leaves open."""
+        if self.screen is None:
+            return self.relied_flows
+        marked = self.screen.arcs(name)
+        return [arc for arc in self.relied_flows if arc.first in marked] if marked else []
+
+    def doubtful_transitions(self, mark: int) -> list[Transition]:
+        """The transitions that the screen leaves open."""
+        if self.screen is None:
+            return self.relied_transitions
+        marked = np.flatnonzero(self.screen.marked("crossing") & mark).tolist()
+        return [self.transitions[index] for index in marked]
 
     @property
     def relied_flows(self) -> list[Arc]:

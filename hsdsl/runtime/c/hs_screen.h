@@ -1,0 +1,102 @@
+/* What a caller gives to have a recorded run screened for its verdict, and what it gets: see screen.c.
+
+   A routine is given as operations on registers: time, the states, the data that routines are bound to, constants, then
+   one register for each operation. Those that depend on data alone come first. */
+
+#ifndef HS_SCREEN_H
+#define HS_SCREEN_H
+
+#include "hs_simulate.h"
+
+typedef enum {
+  HS_ADD,
+  HS_SUB,
+  HS_MUL,
+  HS_DIV,
+  HS_NEG,
+  HS_SQUARE,
+  HS_POWER, /* of a whole exponent: b */
+  HS_ABS,
+  HS_MIN,
+  HS_MAX,
+  HS_SQRT,
+  HS_EXP,
+  HS_LOG,
+  HS_SIN,
+  HS_COS,
+  HS_TANH,
+  HS_ATAN,
+  HS_SIGN,
+  HS_FLOOR,
+  HS_UNKNOWN /* of which nothing is concluded */
+} hs_operator;
+
+typedef struct {
+  int32_t kind, a, b; /* registers */
+} hs_operation;
+
+/* Operations from `first` up to `last`, and the registers of the results. */
+typedef struct {
+  int32_t first, last;
+  const int32_t *result;
+} hs_formula;
+
+typedef struct {
+  int32_t constants, fixed, operations; /* how many; the fixed ones come first */
+  int32_t affine; /* whether the flow is a polynomial of degree 1 in time and states */
+  int32_t steep;  /* whether the flow has functions whose slope has no bound */
+  int32_t jumps;  /* whether it has some that jump */
+  const double *constant; /* least and largest value of each */
+  const hs_operation *operation;
+  hs_formula flow, surfaces;
+  const hs_formula *rate;  /* of each surface */
+  const int32_t *keeps;   /* (edge, states): whether a reset to the mode itself leaves a state as it is; else 0 */
+  const int32_t *jumping; /* (edge): whether its reset has functions that jump */
+} hs_formulas;
+
+/* The columns of a run; see hs_pack. A row's piece leaves it. */
+typedef struct {
+  int64_t rows, arcs, transitions;
+  int32_t width, degree;
+  const double *times, *values, *pieces;
+  const hs_arc *arc;
+  const hs_transition *transition;
+  const double *before, *after; /* (transitions, model->width) */
+} hs_record;
+
+/* Where something may be that only a closer look can tell, one bit each; HS_APART: everything. */
+typedef enum {
+  HS_APART,
+  HS_ACCUMULATION,
+  HS_CROSSING,
+  HS_CHOICE,
+  HS_LANDING,
+  HS_TURNING,
+  HS_TRANSPARENT,
+  HS_NEAREST,
+  HS_ENDING,
+  HS_FLOW_CHANGE
+} hs_doubt;
+
+typedef struct {
+  const hs_model *model;
+  const hs_timeline *timeline;
+  const hs_formulas *formulas; /* of each mode */
+  hs_record run, finer;
+  double until, relaxation, tolerance;
+  int32_t taylor;           /* whether pieces are Taylor polynomials */
+  double *workspace;        /* hs_screen_room() numbers */
+  int32_t *crossing;        /* (transition): not 0 where a closer look is needed */
+  int32_t *landing, *ending; /* (arc), likewise */
+  int32_t *turning, *changing; /* (row): of the step that begins there */
+  int32_t doubts;
+  int64_t crossed;          /* transitions that the flow made; of these: */
+  double slowest, least;    /* rate, and how often the error fits into what keeps a crossing */
+  double margin, missed;    /* the nearest miss: how often the error fits, and when; infinite for none */
+  int32_t missed_mode, missed_surface;
+} hs_screen;
+
+HS_EXPORT int64_t hs_screen_room(const hs_screen *screen);
+HS_EXPORT void hs_look(hs_screen *screen);
+
+#endif

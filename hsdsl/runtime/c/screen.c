@@ -1,0 +1,147 @@
+/* What a closer look at a recorded run need not look at. See hsdsl/simulate/verdict.
+
+   Every hypothesis of the theorem is looked at once, in one pass over rows, arcs and transitions. What surely has no
+   finding is left out; where that is not sure, a doubt is noted and the place is marked. */
+
+#include "screen_view.h"
+
+#include "screen_errors.c"
+#include "screen_places.c"
+#include "screen_steps.c"
+
+/* Whether more than FREE transitions have little flow between them. */
+static int crowded_anywhere(const hs_screen *s) {
+  const hs_transition *made = s->run.transition;
+  double flown = 0.0, before[FREE + 1] = {0.0};
+  for (int64_t k = 1; k < s->run.transitions; k++) {
+    flown += made[k].time - resumed(&made[k - 1]);
+    if (k >= FREE && !(flown - before[k % FREE] > s->relaxation)) return 1;
+    before[k % FREE] = flown;
+  }
+  return 0;
+}
+
+/* Look at one arc of flow. */
+static void look_at_arc(hs_view *v) {
+  hs_screen *const s = v->s;
+  const hs_arc *arc = &s->run.arc[v->arc];
+  const int64_t jump = arc->jump;
+  const double shift =
+      jump ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
+  const int flown = takes_time(&s->run, v->arc);
+  int known = 0;
+  if (s->model->mode[arc->mode].final) return;
+  bind(v, arc->mode, segment_at(s->timeline, s->run.times[arc->first]));
+  v->last = last_row(&s->run, v->arc);
+  v->crossed = crossed_at_end(v);
+  if (flown && v->f->jumps) s->doubts |= DOUBT(HS_FLOW_CHANGE);
+  for (int64_t row = arc->first; row <= v->last; row++) {
+    reach_row(v, row, jump, shift);
+    if (row == arc->first && flown) s->landing[v->arc] = lands_close(v);
+    if (row > arc->first && flown) look_at_step(v, row - 1, &known);
+  }
+  if (s->landing[v->arc]) s->doubts |= DOUBT(HS_LANDING);
+  if (flown && (s->ending[v->arc] = ends_close(v, 0))) s->doubts |= DOUBT(HS_ENDING);
+  const int leaves = v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump;
+  if (leaves && jump < s->run.transitions && !s->run.transition[jump].entry) look_at_crossing(v, jump, flown);
+}
+
+/* Whether a transition within the error of the end is undecided; the view is at the last arc. */
+static int undecided_end(hs_view *v) {
+  const hs_screen *s = v->s;
+  const int64_t count = s->run.transitions;
+  const double end = s->run.times[s->run.rows - 1], length = end - s->run.times[0];
+  v->last = s->run.rows - 1;
+  v->crossed = -1;
+  bind(v, s->run.arc[v->arc].mode, segment_at(s->timeline, end));
+  if (!v->table->final && takes_time(&s->run, v->arc) && ends_close(v, 1)) return 1;
+  if (!count) return 0;
+  const double last = s->run.transition[count - 1].time;
+  return end - last < SAFE * (late_by(v, last) + s->tolerance * length);
+}
+
+static void look_at_all(hs_view *v) {
+  hs_screen *const s = v->s;
+  const hs_transition *made = s->run.transition;
+  for (v->arc = 0; v->arc < s->run.arcs; v->arc++)
+    if (s->run.arc[v->arc].first <= last_row(&s->run, v->arc)) look_at_arc(v);
+  v->arc = s->run.arcs - 1;
+  if (undecided_end(v)) s->doubts |= DOUBT(HS_ENDING);
+  for (int64_t j = 0; j < s->run.transitions; j++) {
+    if (made[j].alternatives) s->doubts |= DOUBT(HS_CHOICE);
+    if (jumps_close(v, &made[j])) s->crossing[j] |= LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
+  }
+  for (int i = 0; i < s->model->modes; i++) {
+    const hs_near_miss *const each = &v->nearest[i];
+    if (!(each->margin < INFINITY && each->start == each->start)) continue;
+    if (each->surface < s->model->mode[i].edges && s->model->mode[i].edge[each->surface].conditional)
+      s->doubts |= DOUBT(HS_NEAREST);
+    if (s->missed_mode < 0 || each->start < s->margin)
+      s->margin = each->start, s->missed = each->middle, s->missed_mode = i, s->missed_surface = each->surface;
+  }
+}
+
+static hs_view make_view(hs_screen *s, hs_store *store) {
+  const hs_model *model = s->model;
+  const int w = model->width, m = model->surfaces > 0 ? model->surfaces : 1, d = s->run.degree;
+  int registers = 0;
+  for (int i = 0; i < model->modes; i++) {
+    const int own = 1 + model->mode[i].dimension + model->data + s->formulas[i].constants + s->formulas[i].operations;
+    registers = own > registers ? own : registers;
+  }
+  hs_view v = {.s = s, .mode = -1};
+  v.error = numbers(store, model->states);
+  v.size = numbers(store, model->states);
+  v.floor = numbers(store, 2 * (int64_t)model->states);
+  v.late = numbers(store, s->run.transitions);
+  double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
+                       &v.at_start, &v.at_end, 0};
+  for (double ***each = states; *each; each++) **each = numbers(store, w);
+  for (double ***each = of_surfaces; *each; each++) **each = numbers(store, m);
+  v.gradient = numbers(store, w + 1);
+  v.matrix = numbers(store, (int64_t)(d + 1) * (d + 1));
+  v.bernstein = numbers(store, (int64_t)(LEVELS + 1) * (d + 1) * w);
+  v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
+  v.enough = numbers(store, w);
+  v.unseen = take(store, (int64_t)(LEVELS + 2) * w, sizeof(int));
+  v.range = take(store, registers, sizeof(hs_range));
+  v.disc = take(store, registers, sizeof(hs_disc));
+  v.nearest = take(store, model->modes, sizeof(hs_near_miss));
+  return v;
+}
+
+int64_t hs_screen_room(const hs_screen *screen) {
+  hs_store store = {0, 0};
+  hs_screen sizes = *screen;
+  make_view(&sizes, &store);
+  return store.used;
+}
+
+/* From powers to Bernstein coefficients: C(k, l)/C(d, l). */
+static void fill_matrix(double *matrix, int d) {
+  for (int k = 0; k <= d; k++) {
+    matrix[k * (d + 1)] = 1.0;
+    for (int l = 1; l <= d; l++)
+      matrix[k * (d + 1) + l] = matrix[k * (d + 1) + l - 1] * (k - l + 1) / (d - l + 1);
+  }
+}
+
+void hs_look(hs_screen *s) {
+  hs_store store = {s->workspace, 0};
+  hs_view v = make_view(s, &store);
+  s->doubts = 0;
+  s->crossed = 0;
+  s->missed_mode = -1;
+  s->slowest = s->least = s->margin = INFINITY;
+  for (int i = 0; i < s->model->states; i++) v.error[i] = v.size[i] = 0.0;
+  for (int i = 0; i < s->model->modes; i++) v.nearest[i].margin = INFINITY;
+  for (int64_t j = 0; j < s->run.transitions; j++) s->crossing[j] = 0;
+  for (int64_t i = 0; i < s->run.arcs; i++) s->landing[i] = s->ending[i] = 0;
+  for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
+  fill_matrix(v.matrix, s->run.degree);
+  const int apart = !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
+  if (apart) s->doubts = DOUBT(HS_APART);
+  else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);
+  else look_at_all(&v);
+  if (outgrown(&v)) s->doubts |= DOUBT(HS_APART);
+}

@@ -1,0 +1,135 @@
+/* Where a recorded run crosses surfaces, and where its arcs begin and end. See hsdsl/simulate/verdict: crossings,
+   landings, endings. */
+
+#include "screen_view.h"
+
+typedef struct {
+  double value, rate, noise, shift;
+} hs_judged;
+
+/* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
+static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
+  double *const g = v->gradient;
+  if (v->table->gradients[k](v->p, t, x, g) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
+  double total = v->magnitudes[k] + fabs(g[0]) * fabs(t);
+  for (int i = 0; i < v->n; i++) total += fabs(g[i + 1]) * fabs(x[i]);
+  found->value = v->values[k];
+  found->noise = ROUNDOFF_UNITS * HS_UNIT * total;
+  found->shift = shift_by(v, t, g);
+  return !hs_finite(found->value + found->noise + found->shift + found->rate);
+}
+
+static int evaluate_surfaces(hs_view *v, double t, const double *x) {
+  return v->table->values(v->p, t, x, v->values) || v->table->magnitudes(v->p, t, x, v->magnitudes);
+}
+
+/* Below this the rate of a surface counts as zero; its gradient is the one last judged. */
+static double rate_noise(const hs_view *v) {
+  double total = fabs(v->gradient[0]);
+  for (int i = 0; i < v->n; i++) total += fabs(v->gradient[i + 1] * v->slope[i]);
+  return TANGENT_UNITS * HS_UNIT * total;
+}
+
+/* Whether the reset of edge k leaves its own surface as it is. */
+static int untouched(const hs_view *v, int k) {
+  const int32_t *const keeps = v->f->keeps + (int64_t)k * v->n;
+  for (int i = 0; i < v->n; i++)
+    if (v->gradient[i + 1] != 0.0 && !keeps[i]) return 0;
+  return v->table->affine;
+}
+
+/* Whether an arc begins on, or within the error of, a surface. */
+static int lands_close(hs_view *v) {
+  const hs_record *run = &v->s->run;
+  const hs_arc *arc = &run->arc[v->arc];
+  const double t = run->times[arc->first], *x = recorded_row(run, arc->first);
+  if (evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope)) return 1;
+  for (int k = 0; k < v->table->surfaces; k++) {
+    hs_judged found;
+    if (judge_surface(v, k, t, x, &found)) return 1;
+    if (arc->first == 0 && fabs(found.value) <= found.noise) return 1;
+    if (arc->jump == 0 || fabs(found.value) > SAFE * found.shift + found.noise) continue;
+    const int conditional = k < v->table->edges && v->table->edge[k].conditional;
+    if (found.rate > rate_noise(v) && !conditional) continue;
+    const hs_transition *made = &run->transition[arc->jump - 1];
+    if (made->mode != v->mode || made->edge != k || !untouched(v, k)) return 1;
+  }
+  return 0;
+}
+
+/* The edge whose transition ends the arc, or -1: else it ends where an input jumps, or with the run. */
+static int crossed_at_end(const hs_view *v) {
+  const hs_record *run = &v->s->run;
+  const int64_t jump = run->arc[v->arc].jump;
+  if (jump >= run->transitions) return -1;
+  const hs_transition *made = &run->transition[jump];
+  return made->time > run->times[v->last] + tie_of(v->s, made->time) ? -1 : made->edge;
+}
+
+/* Whether other surfaces are about to be reached where the arc ends. */
+static int ends_close(hs_view *v, int all) {
+  const hs_screen *s = v->s;
+  const double t = s->run.times[v->last], *x = recorded_row(&s->run, v->last);
+  const int64_t step = v->segment, there = segment_at(s->timeline, t);
+  if (v->crossed < 0 && !all && (t >= s->until || !s->timeline->jump[there])) return 0;
+  if (v->crossed >= 0 || all) bind(v, v->mode, there);
+  int close = evaluate_surfaces(v, t, x);
+  for (int k = 0; k < v->table->surfaces && !close; k++) {
+    hs_judged found;
+    if (k == v->crossed) continue;
+    close = judge_surface(v, k, t, x, &found) ||
+            (found.rate > 0 && (all || found.value <= found.noise) && fabs(found.value) <= SAFE * found.shift);
+  }
+  bind(v, v->mode, step);
+  return close;
+}
+
+/* Whether an input or a reset may jump within the error of a transition. */
+static int jumps_close(const hs_view *v, const hs_transition *made) {
+  const hs_timeline *const timeline = v->s->timeline;
+  const double late = SAFE * late_by(v, made->time);
+  const int64_t here = segment_at(timeline, made->time);
+  if (timeline->jump[here] && fabs(timeline->start[here] - made->time) <= late) return 1;
+  if (timeline->end[here] < v->s->until && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late)
+    return 1;
+  return v->s->formulas[made->mode].jumping[made->edge];
+}
+
+enum { LOOK_AT_CROSSING = 1, LOOK_AT_RESET = 2 };
+
+/* How often the error fits into what keeps a crossing, at the end of the arc. */
+static void look_at_crossing(hs_view *v, int64_t j, int flown) {
+  hs_screen *const s = v->s;
+  const hs_transition *made = &s->run.transition[j];
+  const double t = made->time, *x = s->run.before + j * s->model->width;
+  const int64_t step = v->segment, row = v->last - 1;
+  hs_judged found;
+  double bend = 0.0, rate;
+  bind(v, v->mode, segment_at(s->timeline, t));
+  s->crossed++;
+  int bad = evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope) ||
+            judge_surface(v, made->edge, t, x, &found);
+  if (!bad) {
+    int flat = 1;
+    for (int i = 0; i <= v->n; i++) flat &= v->gradient[i] == 0.0;
+    if (flat || !(found.rate > rate_noise(v)) || v->table->edge[made->edge].conditional)
+      s->crossing[j] |= LOOK_AT_CROSSING;
+    if (flown) {
+      const double begin = s->run.times[row], middle = begin + (s->run.times[v->last] - begin) / 2;
+      bind(v, v->mode, segment_at(s->timeline, middle));
+      along_step(v, &s->run, row, 0.5, v->z);
+      bad = v->table->rates[made->edge](v->p, middle, v->z, &rate);
+      if (!bad && t > middle) bend = fabs(found.rate - rate) / (t - middle);
+    }
+  }
+  bind(v, v->mode, step);
+  if (bad) {
+    s->doubts |= DOUBT(HS_CROSSING);
+    return;
+  }
+  const double depth = bend > 0 ? found.rate * found.rate / (2 * bend) : INFINITY;
+  const double margin = found.shift > 0 ? depth / found.shift : INFINITY;
+  if (!(margin >= SAFE)) s->crossing[j] |= LOOK_AT_CROSSING;
+  s->slowest = hs_min(s->slowest, found.rate);
+  s->least = hs_min(s->least, margin);
+}

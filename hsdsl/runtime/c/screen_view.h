@@ -1,0 +1,113 @@
+/* A recorded run while it is screened: the mode that is looked at, its routines, and what is known so far. */
+
+#ifndef HS_SCREEN_VIEW_H
+#define HS_SCREEN_VIEW_H
+
+#include "ranges.c"
+
+#define DOUBT(at) (1 << (at))
+#define SAFE 10             /* margins below so many errors are named */
+#define ROUNDOFF_SHARE 64   /* units of round-off of a state's size: no error is smaller */
+#define TANGENT_UNITS 64
+#define CUTTING 0x1p-48     /* of the largest coefficient: what cutting and changing the basis may add */
+#define LEVELS 10           /* a step is cut in halves */
+#define END_LEVELS 6        /* the part at its end, where a surface is crossed */
+#define MOST_LOOKS 128      /* at parts of one step */
+#define RESOLVED 8          /* changes of a flow smaller than this share of what its step shows are seen */
+#define PLACES 64           /* of a mode where the round-off of its flow is looked at */
+#define LEAST_SIZE 1.25     /* of discs around a step */
+#define ROUNDS 48           /* of closing in on a turning point */
+
+typedef struct {
+  double margin, start, middle;
+  int64_t row, segment;
+  int surface;
+} hs_near_miss;
+
+typedef struct {
+  hs_screen *s;
+  const hs_mode *table;
+  const hs_formulas *f;
+  const double *p;
+  int64_t segment, arc, last, fine_row, fine_arc;
+  int mode, n, crossed;
+  double *error, *size, *floor, *late; /* of all states; of each transition */
+  double *own;                        /* how wrong the states of the mode are */
+  double *x, *y, *z, *gradient, *slope, *values, *magnitudes, *at_start, *at_end;
+  double *matrix, *bernstein;
+  double *enough;
+  int *open, *unseen;
+  hs_range *range;
+  hs_disc *disc;
+  hs_near_miss *nearest; /* of each mode */
+  int looks;
+} hs_view;
+
+static const double *recorded_piece(const hs_record *run, int64_t row) {
+  return run->pieces + row * run->degree * run->width;
+}
+static const double *recorded_row(const hs_record *run, int64_t row) { return run->values + row * run->width; }
+
+/* The polynomial of the step from a row at a share of it. */
+static void along_step(const hs_view *v, const hs_record *run, int64_t row, double share, double *to) {
+  const double *c = recorded_piece(run, row), *x = recorded_row(run, row);
+  const int w = run->width;
+  for (int i = 0; i < v->n; i++) {
+    double y = c[(run->degree - 1) * w + i];
+    for (int k = run->degree - 2; k >= 0; k--) y = c[k * w + i] + share * y;
+    to[i] = x[i] + share * y;
+  }
+}
+
+static int first_register(const hs_view *v) { return 1 + v->n + v->s->model->data + v->f->constants; }
+
+/* Put data and constants into registers, and carry out what depends on them alone. */
+static void bind_formulas(hs_view *v) {
+  const int base = first_register(v), data = 1 + v->n, constants = data + v->s->model->data;
+  for (int i = data; i < base; i++) {
+    const double *const c = v->f->constant + 2 * (i - constants);
+    const hs_range value = {i < constants ? v->p[i - data] : c[0], i < constants ? v->p[i - data] : c[1]};
+    v->range[i] = value;
+    v->disc[i] = disc((value.low + value.high) / 2, 0.0);
+  }
+  range_operations(v->f, 0, v->f->fixed, base, v->range);
+  disc_operations(v->f, 0, v->f->fixed, base, v->disc);
+}
+
+static void bind(hs_view *v, int mode, int64_t segment) {
+  if (v->mode == mode && v->segment == segment) return;
+  v->mode = mode, v->segment = segment;
+  v->table = &v->s->model->mode[mode];
+  v->f = &v->s->formulas[mode];
+  v->n = v->table->dimension;
+  v->p = v->s->timeline->data + segment * v->s->model->data;
+  bind_formulas(v);
+}
+
+static int64_t last_row(const hs_record *run, int64_t arc) {
+  return arc + 1 < run->arcs ? run->arc[arc + 1].first - 1 : run->rows - 1;
+}
+
+static int takes_time(const hs_record *run, int64_t arc) {
+  const int64_t last = last_row(run, arc);
+  return run->arc[arc].first <= last && run->times[last] > run->times[run->arc[arc].first];
+}
+
+static double tie_of(const hs_screen *s, double t) { return HS_TIE * hs_max(s->until, fabs(t)); }
+
+/* How wrong the time is of what happens at a time. */
+static double late_by(const hs_view *v, double t) {
+  const hs_screen *s = v->s;
+  const double tie = tie_of(s, s->run.times[s->run.rows - 1]);
+  int64_t low = 0, high = s->run.transitions;
+  while (low < high) {
+    const int64_t middle = (low + high) / 2;
+    if (s->run.transition[middle].time <= t + tie) low = middle + 1;
+    else high = middle;
+  }
+  return low ? v->late[low - 1] : tie;
+}
+
+static double resumed(const hs_transition *made) { return made->resumed == made->resumed ? made->resumed : made->time; }
+
+#endif

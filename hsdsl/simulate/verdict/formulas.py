@@ -1,0 +1,219 @@
+"""Routines as operations on registers, for the compiled screen (``hs_screen.h``): one list for each mode.
+
+Registers hold time, the states, data, constants and then the result of each operation. Operations on data alone come
+first. Of a function that the screen does not know nothing is concluded.
+"""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import math
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.program import JUMPS, ModeProgram, Program
+from hsdsl.runtime import structures
+
+CONSTANT = re.compile(r"q_(m?)(\d+)_(\d+)")
+STEEP = re.compile(r"\b(?:sqrt|asin|acos|acosh)\(|\*\* *(?:\(|[a-zA-Z_]|\d*\.|\d+/)")
+SIGNS: Mapping[type[ast.operator], str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
+PLAIN = ("abs", "sqrt", "exp", "log", "sin", "cos", "tanh", "atan", "sign", "floor")
+MOST_POWER = 1 << 20
+
+
+class Node(NamedTuple):
+    """A value: where it comes from, its number there, and its degree as a polynomial in time and the states."""
+
+    source: str
+    number: int
+    degree: float
+
+
+class Tape:
+    """The operations of one mode, while they are collected."""
+
+    def __init__(self, states: int, data: Sequence[str]) -> None:
+        self.names = {"t": Node("state", 0, 1)} | {f"x{i}": Node("state", i + 1, 1) for i in range(states)}
+        self.names |= {name: Node("data", i, 0) for i, name in enumerate(data)}
+        self.constants: dict[tuple[float, float], Node] = {}
+        self.fixed: list[tuple[str, Node, Node | int]] = []
+        self.moving: list[tuple[str, Node, Node | int]] = []
+        self._known: dict[tuple[str, Node, Node | int], Node] = {}
+
+    def formula(self, definition: ast.FunctionDef) -> tuple[int, int, list[Node]]:
+        """Collect one routine: its first operation, the one behind its last, and its results."""
+        self._known = {key: node for key, node in self._known.items() if node.source == "fixed"}
+        names, first, results = dict(self.names), len(self.moving), list[Node]()
+        for statement in definition.body:
+            match statement:
+                case ast.Assign(value=ast.Subscript()):
+                    pass  # a datum under its own name
+                case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                    names[name] = self._node(value, names)
+                case ast.Return(value=ast.Tuple(elts=elements)):
+                    results = [self._node(element, names) for element in elements]
+                case _:
+                    raise ValueError(f"no statement of a routine: {ast.unparse(statement)}")
+        return first, len(self.moving), results
+
+    def _node(self, tree: ast.expr, names: dict[str, Node]) -> Node:
+        match tree:
+            case ast.Name(id=name):
+                return names[name] if name in names else self._constant(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self._made("neg", self._node(operand, names))
+            case ast.BinOp(left=left, op=sign, right=right) if type(sign) in SIGNS:
+                one, other = self._node(left, names), self._node(right, names)
+                if isinstance(sign, ast.Mult) and one == other:
+                    return self._made("square", one)
+                return self._made(SIGNS[type(sign)], one, other)
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                return self._called(name, arguments, names)
+            case _:
+                return self._unknown()
+
+    def _called(self, name: str, arguments: list[ast.expr], names: dict[str, Node]) -> Node:
+        if name == "pow":
+            return self._power(*arguments, names=names)
+        nodes = [self._node(argument, names) for argument in arguments]
+        if name in PLAIN:
+            return self._made(name, nodes[0])
+        if name in ("min", "max"):
+            return reduce(lambda one, other: self._made(name, one, other), nodes)
+        if name == "tan":
+            return self._made("div", self._made("sin", nodes[0]), self._made("cos", nodes[0]))
+        if name == "heaviside":
+            half, one = self._kept(0.5, 0.5), self._kept(1.0, 1.0)
+            return self._made("mul", half, self._made("add", one, self._made("sign", nodes[0])))
+        return self._unknown()
+
+    def _power(self, base: ast.expr, exponent: ast.expr, *, names: dict[str, Node]) -> Node:
+        found = CONSTANT.fullmatch(exponent.id) if isinstance(exponent, ast.Name) else None
+        whole = int(found[2]) if found and not found[1] and found[3] == "1" else 0
+        return self._made("power", self._node(base, names), whole) if 0 < whole < MOST_POWER else self._unknown()
+
+    def _constant(self, name: str) -> Node:
+        if found := CONSTANT.fullmatch(name):
+            exact = Fraction(int(found[2]) * (-1 if found[1] else 1), int(found[3]))
+            if abs(exact) > sys.float_info.max:
+                return self._unknown()
+            nearest = float(exact)
+            return self._kept(nearest, nearest) if Fraction(nearest) == exact else self._around(nearest)
+        nearest = FLOAT64.functions.get(name)
+        if isinstance(nearest, float) and math.isfinite(nearest):
+            return self._around(nearest)
+        return self._unknown()
+
+    def _around(self, nearest: float) -> Node:
+        return self._kept(math.nextafter(nearest, -math.inf), math.nextafter(nearest, math.inf))
+
+    def _kept(self, low: float, high: float) -> Node:
+        return self.constants.setdefault((low, high), Node("constant", len(self.constants), 0))
+
+    def _unknown(self) -> Node:
+        """Give what may be anything; its operand does not matter."""
+        return self._made("unknown", self.names["t"])
+
+    def _made(self, kind: str, one: Node, other: Node | int = 0) -> Node:
+        key = kind, one, other
+        if key not in self._known:
+            nodes = [node for node in (one, other) if isinstance(node, Node)]
+            fixed = all(node.source in ("data", "constant", "fixed") for node in nodes)
+            operations = self.fixed if fixed else self.moving
+            operations.append(key)
+            made = Node("fixed" if fixed else "moving", len(operations) - 1, _degree(kind, one, other))
+            self._known[key] = made
+        return self._known[key]
+
+
+def _degree(kind: str, one: Node, other: Node | int) -> float:
+    degrees = one.degree, other.degree if isinstance(other, Node) else 0
+    if kind in ("add", "sub", "neg"):
+        return max(degrees)
+    if kind == "mul":
+        return sum(degrees)
+    if kind == "div" and degrees[1] == 0:
+        return degrees[0]
+    return 0 if max(degrees) == 0 and kind != "unknown" else math.inf
+
+
+class Compiled:
+    """All modes of a program as the screen takes them; ``table`` is their ``hs_formulas``."""
+
+    def __init__(self, program: Program) -> None:
+        self._kept: list[Any] = []
+        found = [self._mode(program, k, mode) for k, mode in enumerate(program.modes)]
+        self.table: Any = (structures.Formulas * len(found))(*found)
+
+    def _mode(self, program: Program, index: int, mode: ModeProgram) -> Any:
+        data = [f"p{i}" for i in range(len(program.parameters))]
+        data += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
+        data += [f"k{i}" for i in range(len(program.switches))]
+        tape, routines = Tape(len(mode.states), data), _definitions(mode.routines.source)
+        surfaces = len(mode.edges) + len(mode.walls)
+        names = ["flow", "surfaces", *(f"rate_{k}" for k in range(surfaces))]
+        formulas = [tape.formula(routines[name]) for name in names]
+        place = _placed(tape, 1 + len(mode.states) + len(data))
+        steps = [(structures.OPERATORS.index(kind), place(a), place(b)) for kind, a, b in (*tape.fixed, *tape.moving)]
+        flow, values, *rates = (self._formula(tape, place, formula) for formula in formulas)
+        jumping = [any(map(JUMPS.search, edge.reset_texts)) for edge in mode.edges]
+        keeps = [_keeps(mode, index, k) for k in range(len(mode.edges))]
+        return structures.Formulas(
+            constants=len(tape.constants),
+            fixed=len(tape.fixed),
+            operations=len(steps),
+            affine=all(node.degree <= 1 for node in formulas[0][2]),
+            steep=any(map(STEEP.search, mode.flow_texts)),
+            jumps=mode.jumps,
+            constant=self._memory(np.array(list(tape.constants), np.float64)),
+            operation=self._memory(np.array(steps, np.int32)),
+            flow=flow,
+            surfaces=values,
+            rate=self._structures(rates),
+            keeps=self._memory(np.array(keeps, np.int32)),
+            jumping=self._memory(np.array(jumping, np.int32)),
+        )
+
+    def _memory(self, array: Any) -> int:
+        self._kept.append(array)
+        return array.ctypes.data
+
+    def _structures(self, rates: list[Any]) -> Any:
+        self._kept.append((structures.Formula * max(1, len(rates)))(*rates))
+        return ctypes.addressof(self._kept[-1])
+
+    def _formula(self, tape: Tape, place: Callable[[Any], int], formula: tuple[int, int, list[Node]]) -> Any:
+        first, last, results = formula
+        shift = len(tape.fixed)
+        return structures.Formula(first + shift, last + shift, self._memory(np.array([*map(place, results)], np.int32)))
+
+
+def _placed(tape: Tape, data_end: int) -> Callable[[Any], int]:
+    """The register of a node; a number is itself."""
+    starts = {"state": 0, "data": len(tape.names) - sum(n.source == "data" for n in tape.names.values())}
+    starts["constant"] = data_end
+    starts["fixed"] = data_end + len(tape.constants)
+    starts["moving"] = starts["fixed"] + len(tape.fixed)
+    return lambda node: starts[node.source] + node.number if isinstance(node, Node) else node
+
+
+def _definitions(source: str) -> dict[str, ast.FunctionDef]:
+    bind = ast.parse(source).body[0]
+    assert isinstance(bind, ast.FunctionDef)
+    return {each.name: each for each in bind.body if isinstance(each, ast.FunctionDef)}
+
+
+def _keeps(mode: ModeProgram, index: int, k: int) -> list[bool]:
+    """Say which states the reset of an edge to the mode itself leaves as they are."""
+    edge = mode.edges[k]
+    if edge.target != index:
+        return [False] * len(mode.states)
+    return [text == name for name, text in zip(mode.states, edge.reset_texts, strict=True)]

@@ -1,0 +1,119 @@
+"""A run screened in C (``hsdsl/runtime/c/screen.c``): where there is surely nothing to find, nobody looks again.
+
+The screen holds for compiled runs by `located` with a tolerance, which noted nothing, end as the finer run does, and
+make the same transitions. Of others there is none, and every hypothesis is looked at here.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hsdsl.execution import Array, Execution
+from hsdsl.program import ModeProgram
+from hsdsl.runtime import structures
+from hsdsl.runtime.kernel import runtime
+from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.finding import times
+from hsdsl.simulate.verdict.formulas import Compiled
+
+ENDED = ("until", "final")
+LOOK_AT_CROSSING, LOOK_AT_RESET = 1, 2
+DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
+
+
+class Screen:
+    """What the screen found of one run; ``table`` is its ``hs_screen``."""
+
+    def __init__(self, problem: Problem, run: Any, finer: Any) -> None:
+        plan = run.under_way.plan
+        model = plan.compiled
+        formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
+        records = [_record(each.columns) for each in (run, finer)]
+        self.table = table = structures.Screen(
+            model=ctypes.addressof(model.table),
+            timeline=plan.timeline,
+            formulas=ctypes.addressof(formulas.table),
+            run=records[0],
+            finer=records[1],
+            until=problem.settings.until,
+            relaxation=problem.settings.relaxation,
+            tolerance=problem.settings.tolerance,
+            taylor=problem.settings.method is not None and problem.settings.method.kind == "taylor",
+        )
+        rows, arcs, made = table.run.rows, table.run.arcs, table.run.transitions
+        self._ends = np.cumsum([0, made, arcs, arcs, rows, rows]).tolist()
+        self._marks = np.empty(self._ends[-1], np.int32)
+        start = self._marks.ctypes.data
+        table.crossing, table.landing, table.ending, table.turning, table.changing = (
+            start + 4 * end for end in self._ends[:-1]
+        )
+        library = runtime()
+        workspace = np.empty(library.hs_screen_room(ctypes.addressof(table)))
+        table.workspace = workspace.ctypes.data
+        library.hs_look(ctypes.addressof(table))
+        self._first = run.columns
+        self._modes: tuple[ModeProgram, ...] = problem.program.modes
+
+    def doubts(self, *words: str) -> bool:
+        """Whether a closer look is needed at any of these; without words, at anything."""
+        if not words:
+            return bool(self.table.doubts) or any(self._marks[: self._ends[1]])
+        return any(self.table.doubts & DOUBTS[word] for word in words)
+
+    def marked(self, name: str) -> Array:
+        """The marks of a column by transition, arc or row."""
+        place = ("crossing", "landing", "ending", "turning", "changing").index(name)
+        return self._marks[self._ends[place] : self._ends[place + 1]]
+
+    @cached_property
+    def first_rows(self) -> Array:
+        """The first row of each arc."""
+        return self._first["arc"]["first"]
+
+    def arcs(self, name: str) -> set[int]:
+        """The first rows of the arcs that are marked."""
+        return set(self.first_rows[self.marked(name) != 0].tolist())
+
+    @property
+    def crossings(self) -> tuple[int, float, float]:
+        """How many transitions the flow made, the least rate and the least margin."""
+        return self.table.crossed, self.table.slowest, self.table.least
+
+    @property
+    def nearest_miss(self) -> list[str]:
+        """The sentence on the turning point that comes closest to its surface."""
+        table = self.table
+        number: int = table.missed_mode
+        k: int = table.missed_surface
+        if number < 0:
+            return []
+        mode = self._modes[number]
+        edges = mode.edges
+        name = edges[k].name if k < len(edges) else f"the wall {mode.walls[k - len(edges)]} of {mode.name}"
+        return [f"the nearest miss is of {name} at t = {show(table.missed)}, by {times(table.margin)} the error"]
+
+
+def screened(problem: Problem, run: Execution, finer: Execution | None) -> Screen | None:
+    """Screen a run, where that can be done."""
+    if finer is None or problem.settings.scheme != "located" or problem.settings.tolerance is None:
+        return None
+    one, other = (each.__dict__.get("_of") for each in (run, finer))
+    if one is None or other is None or run.stop.reason not in ENDED or finer.stop.reason != run.stop.reason:
+        return None
+    if one.columns.made.notes or other.columns.made.notes or any(mode.slides for mode in problem.program.modes):
+        return None
+    screen = Screen(problem, one, other)
+    return None if screen.doubts("apart", "accumulation") else screen
+
+
+def _record(columns: Any) -> Any:
+    where, made = columns.where, columns.made
+    return structures.Record(
+        where.rows, where.arcs, made.transitions, where.width, where.degree, where.times, where.values, where.pieces,
+        where.arc, made.transition, made.before, made.after,
+    )  # fmt: skip

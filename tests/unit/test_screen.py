@@ -1,0 +1,119 @@
+"""The compiled screen of a verdict: what it leaves out has no finding, and what it encloses holds every value."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.simulate.verdict import run_view
+from hsdsl.simulate.verdict.screen import Screen, screened
+
+ROOT = Path(__file__).parents[2]
+MODELS = (
+    "models/bouncing-ball",
+    "models/oscillator-with-stop-1",
+    "models/oscillator-with-stop-2",
+    "models/pronking-runner",
+    "models/constrained-pendulum",
+    "tests/conformance/cases/m10-flow-ends-at-guard",
+    "tests/conformance/cases/m3-if-of-another-edge",
+    "tests/conformance/cases/m5-jump-onto-surface",
+    "tests/conformance/cases/m4-past-sizes",
+)
+
+
+def model(x: str, y: str, when: str = "x >= 100", until: float = 3) -> Any:
+    return hsdsl.loads(
+        f"""
+hsdsl: 1
+modes:
+  a:
+    flow:
+      x: {x}
+      y: {y}
+    transitions:
+      - when: {when}
+        to: b
+  b: {{flow: {{x: 0, y: 0}}}}
+initial: {{mode: a, x: 0, y: 1}}
+experiment: {{until: {until}, scheme: located}}
+"""
+    )
+
+
+def run_of(loaded: Any, method: str, tolerance: float) -> Any:
+    return loaded.simulate(scheme="located", method=method, tolerance=tolerance)
+
+
+def screen_of(run: Any) -> Screen:
+    screen = screened(run.__dict__["_of"].under_way.plan.problem, run, run.finer)
+    assert screen is not None
+    return screen
+
+
+FLOWS = {
+    "tangent": ("cos(t)", "0", "x >= 0.9999999"),
+    "near": ("y", "-x", "x >= 1 + 1e-8"),
+    "root": ("1", "-sqrt(y)", "x >= 2"),
+    "fast": ("y", "-x + exp(sin(3*t))", "x*y >= 1.2"),
+    "powers": ("y**3/10", "-x**3 - y/(2 + x**2)", "x + y**2 >= 1.4"),
+    "kinked": ("min(y, 0.7)", "-abs(x)", "max(x, y) >= 2"),
+    "logarithm": ("log(2 + y)", "-tanh(x)*tan(y/3)", "atan2(x, 3) >= 0.9"),
+    "pulse": ("exp(-((t - 1.7)/1e-3)**2)", "0", "x >= 2"),
+}
+UNSEEN = "a change of the flow of mode a may not have been seen"
+
+
+def both(loaded: Any, method: str, tolerance: float) -> tuple[Any, Any]:
+    """The verdict of a run, and that without a screen."""
+    found = run_of(loaded, method, tolerance).verdict
+    with patch.object(run_view, "screened", return_value=None):
+        return found, run_of(loaded, method, tolerance).verdict
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(("method", "tolerance"), [("taylor", 1e-9), ("dopri5", 1e-6)])
+def test_findings_are_the_same(name: str, method: str, tolerance: float) -> None:
+    found, expected = both(hsdsl.load(ROOT / f"{name}.yaml"), method, tolerance)
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", FLOWS)
+@pytest.mark.parametrize(("method", "tolerance"), [("taylor", 1e-9), ("dop853", 1e-7), ("radau", 1e-5)])
+def test_findings_of_small_flows_are_the_same(name: str, method: str, tolerance: float) -> None:
+    method = "dopri5" if name == "kinked" and method == "taylor" else method  # which refuses kinks
+    found, expected = both(model(*FLOWS[name]), method, tolerance)
+    assert found == expected
+
+
+def test_a_pulse_between_stages_is_found() -> None:
+    run = run_of(model(*FLOWS["pulse"]), "taylor", 1e-6)
+    assert screen_of(run).doubts("flow change")
+    assert any(reason.startswith(UNSEEN) for reason in run.verdict.reasons)
+
+
+def test_a_clear_run_has_no_doubts() -> None:
+    screen = screen_of(run_of(model("y", "-x + cos(2*t)"), "taylor", 1e-9))
+    assert not screen.doubts()
+    assert screen.crossings[0] == 0
+
+
+def test_a_far_turning_point_is_the_nearest_miss() -> None:
+    (sentence,) = screen_of(run_of(model("cos(t)", "0", "x >= 2"), "taylor", 1e-9)).nearest_miss
+    assert "t = 1.570796327" in sentence
+    assert "more than a million times" in sentence
+
+
+def test_a_screen_reads_no_further_than_its_columns() -> None:
+    run = run_of(model("cos(t)", "0", "x >= 0.5"), "taylor", 1e-9)
+    table = screen_of(run).table
+    assert table.run.rows == len(run.times)
+    assert table.run.transitions == len(run.transitions) == 1
+    before = (ctypes.c_double * 2).from_address(table.run.before)
+    assert np.array_equal(before, [run.transitions[0].before[name] for name in "xy"])
