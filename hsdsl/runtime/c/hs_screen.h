@@ -64,9 +64,9 @@ typedef struct {
   const double *before, *after; /* (transitions, model->width) */
 } hs_record;
 
-/* Where something may be that only a closer look can tell, one bit each; HS_APART: everything. */
+/* Where something may be that only a closer look can tell, one bit each; HS_PARTED: everything. */
 typedef enum {
-  HS_APART,
+  HS_PARTED,
   HS_ACCUMULATION,
   HS_CROSSING,
   HS_CHOICE,

@@ -140,8 +140,8 @@ void hs_look(hs_screen *s) {
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
   fill_matrix(v.matrix, s->run.degree);
   const int apart = !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
-  if (apart) s->doubts = DOUBT(HS_APART);
+  if (apart) s->doubts = DOUBT(HS_PARTED);
   else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);
   else look_at_all(&v);
-  if (outgrown(&v)) s->doubts |= DOUBT(HS_APART);
+  if (outgrown(&v)) s->doubts |= DOUBT(HS_PARTED);
 }

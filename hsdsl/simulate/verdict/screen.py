@@ -108,7 +108,7 @@ def screened(problem: Problem, run: Execution, finer: Execution | None) -> Scree
     if one.columns.made.notes or other.columns.made.notes or any(mode.slides for mode in problem.program.modes):
         return None
     screen = Screen(problem, one, other)
-    return None if screen.doubts("apart", "accumulation") else screen
+    return None if screen.doubts("parted", "accumulation") else screen
 
 
 def _record(columns: Any) -> Any:
