@@ -164,7 +164,11 @@ def _planned(
     arguments: dict[str, Any],
 ) -> Manifest:
     """The manifest of a sweep that is still to be measured."""
-    given = {name: value for name, value in arguments.items() if value not in (None, {})}
+    given = {
+        name: value
+        for name, value in arguments.items()
+        if value not in (None, {}) and (name, value) != ("engine", "auto")
+    }
     check_arguments(given, "a sweep", without=("samples", "precision"))
     fixed = {group: overrides_of(given, group) for group in ("parameters", "initial")}
     values = with_parameters(model.pipeline.values(FLOAT64), fixed["parameters"])

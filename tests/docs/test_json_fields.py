@@ -18,6 +18,7 @@ SPACEEX = str(ROOT / "tests" / "import" / "heater.xml")
 CALLS = [
     ["run", ROOM, "--estimate"],
     ["run", ROOM, "--out", "rows.csv", "--every", "9"],
+    ["sweep", ROOM, "--vary", "rate=0.1,0.2", "--out", "sweep", "--processes", "1"],
     ["validate", ROOM],
     ["lint", ROOM],
     ["explain", "HS401"],
