@@ -10,7 +10,9 @@ typedef struct {
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
 static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
   double *const g = v->gradient;
-  if (v->table->gradients[k](v->p, t, x, g) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
+  const hs_sparse *const row = &v->table->gradients[k];
+  if (row->values(v->p, t, x, g) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
+  hs_spread_out(row, v->n + 1, g);
   double total = v->magnitudes[k] + fabs(g[0]) * fabs(t);
   for (int i = 0; i < v->n; i++) total += fabs(g[i + 1]) * fabs(x[i]);
   found->value = v->values[k];
