@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from decimal import Decimal
 from typing import Any
 
 FLOAT_BITS = 53
+MOST_DIGITS = 20  # of a number in a formula
 
 
 def is_multiprecision(x: Any) -> bool:
@@ -60,3 +62,17 @@ def context_of(digits: int) -> Any:
     from hsdsl.arithmetic import multiprecision
 
     return multiprecision(digits).zero.context
+
+
+def short(p: int, q: int) -> tuple[str, int] | None:
+    """P/q as decimal digits and a power of ten, zero for usual sizes; None where the digits do not end, or are many."""
+    rest = q
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    digits = Decimal(p) / Decimal(q)
+    if rest != 1 or Decimal(digits) * q != p:
+        return None
+    written = f"{digits.normalize():E}" if not 1e-4 <= abs(p / q) < 1e6 else f"{digits.normalize():f}"
+    mantissa, _, exponent = written.partition("E")
+    return (mantissa, int(exponent or 0)) if len(written) <= MOST_DIGITS else None

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from hsdsl.errors import STEP_AND_TOLERANCE, Diagnostic, ModelError, UsageError
 from hsdsl.names import visible, visible_lines
+from hsdsl.progress import Text, ticking
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
-FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds of a progress display
-
-Text = Callable[[], str]
 
 
 class Visible:
@@ -117,24 +114,8 @@ def progress(quiet: bool = False) -> Generator[Callable[[Text], None] | None]:
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    latest: list[Text] = []
-    done = threading.Event()
-
-    def show() -> None:
-        wait = FIRST_SIGN
-        while not done.wait(wait):
-            wait = INTERVAL
-            if latest:
-                _draw(f"\r{visible(latest[-1]()[:100])}\x1b[K")
-
-    thread = threading.Thread(target=show, daemon=True)
-    thread.start()
-    try:
-        yield lambda text: latest.__setitem__(slice(None), [text])
-    finally:
-        done.set()
-        thread.join()
-        _draw("\r\x1b[K")
+    with ticking(lambda text: _draw("\r\x1b[K" if text is None else f"\r{visible(text[:100])}\x1b[K")) as show:
+        yield show
 
 
 def _draw(text: str) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Exit, Option
 
-from hsdsl.cli.console import Text, print_json, progress, say
+from hsdsl.cli.console import print_json, progress, say
 from hsdsl.cli.options import (
     AllowPath,
     CompletionName,
@@ -37,6 +36,7 @@ from hsdsl.cli.shown import needed, shown_of, write_film
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
 from hsdsl.names import did_you_mean, visible
+from hsdsl.progress import running
 
 if TYPE_CHECKING:
     from hsdsl.execution import Execution
@@ -94,7 +94,7 @@ def run(
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
         result: Any
         with progress(quiet or json) as show:
-            settings["watch"] = show and partial(_watch, show)
+            settings["watch"] = show and partial(running, show)
             if every is None:
                 result = loaded.simulate(**settings, outputs=needed(shown))
             elif out is None or plot or animate or estimate or precision is not None:
@@ -165,16 +165,6 @@ def _print_json(execution: Execution, names: list[str] | None, estimated: Any) -
         chosen = result["final"]["outputs"]
         result["final"]["outputs"] = {name: value for name, value in chosen.items() if name in names}
     print_json(result | ({} if estimated is None else {"estimate": estimated.as_json()}))
-
-
-def _watch(show: Callable[[Text], None], run: Any, width: int = 30) -> None:
-    """Show how far a run is."""
-
-    def bar() -> str:
-        share = min(1.0, float(run.now / run.until)) if run.until else 1.0
-        return f"[{'=' * round(width * share):{width}}] {share:4.0%}, {run.made} transitions"
-
-    show(bar)
 
 
 def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:

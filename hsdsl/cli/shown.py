@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.cli.console import Text, progress, say
+from hsdsl.cli.console import progress, say
 from hsdsl.errors import UsageError
+from hsdsl.progress import counted
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
@@ -45,11 +44,5 @@ def needed(shown: dict[str, Any]) -> list[str] | None:
 def write_film(model: Model, path: Path, speed: float | None, settings: dict[str, Any], quiet: bool) -> None:
     """Write the film."""
     with progress(quiet) as show:
-        watch = show and partial(_count, show)
-        model.animate(path, speed=speed, progress=watch, **(settings | {"watch": None}))
+        model.animate(path, speed=speed, progress=counted(show, "frames"), **(settings | {"watch": None}))
     say(f"wrote {path}")
-
-
-def _count(show: Callable[[Text], None], done: int, of: int) -> None:
-    """Show how far a film is."""
-    show(lambda: f"{done} of {of} frames")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
@@ -104,6 +105,34 @@ class Ensemble:
         counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
         how = f"{self.scheme} {self.method}, shape {self.shape}"
         return f"<Ensemble of {visible(self.model)}: {how}, stops: {counts or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        """Show what was varied, how the runs ended, and a picture in notebooks."""
+        from hsdsl.plot.notebook import ensemble_html
+
+        return ensemble_html(self)
+
+    def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
+        """Make a pandas DataFrame with a row for each run, each sample, or each transition.
+
+        Parameters
+        ----------
+        what : {"runs", "samples", "transitions"}
+            ``runs``: what was varied, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``, and
+            ``transition_0``, ... where times were kept. ``samples``: what was varied, ``time``, and values then.
+            ``transitions``: what was varied, ``time``, ``edge``, and ``before.NAME`` and ``after.NAME`` of each state.
+            A state or output of the name of another column is ``state.NAME`` or ``output.NAME``.
+
+        Returns
+        -------
+        DataFrame
+            Its index is the instance, by one number for each dimension of :attr:`shape`.
+
+        Raises UsageError: pandas is not installed, or the ensemble has kept no samples or transitions.
+        """
+        from hsdsl.execution.frames import frame
+
+        return frame(self, what)
 
     @property
     def reasons(self) -> dict[str, int]:

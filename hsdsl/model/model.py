@@ -19,6 +19,7 @@ from hsdsl.model.values import with_parameters
 from hsdsl.model.visible import visible_run
 from hsdsl.names import SINCE, did_you_mean, visible
 from hsdsl.program import Program
+from hsdsl.progress import counted, in_notebook, running
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
 
@@ -88,6 +89,12 @@ class Model:
     def __repr__(self) -> str:
         modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
         return f"<hsdsl model {visible(Path(self.program.path).name)}: modes {modes}>"
+
+    def _repr_html_(self) -> str:
+        """Show modes, equations and the graph of modes in notebooks."""
+        from hsdsl.report.model import model_html
+
+        return model_html(self.system, self.program)
 
     @property
     def system(self) -> HybridSystem:
@@ -178,7 +185,9 @@ class Model:
         if ready is None:
             ready = self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True)))
             self._prepared.keep(key, ready)
-        run = visible_run(ready.simulate(watch, self.pipeline.seconds), ready)
+        with in_notebook() as show:
+            run = ready.simulate(watch or (show and partial(running, show)), self.pipeline.seconds)
+        run = visible_run(run, ready)
         run.__dict__["differentiation"] = partial(self._differentiate, arguments)
         run.__dict__["look"] = partial(self.look, parameters)
         return run
@@ -305,7 +314,9 @@ class Model:
         """
         from hsdsl.model.nearby import orbital_stability
 
-        return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
+        with in_notebook() as show:
+            progress = progress or counted(show, "runs")
+            return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
 
     def fit(
         self,
@@ -339,7 +350,9 @@ class Model:
         """
         from hsdsl.model.fits import fit
 
-        return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
+        with in_notebook() as show:
+            progress = progress or (show and (lambda runs, _, squares: show(lambda: f"{runs} runs, {squares:.6g}")))
+            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
 
     def stream(
         self,
@@ -415,7 +428,9 @@ class Model:
         from hsdsl.model.ensemble import run_ensemble
 
         call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
-        return run_ensemble(self, call, samples, transition_times, threads, progress, every_transition)
+        with in_notebook() as show:
+            progress = progress or counted(show, "runs")
+            return run_ensemble(self, call, samples, transition_times, threads, progress, every_transition)
 
     def sweep(
         self,
@@ -466,7 +481,9 @@ class Model:
         """
         from hsdsl.model.sweeps import sweep
 
-        return sweep(self, vary, out, random, seed, record, outputs, cluster, processes, chunk, progress, arguments)
+        with in_notebook() as show:
+            progress = progress or counted(show, "rows")
+            return sweep(self, vary, out, random, seed, record, outputs, cluster, processes, chunk, progress, arguments)
 
     @cached_property
     def sliding(self) -> Model:
@@ -568,7 +585,9 @@ class Model:
 
         check(path)
         run = self._staged.simulate(**arguments)
-        animate(run, self.system.scene, path, speed, self.program.units.get("t"), progress)
+        with in_notebook() as show:
+            unit = self.program.units.get("t")
+            animate(run, self.system.scene, path, speed, unit, progress or counted(show, "frames"))
         return run
 
     def check_scene(self) -> None:

@@ -35,18 +35,29 @@ def mode_graph(program: Program, execution: Execution | None = None) -> str:
     """The graph and its table, as HTML; every text of the model is escaped. Without a run nothing is counted."""
     program = visited_part(program, execution)
     edges = [edge for mode in program.modes for edge in mode.edges]
+    picture = graph_of(program, execution)
+    return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, _counts(edges, program, execution))}" if picture else ""
+
+
+def graph_of(program: Program, execution: Execution | None = None) -> str:
+    """The graph alone; empty for a model without transitions, or one with too many modes for a picture."""
+    edges = [edge for mode in program.modes for edge in mode.edges]
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""
     names = [mode.name for mode in program.modes]
-    if execution is None:
-        picture = _picture(program, edges, [1] * len(edges), set(names), program.initial_mode)
-        return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, None)}"
-    made = Counter((t.source, t.edge) for t in execution.transitions)
-    numbers = [made[program.modes[edge.source].name, edge.name] for edge in edges]
-    visited = {arc.mode for arc in execution.arcs}
+    counts = _counts(edges, program, execution)
+    if execution is None or counts is None:
+        return _picture(program, edges, [1] * len(edges), set(names), program.initial_mode)
     first = names.index(execution.arcs[0].mode) if execution.arcs else program.initial_mode
-    picture = _picture(program, edges, numbers, visited, first)
-    return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, numbers)}"
+    return _picture(program, edges, counts, {arc.mode for arc in execution.arcs}, first)
+
+
+def _counts(edges: Sequence[EdgeProgram], program: Program, execution: Execution | None) -> list[int] | None:
+    """How often each transition was made; None without a run."""
+    if execution is None:
+        return None
+    made = Counter((t.source, t.edge) for t in execution.transitions)
+    return [made[program.modes[edge.source].name, edge.name] for edge in edges]
 
 
 def _picture(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int], visited: set[str], first: int) -> str:

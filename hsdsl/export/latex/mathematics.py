@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from decimal import Decimal
 from typing import Any
 
 from sympy.printing.latex import LatexPrinter
 
+from hsdsl import decimals
 from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
 from hsdsl.expression import plain
 from hsdsl.expression.scope import Function, symbol
@@ -17,7 +17,6 @@ from hsdsl.expression.scope import Function, symbol
 _SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
 _PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")
 _MOST_PARTS = 9  # of the unit that are written as a fraction: others as decimals, where those end
-_MOST_DIGITS = 20
 
 
 class Mathematics:
@@ -117,17 +116,8 @@ class _Printer(LatexPrinter):
 
 def _decimal(p: int, q: int) -> str | None:
     """P/q as a decimal, where that ends and is short."""
-    rest = q
-    for prime in (2, 5):
-        while rest % prime == 0:
-            rest //= prime
-    if rest != 1:
+    found = decimals.short(p, q)
+    if found is None:
         return None
-    digits = Decimal(p) / Decimal(q)
-    if Decimal(digits) * q != p:
-        return None
-    text = f"{digits.normalize():E}" if not 1e-4 <= abs(p / q) < 1e6 else f"{digits.normalize():f}"
-    if len(text) > _MOST_DIGITS:
-        return None
-    mantissa, _, exponent = text.partition("E")
-    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+    mantissa, exponent = found
+    return rf"{mantissa} \cdot 10^{{{exponent}}}" if exponent else mantissa

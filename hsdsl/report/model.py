@@ -1,0 +1,93 @@
+"""A model as notebooks display it: parameters, the graph of its modes, and their equations as MathML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from hsdsl.names import shown, visible, visible_lines
+from hsdsl.program import Program
+from hsdsl.report import mode_graph
+from hsdsl.report.mathml import Mathematics
+from hsdsl.system import Edge, HybridSystem, Mode
+
+MOST_MODES, MOST_OPEN, MOST_ROWS = 40, 4, 30  # modes that are shown; modes that are unfolded; rows of a table
+CSS = ".hsdsl summary { cursor: pointer } .hsdsl ul { margin: .2rem 0 } .hsdsl .modes { max-width: 60rem }"
+
+
+def model_html(system: HybridSystem, program: Program) -> str:
+    """Return the model in a ``div``; every text of the model is escaped, and nothing is fetched."""
+    math = Mathematics(_names(system))
+    count = f"{len(system.modes)} mode{'s' * (len(system.modes) != 1)}"
+    heading = f"<p><strong>{_said(system.title or system.path)}</strong><br>{count}, {_start(system, math)}</p>"
+    modes = [_mode(system, mode, math, len(system.modes) <= MOST_OPEN) for mode in system.modes[:MOST_MODES]]
+    left = len(system.modes) - MOST_MODES
+    more = [f"<p>{left} more modes</p>"] if left > 0 else []
+    parts = [heading, _parameters(system), _shared(system, math), mode_graph.graph_of(program), *modes, *more]
+    return f'<div class="hsdsl"><style>{mode_graph.CSS}{CSS}</style>{"".join(parts)}</div>'
+
+
+def _said(text: str) -> str:
+    return escape(visible_lines(text))
+
+
+def _names(system: HybridSystem) -> Iterable[str]:
+    yield from system.states
+    yield from (parameter.name for parameter in system.parameters)
+    yield from (given.name for given in system.inputs)
+    yield from (definition.name for definition in system.definitions)
+    yield from system.outputs
+
+
+def _start(system: HybridSystem, math: Mathematics) -> str:
+    initial, until = system.initial, math.value(system.experiment.until)
+    values = ", ".join(f"{_said(name)} = {math.value(value)}" for name, value in initial.values)
+    return f"starts in {_said(initial.mode)}{' at ' if values else ''}{values}, until {until}"
+
+
+def _parameters(system: HybridSystem) -> str:
+    rows = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters[:MOST_ROWS]]
+    left = len(system.parameters) - MOST_ROWS
+    rows += [(f"{left} more", "", "", "")] if left > 0 else []
+    return _table(("parameter", "value", "unit", "meaning"), rows)
+
+
+def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    used = [k for k in range(len(names)) if any(row[k] for row in rows)]
+    if not rows:
+        return ""
+    head = "".join(f"<th>{names[k]}</th>" for k in used)
+    body = "".join("<tr>" + "".join(f"<td>{_said(row[k])}</td>" for k in used) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _shared(system: HybridSystem, math: Mathematics) -> str:
+    """Inputs, and definitions of the whole model."""
+    inputs = [f"{_said(given.name)} is an input of {len(given.times)} samples" for given in system.inputs]
+    return _list([*inputs, *_definitions(system, None, math)])
+
+
+def _definitions(system: HybridSystem, mode: str | None, math: Mathematics) -> list[str]:
+    return [math.equation(math.name(d.name), d.text) for d in system.definitions if d.mode == mode][:MOST_ROWS]
+
+
+def _list(items: Sequence[str]) -> str:
+    return "<ul>" + "".join(f"<li>{item}</li>" for item in items) + "</ul>" if items else ""
+
+
+def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -> str:
+    flow = [math.derivative(name, text) for name, text in zip(mode.states, mode.flow_texts, strict=True)]
+    walls = [f"domain: {math.inequality(wall.text)}" for wall in mode.walls]
+    edges = [_edge(edge, math) for edge in mode.edges]
+    items = [*flow, *_definitions(system, mode.name, math), *walls, *edges]
+    name = f"{_said(shown(mode.name))}{' (final)' if mode.final else ''}"
+    opened = " open" if unfolded else ""
+    return f"<details{opened}><summary>mode <strong>{name}</strong></summary>{_list(items)}</details>"
+
+
+def _edge(edge: Edge, math: Mathematics) -> str:
+    condition = f" if {math.condition(edge.condition_text)}" if edge.condition_text else ""
+    resets = zip(edge.target_states, edge.reset_texts, strict=True)
+    changed = ", ".join(math.reset(name, text) for name, text in resets if text != name)
+    ends = f"<strong>{_said(edge.name)}</strong> to {_said(visible(edge.target))}"
+    return f"{ends} when {math.inequality(edge.surface.text)}{condition}{': ' if changed else ''}{changed}"

@@ -1,0 +1,273 @@
+"""What pictures of columns, pairs and several runs are made of: data of artists, text of pages, frames of films."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import hand_made
+import numpy as np
+import pytest
+from matplotlib import colors
+
+import hsdsl
+from hsdsl.errors import UsageError
+from hsdsl.execution import Stop
+from hsdsl.plot import View, plot
+from hsdsl.plot.animation import FPS, MOST, frame_times
+from hsdsl.plot.curves import curves
+from hsdsl.plot.figure import picture
+from hsdsl.plot.page import page, thinned
+from hsdsl.plot.shapes import Drawn, shapes_at
+from hsdsl.plot.style import fills, looks
+from hsdsl.system import Shape
+
+BALL = hand_made.bouncing_ball()
+LONG = "a_mode_with_a_very_long_name_"
+SCENE = """
+hsdsl: 1
+modes:
+  up: {flow: {x: 1, a: 2}, transitions: [{when: x >= 2, to: down}]}
+  down: {flow: {x: -1, a: 0}}
+scene:
+  - point: [x, 0]
+  - line: [[0, 0], [x, 1]]
+  - {circle: [x, 1], radius: 1/2}
+  - spring: [[0, 2], [x, 2]]
+  - {box: [x, 3], width: 2, height: 1, angle: a}
+initial: {mode: up, x: 0, a: 0}
+experiment: {until: 5}
+"""
+
+
+def modes(count: int, name: str = "mode"):
+    """A run through so many modes, each for one unit of time."""
+    draft = hand_made.Draft()
+    for k in range(count):
+        rows = [(float(k + s), [float(k + s), float(-k - s)], [], 0.0, []) for s in (0, 1)]
+        draft.arc(f"{name}{k}", ("x", "y"), k, rows)
+    return draft.make()
+
+
+def lines(axis):
+    """The curves of an axis, without markers and straight levels."""
+    return [drawn for drawn in axis.get_lines() if drawn.get_marker() == "None" and len(drawn.get_xdata()) > 2]
+
+
+def test_only_chosen_columns_have_panels_and_pairs_have_phase_plots():
+    figure = picture([BALL], View(columns=["v"], phases=[("v", "energy"), ("h", "v")]))
+    assert [axis.get_ylabel() for axis in figure.axes] == ["v", "energy", "v"]
+    assert [axis.get_xlabel() for axis in figure.axes] == ["time t", "v", "h"]
+    phase = figure.axes[2]
+    x, y = lines(phase)[0].get_data()
+    real = np.isfinite(x)
+    assert np.allclose(x[real], 2 - (y[real] ** 2) / 2, atol=1e-9) or np.nanmax(x) == 2  # the first flight is one curve
+    assert np.allclose((x + y**2 / 2)[: np.flatnonzero(~real)[0]], 2, atol=1e-12)  # with its energy
+
+
+@pytest.mark.parametrize("view", [{"columns": ["vv"]}, {"phases": [("h", "w")]}])
+def test_unknown_names_are_refused_before_a_file_is_there(view, tmp_path):
+    with pytest.raises(UsageError, match="no state or output is called"):
+        plot(BALL, tmp_path / "run.png", **view)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_labels_must_be_one_for_each_run():
+    with pytest.raises(UsageError, match="expected 2 labels, one for each run, got 1"):
+        picture([BALL, BALL], View(labels=["one"]))
+
+
+def test_several_runs_share_panels_and_each_has_a_ribbon():
+    other = hand_made.bouncing_ball(restitution="0.25")
+    figure = picture([BALL, other], View(columns=["h", "v"], labels=["half", "quarter"]))
+    h, v, ribbon, phase = figure.axes
+    for axis, name in ((h, "h"), (v, "v")):
+        for run, drawn in zip((BALL, other), lines(axis), strict=True):
+            x, y = drawn.get_data()
+            at = np.isfinite(y)
+            expected = np.concatenate([run.sample(x[at][:1])[name], run.sample(x[at][1:], "left")[name]])
+            jumps = np.isin(x[at], [made.time for made in run.transitions])
+            assert np.allclose(y[at][~jumps], expected[~jumps], atol=1e-9)
+    assert [text.get_text() for text in ribbon.get_yticklabels()] == ["half", "quarter"]
+    assert len(ribbon.collections) == 2 and len(lines(phase)) == 2
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:2] == ["half", "quarter"] and texts[2:] == list(dict.fromkeys(arc.mode for arc in BALL.arcs))
+
+
+def test_a_run_without_a_column_leaves_the_other_s():
+    figure = picture([BALL, hand_made.thermostat(3)], View(columns=["T", "h"]))
+    for axis in figure.axes[:2]:
+        assert sum(np.isfinite(drawn.get_ydata()).any() for drawn in lines(axis)) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8, 12])
+def test_lines_of_runs_differ_without_colours_too(count):
+    found = [(look["color"], str(look["linestyle"])) for look in looks(count)]
+    assert len(set(found)) == count and len({dashes for _, dashes in found}) == min(count, 4)
+
+
+def test_bands_of_eight_modes_differ_in_colour_or_hatch():
+    light = [(fill["facecolor"], fill.get("hatch")) for fill in fills([f"m{k}" for k in range(8)]).values()]
+    assert len({hatch for _, hatch in light[5:]}) == 3
+    pairs = [(a, b) for k, a in enumerate(light) for b in light[:k] if a[1] == b[1]]
+    assert min(np.abs(np.subtract(colors.to_rgb(a[0]), colors.to_rgb(b[0]))).max() for a, b in pairs) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("count", "name", "runs"), [(1, "m", 1), (8, LONG, 1), (8, LONG, 3), (20, "m", 1), (2, LONG, 3), (8, LONG * 3, 1)]
+)
+def test_legends_titles_and_panels_keep_off_each_other(count, name, runs):
+    title = "A title that goes on and on, beyond what one line of the whole picture has room for, " * 2
+    figure = picture([modes(count, name)] * runs, View(title=title))
+    figure.draw_without_rendering()
+    boxes = [legend.get_window_extent() for legend in figure.legends]
+    boxes += [figure._suptitle.get_window_extent()]
+    boxes += [axis.get_window_extent() for axis in figure.axes]
+    boxes += [axis.title.get_window_extent() for axis in figure.axes if axis.title.get_text()]
+    boxes += [axis._left_title.get_window_extent() for axis in figure.axes if axis._left_title.get_text()]
+    for k, box in enumerate(boxes):
+        assert not any(box.shrunk(0.999, 0.999).overlaps(other) for other in boxes[:k])
+        assert box.x0 >= 0 and box.x1 <= figure.bbox.width and box.y0 >= 0 and box.y1 <= figure.bbox.height
+
+
+def test_names_of_modes_keep_off_the_power_of_ten_of_an_axis():
+    run = modes(2)
+    tiny = replace(run, values=run.values * 1e-9)
+    figure = picture([tiny], View())
+    figure.draw_without_rendering()
+    axis = figure.axes[0]
+    power = axis.yaxis.get_offset_text()
+    assert power.get_text() and not any(power.get_window_extent().overlaps(t.get_window_extent()) for t in axis.texts)
+
+
+def test_long_labels_of_guards_leave_the_panel_its_width():
+    from hsdsl.plot import GuardLine
+
+    guards = [GuardLine(f"mode{k}", "x", 4.0, "a transition with a long name " * 3 + str(k)) for k in range(8)]
+    figure = picture([modes(8)], View(guards=guards))
+    figure.draw_without_rendering()
+    assert figure.axes[0].get_window_extent().width > figure.bbox.width / 3
+    assert any(text.get_text().endswith("more") for text in figure.axes[0].texts)
+
+
+def numbers(text, kind):
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def data_of(text):
+    found = dict(re.findall(r'<script type="application/json" id="(\w+)">(.*?)</script>', text))
+    return json.loads(found["model"]), json.loads(found["runs"])
+
+
+def test_a_page_has_the_numbers_of_its_runs():
+    other = hand_made.bouncing_ball(restitution="0.25")
+    model, runs = data_of(page([BALL, other], View(labels=["a", "b"], units={"h": "m"})))
+    assert (model["columns"], model["units"], model["phases"]) == (["h", "v", "energy"], {"h": "m"}, [["h", "v"]])
+    for run, drawn in zip((BALL, other), runs, strict=True):
+        times, h = numbers(drawn["times"], "<f8"), numbers(drawn["columns"][0], "<f8")
+        assert np.allclose(h, run.sample(times)["h"], atol=1e-9)
+        arc = numbers(drawn["arcOf"], "<i4")
+        start, end = (numbers(drawn["arcs"][key], "<f8")[arc] for key in ("start", "end"))
+        assert (times >= start).all() and (times <= end).all() and (np.diff(arc) >= 0).all()
+        assert [drawn["label"], drawn["failed"]] == [["a", "b"][run is other], False]
+
+
+def test_a_page_of_chosen_columns_has_no_others():
+    model, runs = data_of(page([BALL], View(columns=["v"], phases=[("v", "energy")])))
+    assert (model["columns"], model["shown"]) == (["v", "energy"], ["v"]) and len(runs[0]["columns"]) == 2
+
+
+def test_a_page_of_very_many_points_keeps_their_extremes():
+    run = hand_made.thermostat(30_000)
+    drawn = curves(run)
+    kept = thinned(drawn, ["T"], 20_000)
+    assert 2 * len(kept) <= 20_000 and kept[0] == 0 and kept[-1] == len(drawn.samples) - 1
+    time, values = drawn.samples.time, drawn.column("T")
+    for cut in np.array_split(np.arange(len(time)), 100):
+        inside = kept[(time[kept] >= time[cut[0]]) & (time[kept] <= time[cut[-1]])]
+        assert (values[inside].min(), values[inside].max()) == (values[cut].min(), values[cut].max())
+    assert (thinned(drawn, ["T"], 10**9) == np.arange(len(time))).all()
+
+
+@pytest.fixture(scope="module")
+def staged():
+    model = hsdsl.loads(SCENE)
+    return model, model._staged.simulate(engine="python")
+
+
+def test_shapes_have_the_numbers_of_the_run(staged):
+    model, run = staged
+    times = np.linspace(0, 5, 11)
+    samples = run.sample(times)
+    for row, t in enumerate(times):
+        x = t if t <= 2 else 4 - t
+        a = 2 * min(t, 2)
+        point, line, circle, spring, box = shapes_at(samples, model.system.scene, row)
+        assert np.allclose(point.points, [[x, 0]]) and np.allclose(line.points, [[0, 0], [x, 1]])
+        assert np.allclose(circle.points, [[x, 1]]) and circle.sizes == (0.5,)
+        assert np.allclose(spring.outline[[0, -1]], [[0, 2], [x, 2]])
+        corner = box.outline[2] - [x, 3]
+        assert np.allclose(corner, [np.cos(a) - np.sin(a) / 2, np.sin(a) + np.cos(a) / 2])
+
+
+def test_a_shape_without_a_number_is_left_out():
+    class Samples(dict):
+        pass
+
+    values = Samples({f"scene {k}": np.array([float("nan") if k == 1 else 1.0]) for k in range(4)})
+    assert [s.points.tolist() for s in shapes_at(values, [Shape("point", 1), Shape("point", 1)], 0)] == [[[1.0, 1.0]]]
+
+
+def test_a_spring_of_no_length_is_a_point():
+    spring = Drawn("spring", np.ones((2, 2)), ())
+    assert np.allclose(spring.outline, 1)
+
+
+def test_a_film_lasts_as_the_run_or_as_its_speed_says(tmp_path):
+    run = modes(8)
+    assert len(frame_times(run, None)) == 8 * FPS + 1
+    assert len(frame_times(run, 2.0)) == 4 * FPS + 1
+    assert frame_times(modes(2), None)[-1] == 2 and len(frame_times(modes(2), None)) == 4 * FPS + 1
+    with pytest.raises(UsageError, match=rf"choose a speed of at least {8 * FPS / MOST:.3g}"):
+        frame_times(run, 1e-3)
+    for speed in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(UsageError, match="positive speed"):
+            frame_times(run, speed)
+
+
+def test_a_film_has_its_frames(tmp_path):
+    from PIL import Image
+
+    model = hsdsl.loads(SCENE)
+    run = model.animate(tmp_path / "film.gif", speed=10, engine="python")
+    assert run.final.time == 5 and run.output_names[0] == "scene 0"
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == round(5 / 10 * FPS) + 1 and film.info["duration"] == 1000 / FPS
+        first = np.asarray(film.convert("L"), dtype=int)
+        film.seek(6)
+        assert np.abs(np.asarray(film.convert("L"), dtype=int) - first).max() > 100  # shapes have moved
+
+
+def test_what_cannot_be_a_film_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("hsdsl.plot.animation.which", lambda name: None)
+    with pytest.raises(UsageError, match="needs the program ffmpeg") as refusal:
+        hsdsl.loads(SCENE).animate(tmp_path / "film.mp4")
+    assert "write a .gif" in (refusal.value.hint or "")
+    with pytest.raises(UsageError, match="the model has no scene"):
+        hsdsl.loads(SCENE.split("scene:")[0] + "initial: {mode: up, x: 0, a: 0}\nexperiment: {until: 1}\n").animate(
+            tmp_path / "film.gif"
+        )
+    with pytest.raises(UsageError, match=r"should end in .gif or .mp4"):
+        hsdsl.loads(SCENE).animate(tmp_path / "film.avi")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_run_says_so_in_every_picture():
+    failed = replace(modes(3), stop=Stop("not_finite", 3.0, "x has no value."))
+    figure = picture([failed, modes(3)], View())
+    assert "1 stopped before the end" in figure.axes[2].get_title(loc="left")
+    ends = [drawn for drawn in figure.axes[0].get_lines() if list(drawn.get_xdata()) == [3.0, 3.0]]
+    assert len(ends) == 1
+    assert data_of(page([failed], View()))[1][0]["failed"]
