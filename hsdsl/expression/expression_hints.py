@@ -7,7 +7,7 @@ from collections.abc import Container
 
 from hsdsl.functions import FUNCTIONS
 
-CASES = "write a mode for each case, or use min, max, abs or sign"
+CASES = "write a mode for each case; (1 + sign(t - 1))/2 is a step at t = 1"
 _DEGREES = "angles are in radians: write 30*pi/180 for 30 degrees"
 _SAMPLES = "give it as samples, under `inputs`"
 _UNIT_NAMES = (
@@ -42,21 +42,26 @@ _HINTS = {  # what to write instead of names
     "write abs": "fabs",
     "write sign": "sgn signum",
     "write x**y": "pow power",
-    "write x**2": "sqr square",
+    "write x**2": "sqr",
+    "write x**2; a square wave is sign(sin(x))": "square",
+    "write > or >=": "gt geq ge",
+    "write < or <=": "lt leq le",
+    "a pulse over a share d of each period is (1 + sign(d - t/period + floor(t/period)))/2": "pulse pwm rectpuls",
     "write sqrt(x**2 + y**2)": "norm hypot",
     "write -floor(-x)": "ceil",
     "write floor(x + 1/2)": "round",
     "write floor(x)": "int",
     "write x - y*floor(x/y) for a remainder": "mod fmod rem",
     "write x**(1/3), for x that is not negative": "cbrt",
-    "write min(max(x, low), high)": "clip sat saturate",
+    "write min(max(x, low), high)": "clip sat saturate limit constrain clamp",
     _DERIVATIVE: "der diff dt",
     "an integral is a state whose flow is the integrand": "integral",
     "nothing is remembered but states; a reset sees the values before the jump": "pre delay edge",
+    "a guard fires where it is crossed, in the direction in which the flow leads out": "rising falling cross crossing",
     "a state is set by `reset` in a transition": "reinit",
     _SAMPLES: "interp interp1 lookup",
     "a model has no chance in it; " + _SAMPLES: "rand random randn noise",
-    CASES: "if ifelse where piecewise Piecewise heaviside Heaviside step",
+    CASES: "if ifelse where piecewise Piecewise heaviside Heaviside step unit_step unitstep",
 }
 NAMES = {name: hint for hint, names in _HINTS.items() for name in names.split()}
 

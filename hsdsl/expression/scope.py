@@ -161,7 +161,7 @@ class Scope:
                     timed(node.function, time)
                     or NAMES.get(node.function)
                     or _nearest(node.function, own)
-                    or "functions: " + " ".join((*FUNCTIONS, *own))
+                    or f"functions: {' '.join((*FUNCTIONS, *own))}, and those under `functions`"
                 )
             return ExpressionError("HS112", message, node.start, end, hint)
         _, fewest, most = FUNCTIONS[node.function]

@@ -270,7 +270,7 @@ class TestOverrides:
             (
                 "omega > 1",
                 "--set c: expected a number, got the condition `omega > 1`",
-                "write a mode for each case, or use min, max, abs or sign",
+                "write a mode for each case; (1 + sign(t - 1))/2 is a step at t = 1",
             ),
         ],
     )
