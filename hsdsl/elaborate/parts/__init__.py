@@ -118,9 +118,13 @@ class Parts:
             Names(self.board)[name]
         for one in self.roster.instances.values():
             for mode, inner in one.modes:
-                for name in (*one.kind.inputs, *one.kind.let, *inner.let):
-                    meaning = Names(self.board, one, mode, one.index)[name]
-                    assert meaning is None or isinstance(meaning, (Value, Refusal))
+                for name in (*one.kind.inputs, *inner.let):
+                    Names(self.board, one, mode, one.index)[name]
+            for name, scalar in one.kind.let.items():
+                places = [Names(self.board, one, mode, one.index) for mode, _ in one.modes]
+                found = [names[name] for names in places]
+                if found and all(isinstance(meaning, Refusal) for meaning in found):
+                    self.board.value(scalar, places[0])
 
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""

@@ -69,6 +69,7 @@ class Composition:
         """The flow of each state of an instance, zero in modes that lack it, and how it is written."""
         values: dict[str, list[Any]] = {state: [] for state in one.states}
         texts: dict[str, list[str]] = {state: [] for state in one.states}
+        ended = {mode for mode, document in one.modes if document.final and document.flow is None}
         for mode, document in one.modes:
             names = Names(self.board, one, mode, one.index)
             given = {str(key): scalar for key, scalar in (document.flow or {}).items()}
@@ -78,10 +79,16 @@ class Composition:
                 self.board.report_once(key, "HS304", f"the mode '{mode}' has no `flow`", hint)
             for state in one.states:
                 value = self.board.value(given[state], names) if state in given else None
-                values[state].append(ZERO if value is None else value.expr)
+                values[state] += [] if mode in ended else [ZERO if value is None else value.expr]
                 texts[state] += [given[state].value] if state in given else []
         for state in one.states:
-            yield self._picked(one, values[state]), " or ".join(dict.fromkeys(texts[state]))
+            yield self._picked(one, self._filled(one, ended, values[state])), " or ".join(dict.fromkeys(texts[state]))
+
+    @staticmethod
+    def _filled(one: Instance, ended: set[str], values: list[Any]) -> list[Any]:
+        """Values of all modes, of those in which nothing flows that of another."""
+        rest = iter(values)
+        return [values[0] if name in ended else next(rest) for name, _ in one.modes]
 
     def _picked(self, one: Instance, values: list[Any]) -> Any:
         return pick(symbol(one.name), values, self.board.constants)

@@ -31,10 +31,18 @@ class Instance:
     def part(self) -> Part:
         """Its modes and their states, by the names that they have in the whole."""
         modes = self.kind.modes
-        states = tuple(tuple(map(self.full, mode.flow or ())) for mode in modes.values())
+        states = tuple(tuple(map(self.full, self._states(name))) for name in modes)
         return Part(
             self.name, tuple(map(str, modes)), states, tuple(mode.final for mode in modes.values()), self.start or 0
         )
+
+    def _states(self, mode: Key) -> list[str]:
+        """The states of a mode; a final one without a flow has those of the modes that lead to it."""
+        modes = self.kind.modes
+        if not (modes[mode].final and modes[mode].flow is None):
+            return list(map(str, modes[mode].flow or ()))
+        before = [m for m in modes.values() for t in m.transitions if t.to is not None and t.to.value == mode]
+        return list(dict.fromkeys(str(key) for m in before for key in m.flow or ()))
 
     @cached_property
     def states(self) -> tuple[str, ...]:

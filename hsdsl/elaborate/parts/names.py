@@ -8,7 +8,7 @@ refused with the way it took.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
@@ -45,8 +45,13 @@ class Board:
         names = (*self.parameters, *(n for n, kind in self.symbols.names.items() if kind == "parameters"))
         return frozenset(map(symbol, names))
 
-    def evaluated(self, key: tuple[Any, ...], scalar: Scalar, names: Names, label: str) -> Meaning:
-        """The value of a definition, worked out once; a cycle is reported at the definition that closes it."""
+    def evaluated(
+        self, key: tuple[Any, ...], scalar: Scalar, names: Names, label: str, partial: bool = False
+    ) -> Meaning:
+        """The value of a definition, worked out once; a cycle is reported at the definition that closes it.
+
+        A ``partial`` one has no value in modes that lack one of its names.
+        """
         if key in self._known:
             return self._known[key]
         way = [name for _, name in self._active]
@@ -59,7 +64,8 @@ class Board:
             return None
         self._active.append((str(key), label))
         try:
-            value = self.value(scalar, names)
+            lacks = partial and self.lacks(scalar, names)
+            value = _lacking(label, names) if lacks else self.value(scalar, names)
         finally:
             self._active.pop()
         return self._known.setdefault(key, value)
@@ -158,8 +164,11 @@ class Board:
         if attribute not in known:
             message = f"the automaton '{one.automaton}' has no '{attribute}'"
             return Refusal("HS111", message, did_you_mean(attribute, sorted(known)))
-        values: list[Value] = []
-        for mode, _ in one.modes:
+        values: list[Value | None] = []
+        for mode, document in one.modes:
+            if document.flow is None and document.final:  # nothing flows there
+                values.append(None)
+                continue
             inner = Names(self, one, mode)
             value = inner[attribute]
             if value is None:
@@ -173,7 +182,10 @@ class Board:
 
     def lacks(self, scalar: Scalar, names: Names) -> bool:
         """Whether an expression has a name that a mode of the instance does not define."""
-        tree = names.expanded(parse(scalar.value))
+        try:
+            tree = names.expanded(parse(scalar.value))
+        except ExpressionError:  # reported where it is worked out
+            return False
         used = (names.get(node.name) for node in walk(tree) if isinstance(node, Name))
         states = names.states
         return any(
@@ -183,11 +195,18 @@ class Board:
             for value in used
         )
 
-    def picked(self, one: Instance, values: list[Value]) -> Value:
-        """One value of several, by the mode of an instance."""
+    def picked(self, one: Instance, given: Sequence[Value | None]) -> Value:
+        """One value of several, by the mode of an instance; in modes without one it is that of another."""
+        known = [value for value in given if value is not None] or [_whole(0)]
+        values = [value or known[0] for value in given]
         expr = selection.pick(symbol(one.name), [value.expr for value in values], self.constants)
         size, depth = sum(value.size for value in values), max(value.depth for value in values)
         return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
+
+
+def _lacking(label: str, names: Names) -> Refusal:
+    message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': it uses a name that others define"
+    return Refusal("HS354", message, "define that name in this mode, too, under `let`")
 
 
 def _whole(number: int) -> Value:
@@ -249,7 +268,7 @@ class Names(Mapping[str, Meaning]):
         shared = {str(key): scalar for key, scalar in one.kind.let.items()}
         if name in lets or name in shared:
             scalar = lets.get(name) or shared[name]
-            return self.board.evaluated((one.name, mode, name), scalar, self, one.full(name))
+            return self.board.evaluated((one.name, mode, name), scalar, self, one.full(name), name not in lets)
         if name in one.states:
             full = one.full(name)
             return Value(symbol(full), uses=frozenset((full,)))
