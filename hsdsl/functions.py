@@ -88,7 +88,7 @@ class below(_Kinked):
         """Choose where the number is known."""
         if one == other:
             return one
-        return (one if number < bound else other) if number.is_Rational else None
+        return (one if number < bound else other) if number.is_Number else None
 
     def _eval_derivative(self, s):
         number, bound, one, other = self.args

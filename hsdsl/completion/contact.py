@@ -22,6 +22,7 @@ from sympy.core.relational import Relational
 
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode, Surface
 
 MOST_TOGETHER = 3  # edges whose motions along several guards at once are derived
@@ -67,20 +68,22 @@ class Contact:
         return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
 
 
-def contacts(mode: Mode) -> dict[frozenset[int], Contact]:
-    """The motions along guards of a mode, by the edges in contact.
+def contacts(mode: Mode, numbers: Sequence[str] = ()) -> dict[frozenset[int], Contact]:
+    """The motions along guards of a mode, by the edges in contact; ``numbers`` are states that are modes of parts.
 
     Those along several guards are there for up to :data:`MOST_TOGETHER` such edges, where none changes what presses on
     the others.
     """
-    singles = {frozenset((k,)): found for k in range(len(mode.edges)) if (found := contact(mode, k)) is not None}
+    singles = {
+        frozenset((k,)): found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers)) is not None
+    }
     every = dict(singles)
     for size in range(2, len(singles) + 1) if len(singles) <= MOST_TOGETHER else ():
         for few in [few for few in every if len(few) == size - 1]:
             for one in singles:
                 (k,) = one
                 if k > max(few) and all(_apart(singles[one], singles[frozenset((j,))], mode) for j in few):
-                    found = contact(every[few].mode, k)
+                    found = contact(every[few].mode, k, numbers)
                     if found is not None:
                         every[few | one] = _joined(every[few], found)
     return every
@@ -113,12 +116,14 @@ def _apart(one: Contact, other: Contact, mode: Mode) -> bool:
     return not changed(j) & seen(other, k) and not changed(k) & seen(one, j)
 
 
-def contact(mode: Mode, k: int) -> Contact | None:
+def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique."""
     edge = mode.edges[k]
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived:
         return None
-    near = _Nearby(mode, edge)
+    near = _Nearby(mode, edge, _mode_of_part(edge, numbers))
+    if any(mode.states[i] in numbers for i in near.changed):
+        return None
     constrained = _constrained(near) if near.changed and near.is_small() else None
     if constrained is None:
         return None
@@ -146,19 +151,22 @@ def _rows(states: tuple[str, ...], flow: tuple[sp.Expr, ...]) -> dict[sp.Symbol,
 class _Nearby:
     """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
 
-    ``changed`` has the numbers of these states, ``moved`` what the reset adds to each.
+    ``changed`` has the numbers of these states, ``moved`` what the reset adds to each. ``here`` is the mode of the part
+    that the edge belongs to.
     """
 
-    def __init__(self, mode: Mode, edge: Edge) -> None:
-        self.states, self.edge, self.guard = _symbols(mode.states), edge, sp.sympify(edge.surface.residual)
+    def __init__(self, mode: Mode, edge: Edge, here: dict[sp.Symbol, sp.Integer]) -> None:
+        self._here = here
+        self.states, self.edge = _symbols(mode.states), edge
+        self.guard = sp.sympify(edge.surface.residual).xreplace(here)
         self._flow = _rows(mode.states, mode.flow)
         pairs = zip(self.states, edge.reset, strict=True)
         self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x]
-        self.moved = sp.Matrix([edge.reset[i] - self.states[i] for i in self.changed])
+        self.moved = sp.Matrix([edge.reset[i].xreplace(here) - self.states[i] for i in self.changed])
 
-    def flow(self, x: sp.Symbol) -> sp.Expr:
+    def flow(self, x: sp.Symbol) -> Any:
         """The rate of time or of a state."""
-        return sp.S.One if x == TIME else self._flow[x]
+        return sp.S.One if x == TIME else sp.sympify(self._flow[x]).xreplace(self._here)
 
     def among(self, value: sp.Basic) -> list[Any]:
         """The time, and the states in the order of their names, that a value depends on."""
@@ -184,6 +192,17 @@ class _Nearby:
             return sizes[expr]
 
         return sum(map(size, map(sp.sympify, (*self.flows(), *self.moved, self.guard)))) <= MOST_NODES
+
+
+def _mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integer]:
+    """The number of the mode that an edge of a part leaves; nothing where its part has one mode."""
+    residual = edge.surface.residual
+    for name in numbers:
+        number = symbol(name)
+        if edge.name.startswith(f"{name}.") and residual.has(number):
+            most = max(int(node.args[1] + 1) for node in residual.atoms(below) if node.args[0] == number)
+            return next({number: k} for k in map(sp.Integer, range(1, most + 1)) if residual.subs(number, k) != -1)
+    return {}
 
 
 def _constrained(near: _Nearby):

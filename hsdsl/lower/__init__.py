@@ -23,6 +23,7 @@ from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
 from hsdsl.lower.tape import make_tape
+from hsdsl.parts import numbered
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput
 
 _NAN = symbol("nan")
@@ -92,7 +93,7 @@ def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
     modes: list[lowered.ModeProgram] = []
     held: list[lowered.ModeProgram] = []
     for mode in system.modes:
-        found = contacts(mode)
+        found = contacts(mode, numbered(system.parts))
         numbers = {few: len(system.modes) + len(held) + i for i, few in enumerate(found)}
         modes.append(_contact(frozenset(), 0, mode, names, indices, numbers))
         held += [_contact(few, c.order, c.mode, names, indices, numbers, len(mode.edges)) for few, c in found.items()]
@@ -334,7 +335,7 @@ def _every_choice(expr: sp.Basic) -> sp.Basic:
     if not expr.has(below):
         return expr
     if isinstance(expr, below):
-        return sum(sp.Dummy() * _every_choice(choice) for choice in expr.args[2:])
+        return sp.Add(*(sp.Dummy() * _every_choice(choice) for choice in expr.args[2:]))
     return rebuilt(expr, tuple(map(_every_choice, expr.args)))
 
 

@@ -12,6 +12,7 @@ from hsdsl.lower import LoweredMode, number
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.lower.switches import with_switches
+from hsdsl.parts import numbered
 from hsdsl.program import Routines
 from hsdsl.system import TIME, HybridSystem
 
@@ -33,7 +34,7 @@ def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
     with deep_stack():
         whole, switches = with_switches(system)
         names = number(whole, switches.symbols)
-        held = (motion.mode for mode in whole.modes for motion in contacts(mode).values())
+        held = (motion.mode for mode in whole.modes for motion in contacts(mode, numbered(whole.parts)).values())
         flows = (*whole.modes, *held)
         return tuple(_slopes(LoweredMode(mode, names)) for mode in flows)
 

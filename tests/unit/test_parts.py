@@ -1,0 +1,308 @@
+"""Systems of parts: the execution of the flat model that is their product, names, broadcasts, and what is refused."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from engines import COMPILER
+
+import hsdsl
+
+MODELS = Path(__file__).parents[2] / "models" / "parts"
+ENGINES = ("python", *(["c"] if COMPILER else []))
+WAYS = [
+    {},
+    {"method": "dopri5", "tolerance": 1e-8},
+    {"method": "radau", "tolerance": 1e-7},
+    {"scheme": "relaxed", "relaxation": 1e-4},
+    {"scheme": "relaxed", "method": "rk4", "step": 1e-3, "relaxation": 1e-3},
+]
+
+ROOMS = """
+hsdsl: 1
+parameters: {outside: 5, wall: 1/4}
+automata:
+  room:
+    parameters: {power: 30, loss: 1/2, low: 19, high: 21}
+    inputs: [beside]
+    let: {gain: wall*(beside - T)}
+    modes:
+      on: {flow: {T: power - loss*(T - outside) + gain}, transitions: [{name: too_warm, when: T >= high, to: off}]}
+      off: {flow: {T: -loss*(T - outside) + gain}, transitions: [{name: too_cold, when: T <= low, to: on}]}
+system:
+  a: {automaton: room, initial: {mode: on, T: 20}, inputs: {beside: b.T}}
+  b: {automaton: room, initial: {mode: off, T: 20.5}, inputs: {beside: a.T}, parameters: {power: 20}}
+experiment: {until: 1}
+"""
+HEAT = {
+    "on": "{i}power - {i}loss*({i}T - outside) + wall*({j}T - {i}T)",
+    "off": "-{i}loss*({i}T - outside) + wall*({j}T - {i}T)",
+}
+NUMBERS = "aloss: 1/2, alow: 19, ahigh: 21, bpower: 20, bloss: 1/2, blow: 19, bhigh: 21"
+
+
+def flat_rooms() -> str:
+    """The same, with the four modes of the product."""
+    text = f"hsdsl: 1\nparameters: {{outside: 5, wall: 1/4, apower: 30, {NUMBERS}}}\nmodes:\n"
+    for one, two in itertools.product(("on", "off"), repeat=2):
+        flow = HEAT[one].format(i="a", j="b"), HEAT[two].format(i="b", j="a")
+        text += f"  {one}_{two}:\n    flow: {{aT: {flow[0]}, bT: {flow[1]}}}\n    transitions:\n"
+        for name, here, others in (("a", one, "{0}_" + two), ("b", two, one + "_{0}")):
+            if here == "on":
+                text += f"      - {{name: {name}.too_warm, when: {name}T >= {name}high, to: {others.format('off')}}}\n"
+            else:
+                text += f"      - {{name: {name}.too_cold, when: {name}T <= {name}low, to: {others.format('on')}}}\n"
+    return text + "initial: {mode: on_off, aT: 20, bT: 20.5}\nexperiment: {until: 1}\n"
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: "-".join(map(str, way.values())) or "default")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_parts_have_the_execution_of_their_product(way, engine):
+    run = hsdsl.loads(ROOMS).simulate(engine=engine, **way)
+    flat = hsdsl.loads(flat_rooms()).simulate(engine=engine, **way)
+    assert [t.edge for t in run.transitions] == [t.edge for t in flat.transitions]
+    for one, other in zip(run.transitions, flat.transitions, strict=True):
+        assert (one.time, one.resumed) == pytest.approx((other.time, other.resumed), rel=0, abs=1e-13)
+        assert list(one.before.values()) == pytest.approx(list(other.before.values()), rel=1e-13)
+    assert list(run.final.state.values()) == pytest.approx(list(flat.final.state.values()), rel=1e-12)
+    assert len(run.transitions) > 8
+    assert [arc.mode for arc in run.arcs] == ["a={} b={}".format(*arc.mode.split("_")) for arc in flat.arcs]
+    assert run.verdict == flat.verdict
+
+
+@pytest.mark.skipif(not COMPILER, reason="no compiler")
+@pytest.mark.parametrize("name", ["runner", "centipede"])
+@pytest.mark.parametrize("way", [{}, {"scheme": "relaxed", "relaxation": 1e-3}], ids=["located", "relaxed"])
+def test_engines_agree_to_the_last_bit(name, way):
+    model = hsdsl.load(MODELS / f"{name}.yaml")
+    one, other = (model.simulate(until=0.4, engine=engine, tolerance=1e-6, **way) for engine in ("python", "c"))
+    assert one == replace(other, engine="python", verdict=one.verdict)
+
+
+LEG = """
+  leg:
+    parameters: {speed: 1}
+    modes:
+      swing:
+        flow: {s: speed}
+        let: {push: 0}
+        transitions: [{name: down, when: s >= 0.3, to: stance, reset: {foot: body.x + s}}]
+      stance:
+        flow: {foot: 0}
+        let: {push: 3*(1 - (foot - body.x))}
+        transitions: [{name: up, when: foot - body.x <= -0.3, to: lift, reset: {u: foot - body.x}}]
+      lift:
+        flow: {u: 2*speed}
+        let: {push: -0.1*u}
+        transitions: [{name: forward, when: u >= 0.1, to: swing, reset: {s: u/2}}]
+"""
+WALKER = f"""
+hsdsl: 1
+automata:
+  body:
+    modes: {{move: {{flow: {{x: v, v: sum(leg.push) - 4*v}}}}}}
+{LEG}
+system:
+  body: {{automaton: body, initial: {{x: 0, v: 1}}}}
+  leg: {{automaton: leg, count: 4, initial: {{mode: swing, s: index/20}}, parameters: {{speed: 1 + index/10}}}}
+experiment: {{until: 2}}
+"""
+KINDS = {
+    "swing": ("s", "{speed}", "0", "down", "s{i} >= 0.3", "stance", "foot{i}: x + s{i}"),
+    "stance": ("foot", "0", "3*(1 - (foot{i} - x))", "up", "foot{i} - x <= -0.3", "lift", "u{i}: foot{i} - x"),
+    "lift": ("u", "2*{speed}", "-0.1*u{i}", "forward", "u{i} >= 0.1", "swing", "s{i}: u{i}/2"),
+}
+
+
+def flat_walker() -> str:
+    """The walker with its 81 modes."""
+    text = "hsdsl: 1\nmodes:\n"
+    for modes in itertools.product(KINDS, repeat=4):
+        speeds = [f"(1 + {i}/10)" for i in range(1, 5)]
+        numbered = [(i, KINDS[mode], speed) for i, mode, speed in zip(range(1, 5), modes, speeds, strict=True)]
+        pushes = " + ".join(kind[2].format(i=i) for i, kind, _ in numbered)
+        own = ", ".join(f"{kind[0]}{i}: {kind[1].format(speed=speed)}" for i, kind, speed in numbered)
+        text += f"  {'_'.join(modes)}:\n    flow: {{x: v, v: {pushes} - 4*v, {own}}}\n    transitions:\n"
+        for i, kind, _ in numbered:
+            target = "_".join((*modes[: i - 1], kind[5], *modes[i:]))
+            text += f'      - {{name: "leg[{i}].{kind[3]}", when: {kind[4].format(i=i)}, to: {target}, '
+            text += f"reset: {{{kind[6].format(i=i)}}}}}\n"
+    start = ", ".join(f"s{i}: {i}/20" for i in range(1, 5))
+    return text + f"initial: {{mode: swing_swing_swing_swing, x: 0, v: 1, {start}}}\nexperiment: {{until: 2}}\n"
+
+
+def test_four_legs_walk_as_their_81_modes():
+    run, flat = hsdsl.loads(WALKER).simulate(), hsdsl.loads(flat_walker()).simulate()
+    assert [t.edge for t in run.transitions] == [t.edge for t in flat.transitions]
+    assert len({arc.mode for arc in run.arcs}) > 9
+    assert np.allclose([t.time for t in run.transitions], [t.time for t in flat.transitions], rtol=0, atol=1e-12)
+    assert run.final.state["body.x"] == pytest.approx(flat.final.state["x"], abs=1e-12)
+    assert len(run.transitions) > 20
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_runner_of_parts_runs_as_the_flat_one(number):
+    model = hsdsl.load(MODELS / "runner.yaml")
+    known = model.system.reference[number]
+    run = model.simulate(
+        initial={key.removeprefix("initial."): value for key, value in known.settings.items()}, tolerance=1e-13
+    )
+    assert [t.edge for t in run.transitions] == [t.edge for t in known.transitions]
+    for made, exact in zip(run.transitions, known.transitions, strict=True):
+        assert made.time == pytest.approx(float(exact.time), abs=1e-11)
+        for name, value in exact.before.items():
+            assert made.before[name] == pytest.approx(float(value), abs=2e-11)
+    assert run.final.mode == "body=apex left=spent right=spent"
+
+
+def test_neighbours_and_ends():
+    """A chain of masses in its lowest normal mode: cos of a known frequency."""
+    text = """
+    hsdsl: 1
+    automata:
+      mass:
+        inputs: [left, right]
+        modes: {move: {flow: {x: v, v: left - 2*x + right}}}
+    system:
+      chain:
+        automaton: mass
+        count: 5
+        initial: {x: sin(pi*index/6), v: 0}
+        inputs: {left: "chain[index - 1].x", right: "chain[index + 1].x"}
+        at_ends: {x: 0*index}
+    outputs: {energy: sum(chain.v**2)/2, most: max(chain.x), least: min(chain.x), n: count(chain)}
+    experiment: {until: 3}
+    """
+    run = hsdsl.loads(text).simulate()
+    phase = np.cos(2 * np.sin(np.pi / 12) * 3)
+    for k in range(1, 6):
+        assert run.final.state[f"chain[{k}].x"] == pytest.approx(np.sin(np.pi * k / 6) * phase, abs=1e-9)
+    assert run.final.outputs["least"] == min(run.final.state[f"chain[{k}].x"] for k in range(1, 6))
+    assert run.final.outputs["n"] == 5
+
+
+def test_states_that_a_mode_lacks_are_absent():
+    run = hsdsl.loads(WALKER).simulate(until=0.5)
+    first, last = run.arcs[0], run.arcs[-1]
+    assert first.states == ("body.x", "body.v", *(f"leg[{k}].s" for k in range(1, 5)))
+    assert "leg[4].foot" in last.states
+    assert "leg[4].s" not in run.final.state
+    assert np.isnan(run.to_pandas()["leg[4].s"].iloc[-1])
+
+
+def test_overrides_reach_parts():
+    model = hsdsl.loads(ROOMS)
+    run = model.simulate(parameters={"b.power": 25}, initial={"b.mode": "on", "a.T": "outside + 15"})
+    assert run.arcs[0].mode == "a=on b=on"
+    assert model.simulate(initial={"mode": "a=off b=off"}).arcs[0].mode == "a=off b=off"
+    for initial in ({"b.mode": "warm"}, {"b": 1}, {"mode": "a=on"}, {"c.T": 1}):
+        with pytest.raises(hsdsl.UsageError):
+            model.simulate(initial=initial)
+
+
+def test_automata_in_files(tmp_path):
+    head, _, rest = WALKER.partition("  leg:\n")
+    leg = rest.partition("\nsystem:")[0]
+    (tmp_path / "leg.yaml").write_text("hsdsl: 1\n" + "\n".join(line[4:] for line in leg.splitlines()))
+    whole = head + "  leg: {file: leg.yaml}\nsystem:" + rest.partition("\nsystem:")[2]
+    (tmp_path / "walker.yaml").write_text(whole)
+    assert hsdsl.load(tmp_path / "walker.yaml").simulate(until=1).final == hsdsl.loads(WALKER).simulate(until=1).final
+    (tmp_path / "leg.yaml").write_text((tmp_path / "leg.yaml").read_text().replace("s >= 0.3", "q >= 0.3"))
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.load(tmp_path / "walker.yaml")
+    assert error.value.diagnostics[0].span.path.endswith("leg.yaml")
+
+
+HEAD = "hsdsl: 1\nexperiment: {until: 1}\n"
+REFUSED = {
+    "HS350 automaton": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: b, initial: {x: 0}}}",
+    "HS351 connected": (
+        "automata: {a: {inputs: [u], modes: {m: {flow: {x: u}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS352 q.y -> q.u -> p.y": (
+        "automata: {a: {inputs: [u], let: {y: 2*u}, modes: {m: {flow: {x: y}}}}}\nsystem:\n"
+        "  p: {automaton: a, initial: {x: 0}, inputs: {u: q.y}}\n  q: {automaton: a, initial: {x: 0}, inputs: {u: p.y}}"
+    ),
+    "HS354 force": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, let: {force: 1}, transitions: [{when: x >= 1, to: n}]}, "
+        "n: {flow: {x: 0}}}}}\n"
+        "system: {p: {automaton: a, initial: {mode: m, x: 0}}}\nlet: {total: sum(a.force)}"
+    ),
+    "HS111 speed": "automata: {a: {modes: {m: {flow: {x: speed}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}",
+    "HS111 q.x": "automata: {a: {modes: {m: {flow: {x: q.x}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}",
+    "HS353 fire together": (
+        "automata:\n  a: {modes: {m: {flow: {x: 1}, transitions: [{name: go, when: x >= 1, reset: {x: 0, q.x: 1}}]}}}\n"
+        "  b: {modes: {m: {flow: {x: 1}, transitions: [{on: p.go, reset: {x: 2}}]}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}, q: {automaton: b, initial: {x: 0}}}"
+    ),
+    "HS353 nothing": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: q.nothing, reset: {x: 2}}]}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}, q: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS308 initial value": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a}}",
+    "HS303 no mode": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {mode: k}}}",
+    "HS111 has 2 instances": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 2, initial: {x: 0}}}\n"
+        'let: {y: "p[3].x"}'
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_refused(what):
+    code, _, words = what.partition(" ")
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(HEAD + REFUSED[what])
+    found = [d for d in error.value.diagnostics if d.code == code and words in d.message]
+    assert found and found[0].span is not None
+    assert len(error.value.diagnostics) == 1
+
+
+def test_a_broadcast_with_conditions_and_listeners_of_listeners():
+    text = """
+    hsdsl: 1
+    automata:
+      clock: {modes: {run: {flow: {s: 1}, transitions: [{name: tick, when: s >= 1, reset: {s: 0}}]}}}
+      counter:
+        modes:
+          even: {flow: {n: 0}, transitions: [{name: up, on: clock.tick, if: n < 3, to: odd, reset: {n: n + 1}}]}
+          odd: {flow: {n: 0}, transitions: [{name: up, on: clock.tick, if: n < 3, to: even, reset: {n: n + 1}}]}
+      diary: {modes: {keep: {flow: {seen: 0}, transitions: [{on: counter.up, reset: {seen: 10*seen + counter.n}}]}}}
+    system:
+      clock: {automaton: clock, initial: {s: 0}}
+      counter: {automaton: counter, initial: {mode: even, n: 0}}
+      diary: {automaton: diary, initial: {seen: 0}}
+    experiment: {until: 5.5}
+    """
+    model = hsdsl.loads(text)
+    for engine in ENGINES:
+        run = model.simulate(engine=engine)
+        assert run.final.state == {"clock.s": pytest.approx(0.5), "counter.n": 3.0, "diary.seen": 12.0}
+        assert [t.time for t in run.transitions] == pytest.approx([1, 2, 3, 4, 5])
+        assert run.transitions[2].target == "clock=run counter=odd diary=keep"
+
+
+def test_balls_come_to_rest_while_others_go_on():
+    text = """
+    hsdsl: 1
+    automata:
+      ball:
+        modes: {fly: {flow: {h: v, v: -9.81}, transitions: [{name: bounce, when: h <= 0, reset: {v: -v/2}}]}}
+      lamp:
+        modes:
+          dark: {flow: {s: 1}, transitions: [{when: s >= 0.7, to: bright, reset: {s: 0}}]}
+          bright: {flow: {s: 1}, transitions: [{when: s >= 0.3, to: dark, reset: {s: 0}}]}
+    system:
+      ball: {automaton: ball, count: 2, initial: {h: index, v: 0}}
+      lamp: {automaton: lamp, initial: {mode: dark, s: 0}}
+    experiment: {until: 3.5}
+    """
+    run = hsdsl.loads(text).simulate()
+    assert abs(run.final.state["ball[1].h"]) + abs(run.final.state["ball[2].h"]) < 1e-15
+    rests = [3 * np.sqrt(2 * h / 9.81) for h in (1, 2)]
+    assert all(any(f"Zeno at t = {rest:.5f}"[:17] in reason for reason in run.verdict.reasons) for rest in rests)
+    assert sum(t.edge.startswith("lamp") for t in run.transitions) == 6
