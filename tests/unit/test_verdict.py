@@ -283,3 +283,33 @@ experiment: {until: 1.5, method: euler, step: 0.003}
 """
     run = hsdsl.loads(text).simulate(parameters={"half": share * 0.3})
     assert run.estimated().verdict.theorem == theorem, run.estimated().verdict
+
+
+HUMP = """
+hsdsl: 1
+modes:
+  a: {{flow: {{x: 1 - 2*t, y: 1}}, transitions: [{{name: up, when: x >= 0.1, if: {condition}, to: b}}]}}
+  b: {{flow: {{x: 0, y: 0}}}}
+initial: {{mode: a, x: 0, y: 0}}
+experiment: {{until: 10, scheme: located, tolerance: 1e-9}}
+"""
+REACHED = (1 - math.sqrt(0.6)) / 2  # x = t - t**2
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5"])
+@pytest.mark.parametrize(
+    ("condition", "theorem", "word"),
+    [
+        ("y >= 0.3", "holds", "passed at t = 0.112"),
+        ("y >= 0.12", "holds", "passed at t = 0.112"),
+        ("y >= 0.3 and y <= 0.4", "holds", "passed at t = 0.112"),
+        (f"y >= {REACHED!r}", "unknown", "within the error"),
+        ("y >= 0.11", "holds", "1 transition"),
+    ],
+)
+def test_only_where_a_surface_is_reached_its_condition_decides(
+    condition: str, theorem: str, word: str, method: str
+) -> None:
+    verdict = hsdsl.loads(HUMP.format(condition=condition)).simulate(method=method).verdict
+    assert verdict.theorem == theorem
+    assert any(word in reason for reason in verdict.reasons)

@@ -32,10 +32,15 @@ def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | 
     if not (beyond or margin < SAFE) or (has_condition(place, k) and not may_hold(run, place, k, row)):
         return None
     if beyond:
-        sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
-        return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
+        return passed_over(place, k)
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     return Finding("miss", "unknown", f"the run {how} {where}, {times(margin)} the error away")
+
+
+def passed_over(place: Place, k: int) -> Finding:
+    """The finding that a step was beyond a surface."""
+    sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
+    return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
 
 
 def _level(run: RunView, place: Place, k: int) -> Number:

@@ -7,6 +7,7 @@ remains are its turning points close to zero: these are looked at one by one.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +19,11 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold
+from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold, passed_over
+from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
-from hsdsl.simulate.verdict.transparent import passed_at, transparent
+from hsdsl.simulate.verdict.transparent import Passed, passed_at, transparent, undecided_condition
 
 HALVINGS = 20
 MOST_LOOKED_AT = 256  # turning points, one by one
@@ -50,11 +52,11 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
     if run.errors is None:
         return [], []
     found: list[Finding] = []
-    passed: dict[str, list[Number]] = {}
+    passed: Passed = {}
     nearest: Miss | None = None
     for steps in steps_of(run, doubtful="turning"):
         turning = _turning(run, steps)
-        found += filter(None, (_turned(run, run.arc_of(each.row), each) for each in turning[:MOST_LOOKED_AT]))
+        found += filter(None, (_turned(run, run.arc_of(each.row), each, passed) for each in turning[:MOST_LOOKED_AT]))
         if len(turning) > MOST_LOOKED_AT:
             more = f"{len(turning) - MOST_LOOKED_AT} more turning points close to surfaces were not looked at"
             found.append(Finding("misses", "unknown", more))
@@ -125,18 +127,22 @@ def _together(spans: list[Open]) -> list[Open]:
     return joined
 
 
-def _turned(run: RunView, arc: Arc, each: Open) -> Finding | None:
+def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | None:
     """Look at a surface on parts of a step that the enclosures leave open."""
     k, last = each.surface, each.row + 1 == arc.last
     if last and run.crossed.get(arc.last) == k and each.end >= 1:
         return None  # `crossings` looks at how it is crossed
     look = run.between(arc, each.row)
     try:
-        places = [look(run.arithmetic.zero + s) for s in _shares(each)]
-        place = max(places, key=lambda place: place.value(k))
-        beyond = has_condition(place, k) and look(run.arithmetic.zero).value(k) > 0
-        if beyond or (has_condition(place, k) and not may_hold(run, place, k, each.row + 1)):
-            return None  # transparent there
+        places = [(look(run.arithmetic.zero + s), s) for s in _shares(each)]
+        place, share = max(places, key=lambda each: each[0].value(k))
+        if has_condition(place, k):
+            if look(run.arithmetic.zero).value(k) > 0:
+                return None  # transparent there
+            if place.value(k) > place.roundoff_bound(k):
+                return _visited(run, each, look, share, passed)
+            if not may_hold(run, place, k, each.row + 1):
+                return None
         if finding := judged(run, place, k, each.row + 1, "turns back close to"):
             return finding
         sentence = f"whether {place.name(k)} is reached close to t = {show(place.t)} could not be decided"
@@ -144,6 +150,15 @@ def _turned(run: RunView, arc: Arc, each: Open) -> Finding | None:
     except DOMAIN_ERRORS:
         time = show(run.times[each.row])
         return Finding("no value", "unknown", f"a surface of {arc.mode} has no value close to t = {time}")
+
+
+def _visited(run: RunView, each: Open, look: Callable[[Number], Place], share: float, passed: Passed) -> Finding | None:
+    """Look at where a step goes beyond a surface that it is beyond at a share of it: that decides, not what follows."""
+    place = closed_in(lambda s: look(s * share), lambda place: place.value(each.surface))
+    notes = passed if look(run.arithmetic.zero + 1).value(each.surface) <= 0 else {}  # else `transparent` sees it
+    if place.conditions(each.surface, run.around(place, each.row + 1)) == {True}:
+        return passed_over(place, each.surface)
+    return undecided_condition(run, place, each.surface, each.row + 1, notes)
 
 
 def _shares(each: Open) -> list[float]:

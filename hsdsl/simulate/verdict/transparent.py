@@ -11,11 +11,14 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.judged import closed_in
+from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low
 
+Passed = dict[str, list[Number]]  # when the surface of an edge was passed while its `if` was false
 
-def transparent(run: RunView, steps: Parts, passed: dict[str, list[Number]]) -> Iterator[Finding]:
+
+def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]:
     """Surfaces passed where their condition does not hold: does it all around? Notes in ``passed`` where it does."""
     edges = run.problem.program.modes[steps.mode].edges
     if not any(edge.conditional for edge in edges):
@@ -33,15 +36,19 @@ def transparent(run: RunView, steps: Parts, passed: dict[str, list[Number]]) -> 
             if run.crossed.get(arc.last) == k and row + 1 == arc.last:
                 continue
             place = closed_in(run.between(arc, row), lambda place: place.value(k))  # noqa: B023
-            if place.value(k) > 0 or abs(place.value(k)) <= SAFE * run.shift(place, k, row + 1) + place.roundoff_bound(
-                k
-            ):
-                if place.conditions(k, run.around(place, row + 1)) == {False}:
-                    passed.setdefault(edge.name, []).append(place.t)
-                else:
-                    where = f"{place.name(k)} at t = {show(place.t)}"
-                    sentence = f"whether the condition of {where} holds is within the error"
-                    yield Finding("condition", "unknown", sentence)
+            level = SAFE * run.shift(place, k, row + 1) + place.roundoff_bound(k)
+            reached = place.value(k) > 0 or abs(place.value(k)) <= level
+            if reached and (finding := undecided_condition(run, place, k, row + 1, passed)):
+                yield finding
+
+
+def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
+    """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
+    if place.conditions(k, run.around(place, row)) == {False}:
+        passed.setdefault(place.name(k), []).append(place.t)
+        return None
+    where = f"{place.name(k)} at t = {show(place.t)}"
+    return Finding("condition", "unknown", f"whether the condition of {where} holds is within the error")
 
 
 def passed_at(name: str, at: list[Number]) -> str:
