@@ -144,6 +144,7 @@ def _from_zero(c: State, tolerance: Number, arithmetic: Arithmetic) -> Iterator[
     """The steps that keep the terms left out below the tolerance, relative to the first that is not 0."""
     last = len(c) - 1
     first = next((k for k in range(last - 1) if c[k] != 0), last)
+    allowed = tolerance * abs(c[first])
     for k in (last - 1, last):
-        if first < k and c[k] != 0:
-            yield root(abs(c[k]) / (tolerance * abs(c[first])), k - first, arithmetic)
+        if first < k and c[k] != 0 and allowed > 0:  # below the least number there are no digits to keep
+            yield root(abs(c[k]) / allowed, k - first, arithmetic)

@@ -2,8 +2,9 @@
 
 The tolerance falls to a tenth, so the finer run is wrong by about a tenth of what the run is. Steps that the tolerance
 does not bound become shorter in the same way: the run's longest step, and with `located` the first one of each arc of
-flow, which a transition or a sample of an input may have cut. A fixed step is halved;
-a method of order 1 needs a quarter, or the difference would be no larger than the error of the finer run. The
+flow, which a transition or a sample of an input may have cut. A fixed step becomes two fifths of
+itself; a method of order 1 needs a fifth, or the difference would be no larger than the error of the finer run. It is
+no half: steps that the relaxed scheme halves would be those of the finer run, and both wrong in the same way. The
 relaxed scheme's strips shrink to a tenth: the delay of a transition is known only up to a factor. Below round-off the
 other run is coarser instead, and the difference is that much larger than the error.
 """
@@ -36,7 +37,7 @@ def finer_settings(settings: Settings, execution: Execution, arithmetic: Arithme
         finer = replace(finer, relaxation=settings.relaxation / FINER)
     if settings.step is not None:
         first = settings.method is not None and settings.method.order == 1
-        return replace(finer, step=settings.step / (4 if first else 2))
+        return replace(finer, step=settings.step * (1 if first else 2) / 5)
     assert settings.tolerance is not None
     smaller = settings.tolerance / FINER
     tolerance = smaller if smaller >= LEAST_UNITS * arithmetic.unit else settings.tolerance * FINER

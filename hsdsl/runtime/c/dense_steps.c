@@ -150,9 +150,10 @@ static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
   hs_real least = NAN;
   int first = 1;
   while (first < order && c[first] == 0) first++;
-  if (first == order) return NAN;
+  const hs_real allowed = tolerance * fabs(c[first]);
+  if (first == order || !(allowed > 0)) return NAN; /* below the least number there are no digits to keep */
   for (int m = order; m <= order + 1; m++)
-    if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / (tolerance * fabs(c[first])), m - first));
+    if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / allowed, m - first));
   return least;
 }
 

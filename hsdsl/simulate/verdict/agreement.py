@@ -53,6 +53,14 @@ class Errors:
         return time
 
     @property
+    def midway(self) -> bool:
+        """Whether the runs are compared in the middle of steps too.
+
+        Steps that no tolerance bounds, and those of the relaxed scheme, may be right at their ends by symmetry.
+        """
+        return self.tolerance == 0 or self.run.scheme != "located"
+
+    @property
     def _slack(self) -> float:
         span = float(self.run.time_span[1])
         strips = float(self.run.settings["relaxation"]) if self.run.scheme == "relaxed" else 0.0
@@ -84,14 +92,13 @@ class Errors:
         """How far the two runs are apart in each state; shape (rows, states), nowhere falling."""
         found = np.zeros(self._values.shape)
         count = len(self.late) if self.parted is None else int(np.searchsorted(self._made_at, self.parted))
-        rows = np.flatnonzero(self._jumps <= count)
         shift = np.array([0.0, *(self._resumed(self.finer, k) - self._resumed(self.run, k) for k in range(count))])
-        times = self._times[rows] + shift[self._jumps[rows]]
-        first, last = map(float, self.finer.time_span)
-        inside = (times >= first) & (times <= last)
-        rows, times = rows[inside], times[inside]
-        if len(rows):
-            found[rows] = self._apart(self.finer, self._jumps[rows], self._values[rows], times)
+        rows = np.flatnonzero(self._jumps <= count)
+        self._compare(found, rows, self._values[rows], self._times[rows] + shift[self._jumps[rows]])
+        if self.midway:
+            middles = self._times[rows[:-1]] + np.diff(self._times[rows]) / 2
+            values = self._at(self.run, self._jumps[rows[1:]], middles)
+            self._compare(found, rows[1:], values, middles + shift[self._jumps[rows[1:]]])
         for k, (one, other) in enumerate(zip(self.run.transitions[:count], self.finer.transitions, strict=False)):
             before, after = np.searchsorted(self._jumps, [k, k + 1], "right") - 1
             for row, a, b in ((before, one.before, other.before), (after, one.after or {}, other.after or {})):
@@ -146,15 +153,25 @@ class Errors:
             values[rows, columns] = np.asarray(self.run.values[rows, : len(columns)], dtype=float)
         return values
 
-    def _apart(self, other: Execution, jumps: Any, values: Array, times: Array) -> Array:
-        """How far another run is from values at times, where it has made as many transitions; else 0."""
-        samples = other.sample(times)
-        there = np.full(values.shape, np.nan)
-        for k, name in enumerate(samples.states):
-            if name in self.columns:
-                there[:, self.columns[name]] = np.asarray(samples.state_columns[:, k], dtype=float)
-        there[samples.jump != jumps] = np.nan
-        return np.nan_to_num(np.abs(values - there))
+    def _compare(self, found: Array, rows: Array, values: Array, times: Array) -> None:
+        """Enter how far the finer run is from values that belong to rows, at times."""
+        first, last = map(float, self.finer.time_span)
+        inside = (times >= first) & (times <= last)
+        rows, values, times = rows[inside], values[inside], times[inside]
+        if len(rows):
+            apart = np.nan_to_num(np.abs(values - self._at(self.finer, self._jumps[rows], times)))
+            found[rows] = np.maximum(found[rows], apart)
+
+    def _at(self, run: Execution, jumps: Array, times: Array) -> Array:
+        """States of a run at times, not-a-number where it has not made so many transitions; shape (times, states)."""
+        there = np.full((len(times), len(self.columns)), np.nan)
+        if len(times):
+            samples = run.sample(times)
+            for k, name in enumerate(samples.states):
+                if name in self.columns:
+                    there[:, self.columns[name]] = np.asarray(samples.state_columns[:, k], dtype=float)
+            there[samples.jump != jumps] = np.nan
+        return there
 
 
 def _parted(one: Sequence[Transition], other: Sequence[Transition], slack: float) -> float | None:
