@@ -13,12 +13,13 @@ import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 
 import hsdsl
+from hsdsl.processes import processor_seconds
 from hsdsl.sweep.variation import read
 
 MODEL = Path(__file__).parent.parent / "models" / "oscillator-with-stop-1.yaml"
@@ -31,12 +32,12 @@ def resident(process: int | str) -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024
 
 
-def rate_of_ensemble(model: hsdsl.Model, rows: int, settings: dict[str, Any]) -> float:
-    """Rows a second of the same rows in memory, by two threads."""
+def rate_of_ensemble(model: hsdsl.Model, rows: int, settings: dict[str, Any]) -> tuple[float, float]:
+    """Rows a second of the same rows in memory, by two threads; and rows a second of processors."""
     values = read(VARY, rows, 0, lambda value, _: float(value)).values(0, rows)
-    began = perf_counter()
+    began, busy = perf_counter(), process_time()
     model.ensemble(parameters={"c": values["c"]}, initial={"v": values["initial.v"]}, threads=2, **settings)
-    return rows / (perf_counter() - began)
+    return rows / (perf_counter() - began), rows / (process_time() - busy)
 
 
 @contextmanager
@@ -73,14 +74,19 @@ def main() -> None:
             if done >= rows * len(memory) / 4:
                 memory.append((done / rows, [resident(each) for each in ("self", *processes)]))
 
-        began = perf_counter()
+        def processors() -> float:
+            return process_time() + sum(map(processor_seconds, processes))
+
+        began, busy = perf_counter(), processors()
         found = model.sweep(VARY, Path(folder) / "sweep", random=given.rows, progress=watch, **settings, **where)
-        rate = given.rows / (perf_counter() - began)
+        rate, by_processors = given.rows / (perf_counter() - began), given.rows / (processors() - busy)
         size = sum(path.stat().st_size for path in found.chunks.values())
-    rates = np.array(before + [rate_of_ensemble(model, given.baseline, settings) for _ in range(given.rounds)])
+    rounds = before + [rate_of_ensemble(model, given.baseline, settings) for _ in range(given.rounds)]
+    rates, of_processors = np.transpose(rounds)
     print(f"ensemble, {given.baseline:,} rows, 2 threads: {rates.max():,.0f} rows/s (of {rates.round(-1).tolist()})")
     print(f"sweep, {given.rows:,} rows in {len(found.chunks)} files of {size / 1e6:.1f} MB in all: {rate:,.0f} rows/s")
     print(f"ratio {rate / rates.max():.2f} of the best, {rate / np.median(rates):.2f} of the median")
+    print(f"a second of processors: ensemble {np.median(of_processors):,.0f} rows, sweep {by_processors:,.0f}")
     for share, sizes in memory:
         print(f"at {share:4.0%}: MB of this process and the workers: {', '.join(f'{size:.0f}' for size in sizes)}")
 

@@ -31,8 +31,9 @@ from hsdsl.sweep.schedule import Run, run_here
 if TYPE_CHECKING:
     from hsdsl.model import Model
 
-PROBES, SECONDS, BYTES, MOST_ROWS = 16, 2.0, 64e6, 100_000
-CHUNKS_A_CORE = 4  # at least, so that no core waits for the last chunk
+PROBES, BYTES, MOST_ROWS = 16, 64e6, 100_000
+SECONDS, LEAST_SECONDS = 2.0, 0.1  # of a chunk
+CHUNKS_A_CORE = 16  # so that no core waits long for the last chunk
 Progress = Callable[[int, int], None]
 
 
@@ -251,10 +252,11 @@ def _measured(work: ChunkWork, processes: int) -> int:
     first, shared = rows // 2, math.ceil(rows / (CHUNKS_A_CORE * processes))
     work.rows(first, first + 1)  # what is imported and compiled only once does not count
     count, seconds, size = 1, 0.0, 0.0
-    while seconds < SECONDS / 20 and 2 * count <= rows - first:
+    while seconds < LEAST_SECONDS and 2 * count <= rows - first:
         count *= 2
         began = time.perf_counter()
         size = work.rows(first, first + count).nbytes / count
         seconds = time.perf_counter() - began
-    by_memory, by_time = BYTES / max(1.0, size), SECONDS * count / max(seconds, 1e-6)
-    return max(1, int(min(by_memory, by_time, shared, MOST_ROWS)))
+    pace = count / max(seconds, 1e-6)
+    shared = max(shared, min(LEAST_SECONDS * pace, rows / processes))
+    return max(1, int(min(BYTES / max(1.0, size), SECONDS * pace, shared, MOST_ROWS)))

@@ -8,8 +8,11 @@ thread, so memory stays flat. A chunk whose worker is lost goes to another one.
 
 from __future__ import annotations
 
+import asyncio
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent import futures
 from contextlib import contextmanager, suppress
 from functools import partial
 from secrets import token_hex
@@ -19,10 +22,11 @@ from distributed import Client, WorkerPlugin, as_completed, get_worker
 from distributed.scheduler import KilledWorker
 
 from hsdsl.errors import UsageError
-from hsdsl.sweep.schedule import Run, Work, Write, refuse_deadly
+from hsdsl.sweep.schedule import TRIES, Run, Work, Write, refuse_deadly
 
 AHEAD = 3  # chunks under way for each thread
 PATIENCE = 10  # seconds for the connection
+PAUSE = 1.0  # seconds until a worker that died may be gone
 
 
 class SweepPlugin(WorkerPlugin):
@@ -37,7 +41,10 @@ class SweepPlugin(WorkerPlugin):
 
 
 def _answer(name: str, chunk: int) -> bytes:
-    return get_worker().plugins[name].work(chunk)
+    plugins, until = get_worker().plugins, time.monotonic() + PATIENCE
+    while name not in plugins and time.monotonic() < until:
+        time.sleep(0.05)  # a worker that was restarted is still compiling
+    return plugins[name].work(chunk)
 
 
 @contextmanager
@@ -53,8 +60,8 @@ def connected(address: str) -> Iterator[Run]:
         raise UsageError(f"--cluster {address}: no scheduler answers there ({type(error).__name__})", hint) from None
     try:
         yield partial(_run, client)
-    except (OSError, TimeoutError) as error:
-        said = f"the cluster at {address} is lost ({error}); what was done is kept"
+    except (OSError, TimeoutError, asyncio.CancelledError, futures.CancelledError) as error:
+        said = f"the cluster at {address} is lost ({type(error).__name__}); what was done is kept"
         raise UsageError(said, "the same command goes on") from None
     finally:
         client.close()
@@ -62,12 +69,24 @@ def connected(address: str) -> Iterator[Run]:
 
 def _run(client: Any, work: Work, chunks: Sequence[int], write: Write) -> None:
     name = f"hsdsl-sweep-{token_hex(8)}"
-    client.register_plugin(SweepPlugin(name, work), name=name)
+    _register(client, SweepPlugin(name, work))
     try:
         _make(client, name, iter(chunks), write)
     finally:
         with suppress(OSError, TimeoutError):
             client.unregister_worker_plugin(name)
+
+
+def _register(client: Any, plugin: SweepPlugin) -> None:
+    """Send the work to every worker; one that dies meanwhile gets it when it is back."""
+    for left in reversed(range(TRIES)):
+        try:
+            client.register_plugin(plugin, name=plugin.name)
+            return
+        except (OSError, TimeoutError):
+            if not left:
+                raise
+            time.sleep(PAUSE)
 
 
 def _make(client: Any, name: str, waiting: Iterator[int], write: Write) -> None:

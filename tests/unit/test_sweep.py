@@ -193,7 +193,7 @@ def test_damaged_files_are_made_again(model, tmp_path):
 def test_another_model_or_other_settings_are_refused(model, tmp_path):
     out = tmp_path / "s"
     arguments = {"vary": VARY, "out": out, "processes": 1}
-    model.sweep(**arguments)
+    model.sweep(**arguments, chunk=3)
     for changed, words in (
         ({"parameters": {"g": 10}}, "the settings"),
         ({"vary": {"c": [0.5]}}, "what varies"),
@@ -338,3 +338,21 @@ def test_a_cluster_that_does_not_answer_is_refused(model, tmp_path, monkeypatch)
     with pytest.raises(UsageError, match="no scheduler answers there"):
         model.sweep(VARY, tmp_path / "s", cluster="tcp://127.0.0.1:9")
     assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_that_is_lost_loses_nothing(model, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("hsdsl.sweep.cluster.PATIENCE", 0.5)
+    arguments = {"vary": {"c": "0.7:0.9:200"}, "out": tmp_path / "s", "chunk": 5}
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    cluster = distributed.LocalCluster(**options)
+
+    def progress(done: int, rows: int) -> None:
+        if done >= 10:
+            cluster.close()
+
+    with pytest.raises(UsageError, match=r"the cluster at .* is lost"):
+        model.sweep(cluster=cluster.scheduler_address, progress=progress, **arguments)
+    assert 10 <= load(tmp_path / "s").done < 200
+    assert model.sweep(**arguments, processes=1).complete
