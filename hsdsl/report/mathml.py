@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from html import escape
 from typing import Any
 
@@ -12,6 +12,9 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 
 from hsdsl import decimals
 from hsdsl.expression import plain
+from hsdsl.expression.scope import Function, symbol
+from hsdsl.expression.syntax import ExpressionError
+from hsdsl.names import visible
 
 _SIGNS = {">=": "≥", "<=": "≤", ">": ">", "<": "<"}
 _FENCES = {"absolute": ("|", "|"), "floor": ("⌊", "⌋")}
@@ -22,9 +25,13 @@ _MOST_PARTS = 9  # of the unit that are written as a fraction: others as decimal
 
 
 class Mathematics:
-    """Expressions with the names of one model: two names that would look alike are printed as they are written."""
+    """Expressions with the names of one model: two names that would look alike are printed as they are written.
 
-    def __init__(self, names: Iterable[str]) -> None:
+    So is an expression that is no mathematics of one mode: that of a part, whose names are those of its automaton.
+    """
+
+    def __init__(self, names: Iterable[str], functions: Mapping[str, Function] | None = None) -> None:
+        self.functions = functions or {}
         forms: dict[tuple[Any, ...], set[str]] = {}
         for name in names:
             head, above, below = split_super_sub(name)
@@ -34,11 +41,11 @@ class Mathematics:
 
     def name(self, name: str) -> str:
         """A name."""
-        return self.printer.doprint(plain.value(name))
+        return self.printer.doprint(symbol(name))
 
     def equation(self, left: str, text: str) -> str:
         """An equation whose left side is MathML."""
-        return _formula(f"{left}<mo>=</mo>{self.printer.doprint(plain.value(text))}")
+        return self._formula(f"{left}<mo>=</mo>", text, lambda: plain.value(text, self.functions))
 
     def derivative(self, name: str, text: str) -> str:
         """The flow of a state."""
@@ -50,17 +57,30 @@ class Mathematics:
 
     def inequality(self, text: str) -> str:
         """One inequality, as it was written."""
-        left, sign, right = plain.inequality(text)
+        try:
+            left, sign, right = plain.inequality(text, self.functions)
+        except ExpressionError:
+            return _code(text)
         middle = f"<mo>{escape(_SIGNS[sign])}</mo>"
         return _formula(f"{self.printer.doprint(left)}{middle}{self.printer.doprint(right)}")
 
     def condition(self, text: str) -> str:
         """A condition."""
-        return _formula(self.printer.doprint(plain.condition(text)))
+        return self._formula("", text, lambda: plain.condition(text, self.functions))
+
+    def _formula(self, left: str, text: str, read: Callable[[], Any]) -> str:
+        try:
+            return _formula(left + self.printer.doprint(read()))
+        except ExpressionError:
+            return (_formula(left) if left else "") + _code(text)
 
     def value(self, value: Any) -> str:
         """An expression of SymPy."""
         return _formula(self.printer.doprint(value))
+
+
+def _code(text: str) -> str:
+    return f"<code>{escape(visible(text))}</code>"
 
 
 def _formula(inside: str) -> str:

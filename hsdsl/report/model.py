@@ -5,25 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from hsdsl.names import shown, visible, visible_lines
+from hsdsl.elaborate.functions import named_functions
+from hsdsl.expression.scope import state
+from hsdsl.names import shown, visible_lines
 from hsdsl.program import Program
 from hsdsl.report import mode_graph
 from hsdsl.report.mathml import Mathematics
+from hsdsl.report.visited import visited_part
 from hsdsl.system import Edge, HybridSystem, Mode
 
-MOST_MODES, MOST_OPEN, MOST_ROWS = 40, 4, 30  # modes that are shown; modes that are unfolded; rows of a table
+MOST_MODES, MOST_OPEN = 40, 4  # modes that are shown; that are unfolded
+MOST_ROWS, MOST_EQUATIONS = 30, 60  # of a table; of a mode
 CSS = ".hsdsl summary { cursor: pointer } .hsdsl ul { margin: .2rem 0 } .hsdsl .modes { max-width: 60rem }"
 
 
 def model_html(system: HybridSystem, program: Program) -> str:
     """Return the model in a ``div``; every text of the model is escaped, and nothing is fetched."""
-    math = Mathematics(_names(system))
-    count = f"{len(system.modes)} mode{'s' * (len(system.modes) != 1)}"
+    parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
+    math = Mathematics(_names(system), named_functions(system.functions, parameters))
+    kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(system.modes))
+    count = f"{number} {kind}{'s' * (number != 1)}"
     heading = f"<p><strong>{_said(system.title or system.path)}</strong><br>{count}, {_start(system, math)}</p>"
     modes = [_mode(system, mode, math, len(system.modes) <= MOST_OPEN) for mode in system.modes[:MOST_MODES]]
     left = len(system.modes) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
-    parts = [heading, _parameters(system), _shared(system, math), mode_graph.graph_of(program), *modes, *more]
+    parts = [
+        heading,
+        _parameters(system),
+        _parts(system),
+        _shared(system, math),
+        mode_graph.graph_of(visited_part(program, None)),
+        *modes,
+        *more,
+    ]
     return f'<div class="hsdsl"><style>{mode_graph.CSS}{CSS}</style>{"".join(parts)}</div>'
 
 
@@ -41,8 +55,12 @@ def _names(system: HybridSystem) -> Iterable[str]:
 
 def _start(system: HybridSystem, math: Mathematics) -> str:
     initial, until = system.initial, math.value(system.experiment.until)
-    values = ", ".join(f"{_said(name)} = {math.value(value)}" for name, value in initial.values)
-    return f"starts in {_said(initial.mode)}{' at ' if values else ''}{values}, until {until}"
+    numbers = {part.name for part in system.parts if part.is_numbered}
+    start = [(name, value) for name, value in initial.values if name not in numbers]
+    values = ", ".join(f"{_said(name)} = {math.value(value)}" for name, value in start[:MOST_ROWS])
+    values += ", ..." if len(start) > MOST_ROWS else ""
+    where = "" if system.parts else f" in {_said(initial.mode)}"
+    return f"starts{where}{' at ' if values else ''}{values}, until {until}"
 
 
 def _parameters(system: HybridSystem) -> str:
@@ -50,6 +68,13 @@ def _parameters(system: HybridSystem) -> str:
     left = len(system.parameters) - MOST_ROWS
     rows += [(f"{left} more", "", "", "")] if left > 0 else []
     return _table(("parameter", "value", "unit", "meaning"), rows)
+
+
+def _parts(system: HybridSystem) -> str:
+    """The parts of a composed model, with their modes: its product modes are as many as their product."""
+    rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts[:MOST_ROWS]]
+    left = len(system.parts) - MOST_ROWS
+    return _table(("part", "modes", "starts in"), [*rows, *([(f"{left} more", "", "")] if left > 0 else [])])
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -76,18 +101,24 @@ def _list(items: Sequence[str]) -> str:
 
 
 def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -> str:
-    flow = [math.derivative(name, text) for name, text in zip(mode.states, mode.flow_texts, strict=True)]
+    numbers = {part.name for part in system.parts if part.is_numbered}
+    flows = zip(mode.states, mode.flow_texts, strict=True)
+    flow = [math.derivative(name, text) for name, text in flows if name not in numbers]
     walls = [f"domain: {math.inequality(wall.text)}" for wall in mode.walls]
-    edges = [_edge(edge, math) for edge in mode.edges]
-    items = [*flow, *_definitions(system, mode.name, math), *walls, *edges]
+    edges = [_edge(edge, math, not system.parts) for edge in mode.edges[:MOST_EQUATIONS]]
+    edges += [f"{len(mode.edges) - MOST_EQUATIONS} more transitions"] * (len(mode.edges) > MOST_EQUATIONS)
+    items = [*flow[:MOST_EQUATIONS], *([f"{len(flow) - MOST_EQUATIONS} more"] * (len(flow) > MOST_EQUATIONS))]
+    items += [*_definitions(system, mode.name, math), *walls, *edges]
     name = f"{_said(shown(mode.name))}{' (final)' if mode.final else ''}"
     opened = " open" if unfolded else ""
-    return f"<details{opened}><summary>mode <strong>{name}</strong></summary>{_list(items)}</details>"
+    summary = "equations of all parts" if system.parts else f"mode <strong>{name}</strong>"
+    return f"<details{opened}><summary>{summary}</summary>{_list(items)}</details>"
 
 
-def _edge(edge: Edge, math: Mathematics) -> str:
+def _edge(edge: Edge, math: Mathematics, named: bool) -> str:
+    """A transition; ``named`` says that its target has a name that people gave."""
     condition = f" if {math.condition(edge.condition_text)}" if edge.condition_text else ""
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     changed = ", ".join(math.reset(name, text) for name, text in resets if text != name)
-    ends = f"<strong>{_said(edge.name)}</strong> to {_said(visible(edge.target))}"
+    ends = f"<strong>{_said(edge.name)}</strong>{f' to {_said(edge.target)}' if named else ''}"
     return f"{ends} when {math.inequality(edge.surface.text)}{condition}{': ' if changed else ''}{changed}"

@@ -244,3 +244,46 @@ def test_progress_is_shown_in_notebooks_alone(monkeypatch):
     shell.kernel = None
     with in_notebook() as show:
         assert show is None
+
+
+ROOMS = """
+hsdsl: 1
+automata:
+  room:
+    parameters: {power: 30}
+    modes:
+      on: {flow: {T: power - T}, transitions: [{name: warm, when: T >= 21, to: off}]}
+      off: {flow: {T: -T}, transitions: [{name: cold, when: T <= 19, to: on}]}
+system:
+  a: {automaton: room, initial: {mode: on, T: 20}}
+  b: {automaton: room, initial: {mode: off, T: 20}}
+experiment: {until: 1}
+"""
+
+
+def test_a_model_of_parts_shows_its_parts():
+    model = hsdsl.loads(ROOMS)
+    tree = Tree(model._repr_html_())
+    assert "2 parts" in tree.text and "aon, offon" in tree.text and "a.warm" in tree.text and "svg" not in tree.seen
+    run = model.simulate(engine="python")
+    assert "a=on b=off" in Tree(run._repr_html_()).text
+    assert [axis.get_ylabel() for axis in run.plot(_figure())][:2] == ["a.T", "b.T"]
+
+
+def _figure():
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(9, 5), layout="constrained")
+
+
+def test_functions_of_a_file_are_written_out():
+    text = """
+hsdsl: 1
+parameters: {k: 2}
+functions: {spring: {of: [s], is: -k*s}}
+modes: {on: {flow: {x: v, v: spring(x)}}}
+initial: {mode: on, x: 1, v: 0}
+experiment: {until: 1}
+"""
+    found = [formula(part + "</math>") for part in _formulas(hsdsl.loads(text)._repr_html_())]
+    assert "v˙=−kx" in found
