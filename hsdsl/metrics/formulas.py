@@ -72,7 +72,8 @@ def compiled(text: Routines, shape: tuple[int, int], jumps: bool) -> Formula:
         with np.errstate(all="ignore"):
             found = [as_range(r) for r in over[k](*hull(low, high))]
         ends = ([np.broadcast_to(getattr(r, end), len(low)) for r in found] for end in ("low", "high"))
-        below, above = (np.array(end, dtype=float).reshape(-1, len(low)).T.reshape(len(low), *size) for end in ends)
+        flat, whole = (len(found), len(low)), (len(low), *size)  # also where there are no boxes
+        below, above = (np.array(end, dtype=float).reshape(flat).T.reshape(whole) for end in ends)
         return below, above
 
     def slopes(low: Array, high: Array) -> tuple[Array, Array]:

@@ -10,7 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 import hsdsl
-from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, segments_inside, to_passages
+from hsdsl.metrics import guard_clearance
+from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, UNDECIDED, segments_inside, to_passages
 from hsdsl.metrics.points import SpacePoint, distance
 from hsdsl.metrics.space import make_space
 from hsdsl.model.distances import distance_of_runs as between_runs
@@ -166,3 +167,22 @@ def test_a_distance_keeps_to_its_seconds_and_says_so(model):
     assert 0 < found.lower <= 2.882014 <= found.upper
     with pytest.raises(hsdsl.UsageError, match="positive number of seconds"):
         between_runs(a, b, model=model, seconds=0)
+
+
+def test_formulas_take_no_boxes(space):
+    none = np.zeros((0, 6))
+    for formula in space.domains[0].curved:
+        m, n = formula.jacobian(np.ones(6)).shape
+        assert all(end.shape == (0, m) for end in formula.ranges(none, none))
+        assert all(end.shape == (0, m, n) for end in formula.slopes(none, none))
+
+
+def test_pieces_that_may_not_be_cut_are_judged_by_points(space, monkeypatch):
+    monkeypatch.setattr(guard_clearance, "MOST_PARTS", 0)  # nothing is left to cut in halves
+    rng = np.random.default_rng(2)
+    low, high = (-1, 0.5, -1, -1, -2, -1), (1, 1.2, 1, 1, 0, 1)
+    a, b = rng.uniform(low, high, size=(100, 6)), rng.uniform(low, high, size=(100, 6))
+    verdicts = segments_inside(space, 0, a, b)
+    seen = np.array([foot_heights(np.vstack([p, q])).min() for p, q in zip(a, b, strict=True)])
+    assert np.all(verdicts[seen < -1e-6] == OUTSIDE)
+    assert UNDECIDED in verdicts

@@ -153,7 +153,7 @@ class Errors:
             values[rows, columns] = np.asarray(self.run.values[rows, : len(columns)], dtype=float)
         return values
 
-    def _compare(self, found: Array, rows: Array, values: Array, times: Array) -> None:
+    def _compare(self, found: Array, rows: Any, values: Array, times: Array) -> None:
         """Enter how far the finer run is from values that belong to rows, at times."""
         first, last = map(float, self.finer.time_span)
         inside = (times >= first) & (times <= last)
@@ -162,7 +162,7 @@ class Errors:
             apart = np.nan_to_num(np.abs(values - self._at(self.finer, self._jumps[rows], times)))
             found[rows] = np.maximum(found[rows], apart)
 
-    def _at(self, run: Execution, jumps: Array, times: Array) -> Array:
+    def _at(self, run: Execution, jumps: Any, times: Array) -> Array:
         """States of a run at times, not-a-number where it has not made so many transitions; shape (times, states)."""
         there = np.full((len(times), len(self.columns)), np.nan)
         if len(times):
