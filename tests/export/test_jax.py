@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import ctypes
+import gc
 import os
 import subprocess
 import sys
@@ -64,6 +66,9 @@ def slow_or_campaign(campaign: bool) -> pytest.MarkDecorator:
 def _no_compiled_code_is_left() -> Iterator[None]:
     yield
     jax.clear_caches()  # else each test adds its own to the memory
+    gc.collect()
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+        libc.malloc_trim(0)
 
 
 def hostile(path: Path) -> Path:
