@@ -79,5 +79,6 @@ def assert_engines_agree(model: Model, kernel: bool = True, **arguments: Any) ->
         ]  # fmt: skip
         assert not differing, (name, differing, python.stop, other.stop, arguments)
         assert alike(python) == alike(other)
-    assert_sampled_alike(others["C loop"])
+    if not model.program.parts:  # runs of parts are sampled in Python
+        assert_sampled_alike(others["C loop"])
     return python

@@ -18,6 +18,7 @@ from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.ignores import Ignored, sift
+from hsdsl.lint.parts import findings_of_parts
 from hsdsl.lint.rules import RULES
 from hsdsl.lint.selection import Selection, configured
 from hsdsl.lint.subject import Subject
@@ -62,8 +63,13 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     seconds = limits.current().seconds
     end = time.process_time() + seconds / 2
     found: list[Diagnostic] = []
+    if subject.system.parts:
+        found += [_diagnostic(subject, code, finding) for code, finding in findings_of_parts(subject, codes)]
+        codes_of_modes: tuple[str, ...] = ()
+    else:
+        codes_of_modes = tuple(codes)
     with deep_stack():
-        for code in codes:
+        for code in codes_of_modes:
             found += _findings(subject, code, min(seconds / PARTS, end - time.process_time()))
     findings, ignored = sift(subject, found, codes)
     return Report(subject.system, findings, ignored)

@@ -87,6 +87,8 @@ class Model:
         return type(self), (self.pipeline,)
 
     def __repr__(self) -> str:
+        if parts := self.program.parts:
+            return f"<hsdsl model {visible(Path(self.program.path).name)}: a system of {len(parts)} parts>"
         modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
         return f"<hsdsl model {visible(Path(self.program.path).name)}: modes {modes}>"
 
@@ -196,8 +198,14 @@ class Model:
         call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
         return self._sliding_for(call)._differentiator.of_run(call, wrt)
 
+    def _flat(self, what: str) -> None:
+        """Refuse what systems of parts are not made for yet."""
+        if self.program.parts:
+            raise UsageError(f"{what} cannot be had of a system of parts", "write the modes of a small one out")
+
     def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
         """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
+        self._flat("derivatives, fits, orbits and their stability")
         given = {"completion": arguments.get("completion")}
         options = self.resolve(arguments.get("settings"), given)
         return self.sliding if options.values["completion"].value == "auto" else self
@@ -385,6 +393,7 @@ class Model:
         """
         from hsdsl.model.stream import check, stream
 
+        self._flat("rows in a file while a run goes on")
         target = check(path, every, columns, arguments, self)
         return stream(self.pipeline.prepare(arguments | {"engine": "c"}), target, every, columns, watch)
 
@@ -496,6 +505,7 @@ class Model:
         It is an ordinary model, for every engine and export. A transition enters the motion along its guard where the
         flight that follows it would last less than the parameter ``contact_time``.
         """
+        self._flat("a completed text")
         from hsdsl.completion.text import completed_text
         from hsdsl.elaborate import elaborate_files
 
@@ -646,6 +656,8 @@ class Model:
         """
         from hsdsl.model.distances import budget_of
         from hsdsl.model.points import distance_of_points
+
+        self._flat("a distance of two points")
 
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
         return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)

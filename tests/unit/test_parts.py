@@ -306,3 +306,37 @@ def test_balls_come_to_rest_while_others_go_on():
     rests = [3 * np.sqrt(2 * h / 9.81) for h in (1, 2)]
     assert all(any(f"Zeno at t = {rest:.5f}"[:17] in reason for reason in run.verdict.reasons) for rest in rests)
     assert sum(t.edge.startswith("lamp") for t in run.transitions) == 6
+
+
+def test_since_is_of_the_part():
+    text = """
+    hsdsl: 1
+    functions: {twice: {of: [u], is: 2*u}}
+    automata:
+      blinker:
+        parameters: {pause: 1}
+        modes:
+          dark: {flow: {}, transitions: [{when: since >= pause, to: bright}]}
+          bright: {flow: {}, let: {light: twice(since)}, transitions: [{when: since >= 2*pause, to: dark}]}
+    system:
+      a: {automaton: blinker, initial: {mode: dark}}
+      b: {automaton: blinker, initial: {mode: dark}, parameters: {pause: 0.7}}
+    outputs: {light: a.light}
+    experiment: {until: 6.5}
+    """
+    run = hsdsl.loads(text).simulate()
+    times = {"a": [1, 3, 4, 6], "b": [0.7, 2.1, 2.8, 4.2, 4.9, 6.3]}
+    for name, expected in times.items():
+        made = [t.time for t in run.transitions if t.edge.startswith(name)]
+        assert made == pytest.approx(expected, abs=1e-9)
+    assert run(2.0)["light"] == pytest.approx(2.0)
+    assert np.isnan(run(0.5)["light"])
+
+
+def test_the_centipede_costs_what_its_legs_cost():
+    model = hsdsl.load(MODELS / "centipede.yaml")
+    assert len(model.program.modes) == 1
+    assert len(model.program.modes[0].edges) == 40
+    run = model.simulate(until=1)
+    assert run.stop.reason == "until"
+    assert len(run.transitions) > 30

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
+from dataclasses import replace
 from typing import Any
 
 from hsdsl.elaborate.definitions import define_parameter
@@ -14,6 +15,7 @@ from hsdsl.elaborate.scene import elaborate_scene
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.expression.selection import NO_VALUE, ZERO, whole
+from hsdsl.names import SINCE
 from hsdsl.parts import Part, numbered
 from hsdsl.schema import SystemDocument
 from hsdsl.source import Key
@@ -52,6 +54,7 @@ class Parts:
         self.scene, scene = self._scene()
         self._check_lets(document)
         self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
+        self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
 
     def _refuse_modes(self, document: SystemDocument) -> None:
@@ -126,6 +129,11 @@ class Parts:
                 if found and all(isinstance(meaning, Refusal) for meaning in found):
                     self.board.value(scalar, places[0])
 
+    def _with_timer(self, part: Part) -> Part:
+        """A part with the state `since` in all of its modes, where it uses that."""
+        timer = (f"{part.name}.{SINCE}",) if part.name in self.board.timed else ()
+        return replace(part, states=tuple((*states, *timer) for states in part.states))
+
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""
         values: list[tuple[str, Any]] = []
@@ -145,5 +153,6 @@ class Parts:
             for part, one in zip(self.parts, self.roster.instances.values(), strict=True)
         }
         ends = any(one.part.final[one.start or 0] for one in self.roster.instances.values())
+        values += [(one.full(SINCE), ZERO) for one in self.roster.instances.values() if one.name in self.board.timed]
         values += [(name, starts[name]) for name in numbered(self.parts)]
         return Initial(FINAL if ends else MODE, tuple(values))

@@ -11,7 +11,8 @@ from typing import Any
 from hsdsl.elaborate.parts.names import Board
 from hsdsl.elaborate.parts.transitions import Event, PartTransition
 from hsdsl.expression.scope import symbol
-from hsdsl.expression.selection import ONE, either, is_mode, select, total, truth_of, whole
+from hsdsl.expression.selection import ONE, ZERO, either, is_mode, select, total, truth_of, whole
+from hsdsl.names import SINCE
 
 
 @dataclass
@@ -74,8 +75,9 @@ class Broadcast:
         setters = dict.fromkeys(first.resets, first)
         if first.one.part.is_numbered and first.target != first.source:
             values[first.one.name] = whole(first.target + 1)
+        values |= self._timer(first)
         for truth, follower in self.followers(first):
-            given = dict(follower.resets)
+            given = follower.resets | self._timer(follower)
             if follower.one.part.is_numbered and follower.target != follower.source:
                 given[follower.one.name] = whole(follower.target + 1)
             for state, value in given.items():
@@ -85,6 +87,10 @@ class Broadcast:
                 safe = total(value, lambda a, b, truth=truth: select(truth, a, b), frozenset())
                 values[state] = select(truth, safe, values.get(state, symbol(state)))
         return values
+
+    def _timer(self, made: PartTransition) -> dict[str, Any]:
+        """The timer of an instance, which each of its transitions sets to 0."""
+        return {made.one.full(SINCE): ZERO} if made.one.name in self.board.timed else {}
 
     def _clash(self, state: str, one: PartTransition, other: PartTransition) -> None:
         message = (

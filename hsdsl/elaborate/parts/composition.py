@@ -18,6 +18,7 @@ from hsdsl.elaborate.parts.names import Board, Names
 from hsdsl.elaborate.parts.transitions import PartTransition, transitions_of
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import ONE, ZERO, pick
+from hsdsl.names import SINCE
 from hsdsl.parts import numbered
 from hsdsl.system import Edge, Mode, Surface
 
@@ -39,7 +40,13 @@ class Composition:
     def states(self) -> tuple[str, ...]:
         """The states of the whole: those of the parts, then the numbers of their modes."""
         parts = [one.part for one in self.instances]
-        return (*(one.full(state) for one in self.instances for state in one.states), *numbered(parts))
+        own = (one.full(state) for one in self.instances for state in one.states)
+        return (*own, *self.timers, *numbered(parts))
+
+    @property
+    def timers(self) -> tuple[str, ...]:
+        """The states `since` of the instances that use it."""
+        return tuple(one.full(SINCE) for one in self.instances if one.name in self.board.timed)
 
     def modes(self, outputs: tuple[Any | None, ...], scene: tuple[Any, ...]) -> tuple[Mode, ...]:
         """The mode of the whole, and a final one where a part has one; none where something is wrong."""
@@ -50,6 +57,7 @@ class Composition:
             return ()
         broadcast = Broadcast(self.board, [t for t in transitions if not t.surface])
         edges = [self._edge(broadcast, t) for t in transitions if t.surface]
+        flow += [(ONE, "1")] * len(self.timers)
         count = len(self.states) - len(flow)
         whole = Mode(
             name=MODE,

@@ -19,7 +19,7 @@ from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression import ExpressionError, parse, selection, syntax
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
-from hsdsl.names import did_you_mean
+from hsdsl.names import SINCE, did_you_mean
 from hsdsl.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
@@ -29,12 +29,16 @@ _IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
 
 @dataclass
 class Board:
-    """The names of a system, with what has been worked out; ``parameters`` has those of instances by full name."""
+    """The names of a system, with what has been worked out; ``parameters`` has those of instances by full name.
+
+    ``timed`` has the names of instances that use `since`, the time since they entered their mode.
+    """
 
     symbols: SymbolTable
     roster: Roster
     lets: Mapping[str, Scalar]
     parameters: dict[str, Meaning] = field(default_factory=dict)
+    timed: dict[str, None] = field(default_factory=dict)
     _known: dict[tuple[Any, ...], Meaning] = field(default_factory=dict)
     _active: list[tuple[str, str]] = field(default_factory=list)
     _broken: set[tuple[str, Any, str]] = field(default_factory=set)
@@ -254,6 +258,8 @@ class Names(Mapping[str, Meaning]):
                 return meaning  # pyright: ignore[reportReturnType]
         if name == "index" and self.index is not None:
             return _whole(self.index)
+        if name == SINCE and self.board.symbols.timed:
+            return Refusal("HS117", f"'{SINCE}' is the time since a part entered its mode", "use it in an automaton")
         if name in self.board.lets:
             return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], self._outside, name)
         return self.board.symbols.values[name]
@@ -283,6 +289,9 @@ class Names(Mapping[str, Meaning]):
         if any(name in other.let for _, other in one.modes):
             hint = "give it to this mode too, or define it once in the `let` of the automaton"
             return Refusal("HS354", f"'{name}' is a `let` name of other modes", hint)
+        if name == SINCE and self.board.symbols.timed:
+            self.board.timed[one.name] = None
+            return Value(symbol(one.full(SINCE)))
         return _whole(one.index) if name == "index" and one.index is not None else KeyError
 
     def __iter__(self) -> Iterator[str]:
