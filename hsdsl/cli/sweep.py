@@ -83,7 +83,6 @@ def sweep(
             from hsdsl.sweep import load
 
             found = load(show)
-            plot = plot or show / "_picture.png"
         else:
             settings = settings_of(
                 overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
@@ -93,7 +92,9 @@ def sweep(
             settings |= {"processes": processes, "chunk": chunk, "outputs": names_of(outputs) or None}
             assert model is not None and vary is not None and out is not None
             found = _run(model, vary, out, settings, quiet or json)
-        _report(found, plot, of, tail, json, quiet)
+        _report(
+            found, plot or (show and show / "_picture.png"), of, tail, plot is not None or of is not None, json, quiet
+        )
 
 
 def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: Path | None) -> None:
@@ -158,10 +159,19 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
-def _report(found: Any, plot: Path | None, of: str | None, tail: float, json: bool, quiet: bool) -> None:
-    if plot is not None:
+def _draw(found: Any, plot: Path, of: str | None, tail: float, needed: bool) -> None:
+    try:
         found.plot(plot, of, tail=tail)
         say(f"wrote {plot}")
+    except UsageError as error:
+        if needed:
+            raise
+        say(f"no picture: {error}")
+
+
+def _report(found: Any, plot: Path | None, of: str | None, tail: float, needed: bool, json: bool, quiet: bool) -> None:
+    if plot is not None:
+        _draw(found, plot, of, tail, needed)
     if json:
         print_json(found.as_json())
     elif not quiet:

@@ -53,7 +53,7 @@ def plot_curve(path: str | os.PathLike[str], x: Axis, of: Quantity, title: str) 
         if of.words:
             numbers = [of.words.index(str(v)) if v is not None else np.nan for v in of.values[order]]
             axes.plot(x.values[order], numbers, ".", color=curve(PALETTE[5]))
-            axes.set_yticks(range(len(of.words)), of.words)
+            axes.set_yticks(range(len(of.words)), of.words, parse_math=False)
         else:
             line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
             axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
@@ -148,10 +148,12 @@ def edges(values: Any, logarithmic: bool) -> Any:
 
 def _legend(figure: Figure, axes: Axes, drawn: Any, of: Quantity) -> None:
     if not of.words:
-        figure.colorbar(drawn, ax=axes, label=of.label)
+        figure.colorbar(drawn, ax=axes).set_label(of.label, parse_math=False)
         return
     from matplotlib.patches import Patch
 
     handles = [Patch(color=PALETTE[i % len(PALETTE)], label=word) for i, word in enumerate(of.words[:MOST_WORDS])]
     handles += [Patch(color="#dddddd", label="other")] if len(of.words) > MOST_WORDS else []
-    figure.legend(handles=handles, title=of.label, loc="outside right upper", frameon=False, edgecolor=FAINT)
+    legend = figure.legend(handles=handles, title=of.label, loc="outside right upper", frameon=False, edgecolor=FAINT)
+    for text in legend.get_texts():
+        text.set_parse_math(False)

@@ -118,7 +118,8 @@ class Sweep:
         ----------
         path : path
         of : str, optional
-            A column; left out, ``transitions``. One of lists, such as ``before.v``, gives a bifurcation diagram.
+            A column; one of lists, such as ``before.v``, gives a bifurcation diagram. Left out: where transitions were
+            recorded over one name, the state before them that they change most, else ``transitions``.
         tail : float
             The share of each run, at its end, whose transitions and samples are drawn there.
 

@@ -2,8 +2,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """What a picture of a sweep is of: which columns, over which of the names that vary.
 
-A column of lists gives a bifurcation diagram over the first name. A column of numbers or words gives a curve over one
-name, a map over two. More names are refused: their rows would lie on each other.
+A column of lists gives a bifurcation diagram over one name. A column of numbers or words gives a curve over one name, a
+map over two. More names are refused: their rows would lie on each other.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ TIMES = {"transition": "transition.time", "before": "transition.time", "after": 
 
 
 def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float) -> None:
-    """Draw a column of a sweep; left out, the numbers of transitions.
+    """Draw a column of a sweep; left out, the one of :func:`telling`.
 
     Raises UsageError: no such column, one that cannot be drawn, or more than two names that vary.
     """
     from hsdsl.plot import sweep as plots
 
-    column = of or "transitions"
+    column = of or telling(sweep)
     names = sweep.manifest.variation.names
     if column not in sweep.columns or column in ("row", "message", "verdict.reasons", *map(column_of, names)):
         raise UsageError(f"--of: the sweep has no column '{column}' to draw", _hint(sweep, column))
@@ -55,6 +55,30 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
         plots.plot_curve(path, axes[0], quantity, title)
     else:
         plots.plot_map(path, axes[0], axes[1], quantity, title)
+
+
+def telling(sweep: Sweep) -> str:
+    """The column that is drawn where none is named.
+
+    Where transitions were recorded over one name, it is the state before them that they change most, relative to its
+    size; else the number of transitions.
+    """
+    states = sweep.manifest.states
+    if not (sweep.manifest.recording.transitions and len(sweep.manifest.variation.names) == 1 and states):
+        return "transitions"
+    changes = np.zeros(len(states))
+    for table in sweep.batches([f"{side}.{state}" for state in states for side in ("before", "after")]):
+        for k, state in enumerate(states):
+            before, after = (_flat(table, f"{side}.{state}") for side in ("before", "after"))
+            known = np.isfinite(before) & np.isfinite(after) & (before != after)
+            before, after = before[known], after[known]
+            changes[k] += (np.abs(after - before) / np.maximum(np.abs(before), np.abs(after))).sum()
+    return f"before.{states[int(np.argmax(changes))]}" if changes.any() else "transitions"
+
+
+def _flat(table: Any, column: str) -> Array:
+    """The numbers in all lists of a column."""
+    return table.column(column).combine_chunks().flatten().to_numpy(zero_copy_only=False)
 
 
 def _hint(sweep: Sweep, column: str) -> str:
@@ -88,13 +112,10 @@ def _dots(sweep: Sweep, column: str, tail: float) -> tuple[Array, Array]:
     values: list[Any] = [np.empty(0)]
     where, rows = [np.empty(0, int)], 0
     for table in sweep.batches(list(dict.fromkeys([column, times, "time"]))):
-        at, lists = table.column(times).combine_chunks(), table.column(column).combine_chunks()
-        row = at.value_lengths().fill_null(0).to_numpy().astype(int)
-        row = np.repeat(np.arange(table.num_rows), row)
-        ends = table.column("time").to_numpy()
-        found = lists.flatten().to_numpy(zero_copy_only=False)
-        late = at.flatten().to_numpy(zero_copy_only=False) >= (1 - tail) * ends[row]
-        values.append(found[late])
+        counts = table.column(times).combine_chunks().value_lengths().fill_null(0).to_numpy().astype(int)
+        row, ends = np.repeat(np.arange(table.num_rows), counts), table.column("time").to_numpy()
+        late = _flat(table, times) >= (1 - tail) * ends[row]
+        values.append(_flat(table, column)[late])
         where.append(row[late] + rows)
         rows += table.num_rows
     return np.concatenate(values), np.concatenate(where)

@@ -10,7 +10,7 @@ import pytest
 
 import hsdsl
 from hsdsl.errors import UsageError
-from hsdsl.sweep import load, recording, variation
+from hsdsl.sweep import load, picture, recording, variation
 from hsdsl.sweep.dataset import damaged
 
 pytest.importorskip("pyarrow")
@@ -308,6 +308,14 @@ def test_pictures(model, tmp_path, vary, of, kind):
     found = model.sweep(vary, tmp_path / "s", record="final,transitions,outputs:count=5", random=random, processes=1)
     found.plot(tmp_path / "p.svg", of)
     assert kind in (tmp_path / "p.svg").read_text()
+
+
+def test_where_no_column_is_named_the_most_telling_one_is_drawn(model, tmp_path):
+    telling = picture.telling
+    one = {"c": [0.7, 0.8]}
+    assert telling(model.sweep(one, tmp_path / "a", processes=1, record="transitions")) == "before.v"  # x stays
+    assert telling(model.sweep(one, tmp_path / "b", processes=1)) == "transitions"
+    assert telling(model.sweep(VARY, tmp_path / "c", processes=1, record="transitions")) == "transitions"
 
 
 def test_pictures_that_cannot_be_drawn_are_refused(model, tmp_path):
