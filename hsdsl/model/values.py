@@ -205,6 +205,8 @@ def _elsewhere(name: str, program: Program) -> str | None:
         return f"write experiment.{name}"
     if name == "mode" or any(name in mode.states for mode in program.modes):
         return f"write initial.{name}"
+    if any(name == sampled.name for sampled in program.inputs):
+        return "it is an input: give its values in the file by parameters, and override these"
     return did_you_mean(name, program.parameters)
 
 
