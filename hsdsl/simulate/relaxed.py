@@ -92,7 +92,8 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
         if ratio is not None and halvings == 0:
             control.accept(h, ratio)
         if found or end is None:
-            return Event(*choose(here, found, run), t1, sizes(x, z, here))
+            crossing, alternatives = choose(here, found, run)
+            return Event(crossing, alternatives, t1, sizes(x, z if crossing.theta > 0 else x, here))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
         if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):

@@ -145,7 +145,7 @@ static int flow(hs_run *run) {
     if (ratio == ratio && halvings == 0) accept(control, h, ratio);
     if (found.crossings || !run->trial.ends) {
       choose(run, found.crossings);
-      sizes(run, run->x, run->z);
+      sizes(run, run->x, run->chosen.theta > 0 ? run->z : run->x);
       run->landed_at = t1;
       return LANDED;
     }
