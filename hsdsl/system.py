@@ -18,10 +18,22 @@ from typing import Any, Literal
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
+from hsdsl.expression.trigger import Trigger
 from hsdsl.parts import Part
 
 TIME = sp.Symbol("t", real=True)
-ZERO, ONE = sp.S.Zero, sp.S.One
+ZERO, HALF, ONE = sp.S.Zero, sp.S.Half, sp.S.One
+TRUTH = {True: sp.true, False: sp.false}
+
+
+def all_of(*conditions: Any) -> Any:
+    """The Boolean that all conditions hold."""
+    return sp.And(*conditions)
+
+
+def at_least(left: Any, right: Any) -> Any:
+    """The Boolean left >= right."""
+    return sp.Ge(left, right, evaluate=False)
 
 
 @dataclass(frozen=True)
@@ -77,12 +89,28 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class Event:
+    """What an edge has that fires where a condition turns true, until `elaborate.events` writes it as edges.
+
+    ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later,
+    and unless ``persistent`` only if the condition holds until then.
+    """
+
+    trigger: Trigger
+    text: str
+    delay: sp.Expr | None = None
+    persistent: bool = True
+    initially: bool = True
+
+
+@dataclass(frozen=True)
 class Edge:
     """A transition: its surface, condition and reset.
 
     ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
     ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
-    ``derived`` of them are derivatives of others.
+    ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again;
+    one ``of_event`` is part of an event.
     """
 
     name: str
@@ -96,6 +124,9 @@ class Edge:
     priority: int = 0
     derived: int = 0
     condition_text: str | None = None
+    event: Event | None = None
+    stays: bool = False
+    of_event: bool = False
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}

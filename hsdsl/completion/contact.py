@@ -119,7 +119,7 @@ def _apart(one: Contact, other: Contact, mode: Mode) -> bool:
 def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique."""
     edge = mode.edges[k]
-    if edge.target != mode.name or edge.target_states != mode.states or mode.derived:
+    if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
         return None
     near = _Nearby(mode, edge, _mode_of_part(edge, numbers))
     if any(mode.states[i] in numbers for i in near.changed):

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 from hsdsl import limits
 from hsdsl.elaborate.definitions import define_lets, define_parameters, elaborate_units, substituted_definitions
+from hsdsl.elaborate.events import with_events
 from hsdsl.elaborate.experiment import elaborate_experiment, elaborate_initial
 from hsdsl.elaborate.functions import define_functions, named_functions
 from hsdsl.elaborate.inputs import define_inputs, switch_name
@@ -99,7 +100,7 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
         symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
         try:
             with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
-                system = _system(symbols)
+                system = with_events(_system(symbols))
                 system = with_timers(system) if symbols.timed else system
         except OutOfTime:
             _report_timeout(symbols.resolver)

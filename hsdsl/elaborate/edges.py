@@ -8,12 +8,15 @@ import re
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
+from hsdsl.expression.trigger import Trigger, comparisons
+from hsdsl.functions import floor, sign
 from hsdsl.names import SINCE, did_you_mean, shown
 from hsdsl.parts import numbers_of
 from hsdsl.schema import ModeDocument, TransitionDocument
 from hsdsl.source import ABSENT, Key, Scalar
-from hsdsl.system import Edge, Surface
+from hsdsl.system import ZERO, Edge, Event, Surface
 
+_NOWHERE = Surface(ZERO, ZERO, ZERO, "")
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 
@@ -51,7 +54,11 @@ def _names(symbols: SymbolTable, source: Key, transitions: list[TransitionDocume
         elif name is not None:
             given.add(name)
     counts: dict[str, int] = {}
-    return [symbols.text(t.name) or unnamed(f"{source}->{t.to.value}", counts, given) for t in transitions]
+    targets = [str(source) if t.event is not None and t.to.value == ABSENT else t.to.value for t in transitions]
+    return [
+        symbols.text(t.name) or unnamed(f"{source}->{target}", counts, given)
+        for t, target in zip(transitions, targets, strict=True)
+    ]
 
 
 def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
@@ -65,10 +72,12 @@ def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
 
 def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:
     resolver = symbols.resolver
-    crossed = surface(resolver, transition.when, scope, "when")
+    event = _event(symbols, transition, scope)
+    crossed = surface(resolver, transition.when, scope, "when") if transition.event is None else _NOWHERE
     condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
     values = symbols.numbers(transition.reset.values(), scope)
-    target = known_mode(symbols, transition.to)
+    stays = transition.event is not None and transition.to.value == ABSENT
+    target = source if stays else known_mode(symbols, transition.to)
     if target is None:
         return None
     document = symbols.document.modes[target]  # pyright: ignore[reportArgumentType]
@@ -76,6 +85,8 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
     if document.flow is not None or document.final:  # else that mode is reported, and its states are not known
         _check_reset(symbols, source, target, states, transition)
     if crossed is None or values is None or (transition.condition and condition is None):
+        return None
+    if transition.event is not None and event is None:
         return None
     resets = dict(zip(map(str, transition.reset), values, strict=True))
     texts = {str(key): scalar.value for key, scalar in transition.reset.items()}
@@ -90,7 +101,46 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         reset_texts=tuple(texts.get(s, s) for s in states),
         priority=transition.priority,
         condition_text=None if transition.condition is None else transition.condition.value,
+        event=event,
+        stays=stays,
     )
+
+
+def _event(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -> Event | None:
+    """What a transition has that fires where a condition turns true; None for another one, and where it has faults."""
+    given = transition.event
+    if given is None:
+        if transition.delay is not None:
+            message = "only a transition with `event` has a `delay`"
+            symbols.report(transition.delay.place, "HS323", message, "use `since`, or `event` instead of `when`")
+        return None
+    for key, other in (("when", transition.when), ("if", transition.condition)):
+        if other is not None and other.value != ABSENT:
+            message = f"a transition has either `event` or `{key}`"
+            symbols.report(other.place, "HS323", message, "join conditions by `and` under `event`")
+            return None
+    trigger = symbols.resolver.trigger(given, scope)
+    delay = None if transition.delay is None else symbols.number(transition.delay, scope)
+    if trigger is None or (transition.delay is not None and delay is None):
+        return None
+    if not comparisons(trigger):
+        symbols.report(given.place, "HS323", "a condition that never changes is no event", "write an inequality")
+        return None
+    if not _continuous(symbols, given, trigger):
+        return None
+    after = None if delay is None else delay.expr
+    return Event(trigger, given.value, after, transition.persistent, transition.initially)
+
+
+def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger) -> bool:
+    """Whether no comparison of an event jumps by itself; one that does is reported."""
+    sampled = {symbol(str(name)) for name in symbols.document.inputs}
+    for part in comparisons(trigger):
+        if part.residual.free_symbols & sampled or part.residual.has(sign, floor):
+            message = f"`{shown(part.text, 40)}` may jump, and an event is not looked for at jumps of samples or steps"
+            symbols.report(given.place, "HS323", message, "use `when`, which fires on entry there")
+            return False
+    return True
 
 
 def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:

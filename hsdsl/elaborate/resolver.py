@@ -13,6 +13,7 @@ from hsdsl.expression.inequality import Inequality, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import Call, Tree
 from hsdsl.expression.timebox import Box
+from hsdsl.expression.trigger import Trigger, trigger_of
 from hsdsl.names import shown
 from hsdsl.source import ABSENT, Scalar, SourceRange
 
@@ -82,6 +83,10 @@ class ExpressionResolver:
     def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
         """The SymPy Boolean of a condition."""
         return self._built(scalar, scope, "condition", lambda tree: symbolic.condition(tree, scope, scalar.value))
+
+    def trigger(self, scalar: Scalar, scope: Scope) -> Trigger | None:
+        """The condition of an event."""
+        return self._built(scalar, scope, "condition", lambda tree: trigger_of(tree, scope, scalar.value))
 
     def inequality(self, scalar: Scalar, scope: Scope, key: str) -> Inequality | None:
         """The two sides of one inequality."""

@@ -63,7 +63,7 @@ def _edge(edge: Edge, timed: set[str], own: dict[str, bool]) -> Edge:
     kept = not own[edge.target] and edge.source in timed
     if edge.target not in timed and not kept:
         return edge
-    value, text = (_TIMER, SINCE) if kept else (ZERO, "0")
+    value, text = (_TIMER, SINCE) if kept or edge.stays else (ZERO, "0")
     return replace(
         edge,
         target_states=(*edge.target_states, SINCE),

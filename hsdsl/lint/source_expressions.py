@@ -23,6 +23,8 @@ Role = Literal[
     "flow",  # the derivative of the state `name` in `mode`
     "domain",  # a wall of `mode`
     "when",  # the surface of a transition
+    "event",  # the condition of an event
+    "delay",  # its delay
     "if",  # its condition
     "reset",  # its new value of the state `name`
     "output",  # the output `name`, of `mode` or of the whole model
@@ -32,15 +34,15 @@ Role = Literal[
     "experiment",  # the setting `name`
     "reference",  # a number in `reference`
 ]
-_WANTED: dict[Role, Expected] = {"domain": "inequality", "when": "inequality", "if": "condition"}
+_WANTED: dict[Role, Expected] = {"domain": "inequality", "when": "inequality", "if": "condition", "event": "condition"}
 
 
 @dataclass(frozen=True)
 class SourceExpression:
     """One expression of a file: what it is for, its text and place, and the mode it belongs to, if any.
 
-    ``name`` is what it defines; empty for walls, surfaces and conditions. ``index`` says of `domain`, `when`, `if` and
-    `reset` which wall or which transition of the mode it is. ``arguments`` are those of a function.
+    ``name`` is what it defines; empty for walls, surfaces and conditions. ``index`` says of `domain`, `when`, `event`,
+    `if` and `reset` which wall or which transition of the mode it is. ``arguments`` are those of a function.
     """
 
     role: Role
@@ -114,7 +116,11 @@ def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
     for index, scalar in enumerate(mode.domain):
         yield SourceExpression("domain", scalar, "", name, index)
     for index, transition in enumerate(mode.transitions):
-        yield SourceExpression("when", transition.when, "", name, index)
+        if transition.event is None:
+            yield SourceExpression("when", transition.when, "", name, index)
+        else:
+            yield SourceExpression("event", transition.event, "", name, index)
+        yield from (SourceExpression("delay", s, "", name, index) for s in (transition.delay,) if s is not None)
         if transition.condition is not None:
             yield SourceExpression("if", transition.condition, "", name, index)
         for key, scalar in transition.reset.items():

@@ -44,10 +44,11 @@ class ModePart:
 
 
 def _edges(mode: Mode, key: str, document: schema.ModeDocument) -> tuple[EdgePart, ...]:
-    pairs = zip(mode.edges, document.transitions, strict=True)
-    return tuple(
-        EdgePart(edge, written, i, ("modes", str(key), "transitions", i)) for i, (edge, written) in enumerate(pairs)
-    )
+    """The transitions of a mode but its events, which several edges are made of."""
+    edges = [edge for edge in mode.edges if not edge.of_event]
+    places = [(i, written) for i, written in enumerate(document.transitions) if written.event is None]
+    pairs = zip(edges, places, strict=True)
+    return tuple(EdgePart(edge, written, i, ("modes", str(key), "transitions", i)) for edge, (i, written) in pairs)
 
 
 class Subject:
@@ -66,7 +67,7 @@ class Subject:
     @cached_property
     def modes(self) -> tuple[ModePart, ...]:
         """Every mode, in file order."""
-        pairs = zip(self.system.modes, self.document.modes.items(), strict=True)
+        pairs = zip(self.system.modes, self.document.modes.items(), strict=False)  # those of events come last
         return tuple(ModePart(mode, document, key, _edges(mode, key, document)) for mode, (key, document) in pairs)
 
     @property

@@ -17,7 +17,7 @@ from hsdsl.model.options import ARGUMENTS, Options, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
 from hsdsl.model.visible import visible_run
-from hsdsl.names import SINCE, did_you_mean, visible
+from hsdsl.names import did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.progress import counted, in_notebook, running
 from hsdsl.simulate import Prepared
@@ -513,11 +513,11 @@ class Model:
         if files is None:
             raise UsageError("expected a model that was read from text")
         read = elaborate_files(files)
-        declared = any(SINCE in (mode.flow or ()) for mode in read.document.modes.values())
         text = completed_text(read.text, read.root, read.system)
-        if text is not None and SINCE in read.system.states and not declared:
+        declared = {name for mode in read.document.modes.values() for name in mode.flow or ()}
+        if text is not None and not declared >= {*read.system.states}:
             hint = "write it as a state: its flow 1 in each mode, and since: 0 in each reset"
-            raise UsageError("a model that uses `since` cannot be written with its completions", hint)
+            raise UsageError("a model that uses `since` or events cannot be written with its completions", hint)
         return text
 
     def only(self, outputs: Sequence[str]) -> Model:

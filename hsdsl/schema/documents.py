@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag, model_validator
 
 from hsdsl.schema.fields import (
     AnyKey,
@@ -35,7 +35,7 @@ from hsdsl.schema.fields import (
     required,
 )
 from hsdsl.schema.shapes import BoxShape, CircleShape, LineShape, PointShape, Shape, SpringShape
-from hsdsl.source import Scalar
+from hsdsl.source import Scalar, absent
 
 
 def _mapping_or_not(value: Any) -> str:
@@ -99,10 +99,14 @@ class FunctionDocument(Document):
 
 
 class TransitionDocument(Document):
-    """An edge that leaves a mode."""
+    """An edge that leaves a mode: with `when` and `to`, or with `event`."""
 
     when: Inequality = required(
         "One inequality, such as `x >= x_max`: the surface at which the transition fires.", "x >= x_max", "h <= 0"
+    )
+    event: OptionalCondition = optional(
+        "A condition, instead of `when`: the transition fires where it turns true. Without `to` the mode stays.",
+        "x >= 1 and y < 2",
     )
     condition: OptionalCondition = optional(
         "Which part of the surface is the guard: a condition.", "v > 0 and y < 1", alias="if"
@@ -117,6 +121,27 @@ class TransitionDocument(Document):
     priority: Whole = optional(
         "Of transitions reached together, the one with the largest priority goes first.", 1, default=0
     )
+    delay: OptionalExpression = optional(
+        "With `event`: how long after its condition turned true the transition is made, with the values of then.", 2
+    )
+    persistent: Flag = optional(
+        "With `delay`: whether the transition is made even if the condition turns false before.", False, default=True
+    )
+    initially: Flag = optional(
+        "With `event`: what its condition counts as before the mode is entered; with `false` it fires there if it "
+        "holds.",
+        False,
+        default=True,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_event(cls, value: Any) -> Any:
+        whole: dict[Any, Any] = value if isinstance(value, dict) else {}  # pyright: ignore[reportUnknownVariableType]
+        given = whole.get("event")
+        if not isinstance(given, Scalar):
+            return value  # pyright: ignore[reportUnknownVariableType]
+        return {"when": absent(given.place), "to": absent(given.place), **whole}
 
 
 class ModeDocument(Document):

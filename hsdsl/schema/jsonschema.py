@@ -31,6 +31,8 @@ def json_schema() -> dict[str, Any]:
         by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
     )
     definitions = {_short(name): _draft_7(part) for name, part in sorted(made.pop("$defs").items())}
+    transition = definitions["Transition"]
+    transition["anyOf"] = [{"required": transition.pop("required")}, {"required": ["event"]}]
     root = _draft_7(made)
     reference = root["properties"]["reference"]
     item = reference.pop("items")

@@ -43,12 +43,12 @@ from exact.arithmetic import evaluate
 import hsdsl
 
 HERE = Path(__file__).parent
-CASES = {  # those of parts apart: exports take the others as they are
+CASES = {  # those of parts and events apart: exports take the others as they are
     path.name.removesuffix(".expect.yaml"): path
-    for folder in ("cases", "parts")
+    for folder in ("cases", "parts", "events")
     for path in sorted((HERE / folder).glob("*.expect.yaml"))
 }
-MEANING = [f"M{k}" for k in range(1, 13)]
+MEANING = [f"M{k}" for k in range(1, 14)]
 SCHEMES = ("relaxed", "located")
 LIMIT = 30  # seconds for one run; most take a thousandth of it
 ENGINES: dict[str, dict[str, Any]] = {"python": {"engine": "python"}} | ({"c": {"engine": "c"}} if COMPILER else {})

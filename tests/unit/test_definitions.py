@@ -141,5 +141,5 @@ def test_completions_as_text_refuse_the_timer(tmp_path):
     mode = "{flow: {h: v, v: -1}, transitions: [{when: h <= 0, to: m, reset: {v: -v/2}}], outputs: {s: since}}"
     text = f"hsdsl: 1\nmodes: {{m: {mode}}}\ninitial: {{mode: m, h: 1, v: 0}}\nexperiment: {{until: 9}}\n"
     (tmp_path / "m.yaml").write_text(text)
-    with pytest.raises(UsageError, match="`since` cannot be written with its completions"):
+    with pytest.raises(UsageError, match="`since` or events cannot be written with its completions"):
         hsdsl.load(tmp_path / "m.yaml").completed()

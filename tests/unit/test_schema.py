@@ -79,8 +79,9 @@ def test_hover_and_completion_find_every_key_of_a_transition():
 
     mode = resolved(schema["properties"]["modes"]["additionalProperties"])
     transition = resolved(mode["properties"]["transitions"]["items"])
-    assert set(transition["properties"]) == {"when", "if", "to", "reset", "name", "priority"}
-    assert transition["required"] == ["when", "to"]
+    of_events = {"event", "delay", "persistent", "initially"}
+    assert set(transition["properties"]) == {"when", "if", "to", "reset", "name", "priority"} | of_events
+    assert transition["anyOf"] == [{"required": ["when", "to"]}, {"required": ["event"]}]
     assert "surface" in transition["properties"]["when"]["description"]
 
 
@@ -91,6 +92,8 @@ def test_models_are_valid(path):
     for mode in document["modes"].values():
         if "final" in mode:
             mode["final"] = mode["final"] == "true"
+        for transition in mode.get("transitions", []):
+            transition |= {key: transition[key] == "true" for key in ("persistent", "initially") if key in transition}
         for transition in mode.get("transitions", []):
             if "priority" in transition:
                 transition["priority"] = int(transition["priority"])

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from hsdsl.elaborate.functions import named_functions
+from hsdsl.errors import UsageError
 from hsdsl.export.latex.escaping import escaped
 from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
@@ -35,6 +36,8 @@ def files(source: Source) -> dict[str, bytes]:
 def document(source: Source) -> str:
     """The text of the document."""
     system = source.system
+    if any(edge.of_event for mode in system.modes for edge in mode.edges):
+        raise UsageError("a model with events cannot be written as LaTeX", "write them as modes, with `when`")
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
     math = Mathematics(_names(system), named_functions(system.functions, parameters))
     lines = [*(f"% {line}" for line in source.heading), _HEAD, rf"\section*{{{escaped(system.title or source.name)}}}"]

@@ -57,17 +57,18 @@ def _places(subject: Subject, *roles: str) -> Iterator[_Place]:
     dynamics = subject.dynamics
     for part in subject.modes:
         mode, where = part.mode, (dynamics.domain(part.mode),)
+        edges = {item.index: item.edge for item in part.edges}
         for written in subject.written_in(mode.name):
             match written.role if written.role in roles else None:
                 case "flow":
                     yield _Place(dynamics, mode, written, dynamics.flow(mode)[symbol(written.name)], where)
                 case "when":
-                    residual = dynamics.residual(mode.edges[written.index].surface)
+                    residual = dynamics.residual(edges[written.index].surface)
                     yield _Place(dynamics, mode, written, residual, where)
                 case "domain":
                     yield _Place(dynamics, mode, written, dynamics.residual(mode.walls[written.index]), where)
-                case "reset":
-                    edge = mode.edges[written.index]
+                case "reset" if written.index in edges:
+                    edge = edges[written.index]
                     value = dynamics.placed(edge.reset[edge.target_states.index(written.name)])
                     yield _Place(dynamics, mode, written, value, dynamics.guard(edge) or ())
                 case _:

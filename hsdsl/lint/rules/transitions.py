@@ -151,6 +151,13 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
     """Find cycles of transitions that take no time."""
     reported: set[frozenset[str]] = set()
     for part, edge in subject.edges:
+        if _repeats(edge.edge, part.mode):
+            message = (
+                f"once '{edge.edge.name}' has fired, it fires again at once, for ever: its reset leaves all as it was"
+            )
+            hint = "write event: instead of when: to make it once each time, or reset a state that ends it"
+            yield Finding(edge.document.to.place.span, message, hint)
+            continue
         for answer in _followed_at_once(subject.dynamics, part.mode, edge.edge):
             here = ModePoint(subject.dynamics, part.mode, answer.point)
             edges = cycle(here, edge.edge) if answer.somewhere else None
@@ -158,6 +165,18 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
             if edges and names not in reported:
                 reported.add(names)
                 yield _cycle_finding(subject.dynamics, part.mode, edge, answer, edges)
+
+
+def _repeats(edge: Edge, mode: Mode) -> bool:
+    """Whether the reset of an edge to its own mode changes states, and none that decides about a next transition."""
+    if edge.target != mode.name or mode.final:
+        return False
+    flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
+    changed = {symbol(s) for s, value in zip(mode.states, edge.reset, strict=True) if value != symbol(s)}
+    surfaces = {x for surface in mode.surfaces for x in surface.residual.free_symbols}
+    rates = {x for own in edge.surface.residual.free_symbols & flow.keys() for x in flow[own].free_symbols}
+    conditions = {x for e in mode.edges if e.condition is not None for x in e.condition.free_symbols}
+    return bool(changed) and not changed & (surfaces | rates | conditions)
 
 
 def _cycle_finding(dynamics: Dynamics, mode: Mode, edge: EdgePart, answer: Answer, edges: tuple[Edge, ...]) -> Finding:

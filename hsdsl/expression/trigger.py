@@ -1,0 +1,121 @@
+# pyright: basic
+"""Conditions of events: comparisons with their surfaces, joined by `and` and `or`; `not` is moved into comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import sympy as sp
+
+from hsdsl.expression import symbolic
+from hsdsl.expression.scope import Scope
+from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
+from hsdsl.functions import absolute, maximum, minimum, sign
+from hsdsl.names import shown
+
+_OPPOSITE = {">": "<=", ">=": "<", "<": ">=", "<=": ">"}
+# within this share of its sides a comparison that is reached together with another one counts as reached:
+# 32 units of round-off of 64-bit floats, as for surfaces
+_NEAR = sp.Rational(1, 2**48)
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A comparison: its surface function ``residual`` = left - right rises through 0 where it turns true."""
+
+    left: Any
+    right: Any
+    residual: Any
+    strict: bool
+    text: str
+    opposite: str
+
+    def holds(self, meaning: Mapping[Any, Any]) -> Any:
+        """1 where it holds at values of its symbols, 0 elsewhere."""
+        value = 2 * sign(self.residual.xreplace(meaning))
+        return (1 + sign(value - 1 if self.strict else value + 1)) / 2
+
+    def nearly(self, favoured: bool) -> Any:
+        """The Boolean that it holds; at round-off of its surface it does so if that is favoured."""
+        margin = _NEAR * (absolute(self.left) + absolute(self.right))
+        return sp.Ge(self.residual + margin if favoured else self.residual - margin, 0)
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Parts joined by `and` or by `or`."""
+
+    word: Literal["and", "or"]
+    parts: tuple[Trigger, ...]
+
+
+Trigger = Reached | Joined | bool
+
+
+def trigger_of(tree: Tree, scope: Scope, text: str, positive: bool = True) -> Trigger:
+    """The trigger of a condition; with ``positive`` false, of its opposite.
+
+    Raises ExpressionError: a number in place of a condition, `==` or `!=`, and as `symbolic.number`.
+    """
+    match tree:
+        case Truth():
+            return tree.value == positive
+        case Not():
+            return trigger_of(tree.operand, scope, text, not positive)
+        case Logic():
+            word = tree.operator if positive else {"and": "or", "or": "and"}[tree.operator]
+            return Joined(word, tuple(trigger_of(part, scope, text, positive) for part in tree.operands))  # pyright: ignore[reportArgumentType]
+        case Comparison():
+            pairs = zip(tree.operators, tree.operands, tree.operands[1:], strict=False)
+            parts = tuple(_reached(tree, *pair, scope, text, positive) for pair in pairs)
+            return parts[0] if len(parts) == 1 else Joined("and" if positive else "or", parts)
+    message = f"expected a condition, got the number `{shown(text[tree.start : tree.end], 40)}`"
+    raise ExpressionError.at(tree, "HS115", message, "compare it with something, as x > 0")
+
+
+def _reached(tree: Tree, operator: str, left: Tree, right: Tree, scope: Scope, text: str, positive: bool) -> Reached:
+    if operator not in _OPPOSITE:
+        message = f"`event` takes inequalities, not `{operator}`"
+        raise ExpressionError.at(tree, "HS107", message, "an event fires where one of >= > <= < turns true")
+    a, b = symbolic.number(left, scope, text).expr, symbolic.number(right, scope, text).expr
+    own, other = text[left.start : left.end], text[right.start : right.end]
+    operator = operator if positive else _OPPOSITE[operator]
+    if operator in ("<", "<="):
+        a, b = b, a
+    return Reached(a, b, a - b, operator in "><", f"{own} {operator} {other}", f"{own} {_OPPOSITE[operator]} {other}")
+
+
+def comparisons(trigger: Trigger) -> tuple[Reached, ...]:
+    """Its comparisons, each surface once."""
+    found: dict[Any, Reached] = {}
+    for part in _parts(trigger):
+        found.setdefault(part.residual, part)
+    return tuple(found.values())
+
+
+def _parts(trigger: Trigger) -> Iterator[Reached]:
+    if isinstance(trigger, Joined):
+        for part in trigger.parts:
+            yield from _parts(part)
+    elif isinstance(trigger, Reached):
+        yield trigger
+
+
+def condition(trigger: Trigger, of: Callable[[Reached], Any]) -> Any:
+    """The Boolean of a trigger, with that of each comparison."""
+    if isinstance(trigger, Joined):
+        return (sp.And if trigger.word == "and" else sp.Or)(*(condition(part, of) for part in trigger.parts))
+    return of(trigger) if isinstance(trigger, Reached) else sp.true if trigger else sp.false
+
+
+def number(trigger: Trigger, of: Callable[[Reached], Any]) -> Any:
+    """1 where a trigger holds and 0 elsewhere, from that of each comparison."""
+    if isinstance(trigger, Joined):
+        values = [number(part, of) for part in trigger.parts]
+        value = values[0]
+        for other in values[1:]:
+            value = minimum(value, other) if trigger.word == "and" else maximum(value, other)
+        return value
+    return of(trigger) if isinstance(trigger, Reached) else sp.Integer(int(trigger))

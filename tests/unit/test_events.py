@@ -1,0 +1,115 @@
+"""Events: where they fire, against exact times, alike in both engines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from engines import COMPILER
+
+import hsdsl
+from hsdsl import UsageError
+
+HEAD = "hsdsl: 1\nmodes:\n  m:\n"
+ENGINES = ["python", *(["c"] if COMPILER else [])]
+
+
+def model(tmp_path, flow: str, transitions: str, initial: str, until: str = "10"):
+    text = f"{HEAD}    flow: {{{flow}}}\n    transitions: [{transitions}]\n"
+    (tmp_path / "m.yaml").write_text(f"{text}initial: {{mode: m, {initial}}}\nexperiment: {{until: {until}}}\n")
+    return hsdsl.load(tmp_path / "m.yaml")
+
+
+def times(run, edge):
+    return [made.time for made in run.transitions if made.edge == edge]
+
+
+@pytest.mark.parametrize("method", ["auto", "dop853", "radau"])
+def test_turns_true_again_after_it_was_false(tmp_path, method):
+    """sin(t) rises through 1/2 at pi/6 + 2 k pi, and |sin(t)| through 9/10 at asin(9/10) + k pi."""
+    two = "{name: high, event: x >= 1/2}, {name: far, event: x >= 9/10 or not x > -9/10, reset: {n: n + 1}}"
+    run = model(tmp_path, "x: y, y: -x, n: 0", two, "x: 0, y: 1, n: 0", "20").simulate(method=method)
+    close = {"abs": 1e-6 if method == "radau" else 1e-8}
+    assert times(run, "high") == pytest.approx([math.pi / 6 + 2 * k * math.pi for k in range(4)], **close)
+    assert times(run, "far") == pytest.approx([math.asin(0.9) + k * math.pi for k in range(7)], **close)
+    assert run.final.state["n"] == 7
+
+
+def test_engines_agree_to_the_last_bit(tmp_path):
+    if not COMPILER:
+        pytest.skip("no compiler")
+    four = (
+        "{name: a, event: x >= 1/2 and y < 0, delay: 1/3, persistent: false, reset: {n: n + x}},"
+        "{name: b, event: x <= -1/2 or y >= 3/4, reset: {n: -n, x: x/2}, priority: 1},"
+        "{name: c, event: n > 1, initially: false, reset: {n: n - y}}"
+    )
+    made = model(tmp_path, "x: y, y: -x + n/10, n: 1/7", four, "x: 0, y: 1, n: 2", "12")
+    for scheme in ("located", "relaxed"):
+        python, c = (made.simulate(engine=engine, scheme=scheme) for engine in ("python", "c"))
+        assert len(python.transitions) > 10
+        assert [(m.edge, m.time, m.after) for m in python.transitions] == [
+            (m.edge, m.time, m.after) for m in c.transitions
+        ]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_two_comparisons_reached_together(tmp_path, engine):
+    """Each is within round-off of its surface where the other one is crossed."""
+    both = "{name: both, event: x >= 1/3 and y >= 2/3 and z <= -1/9, reset: {n: n + 1}}"
+    run = model(tmp_path, "x: 1, y: 2, z: -1/3, n: 0", both, "x: 0, y: 0, z: 0, n: 0", "1").simulate(engine=engine)
+    assert times(run, "both") == pytest.approx([1 / 3], abs=1e-12)
+
+
+def test_the_order_of_events_reached_together(tmp_path):
+    """Each goes with the values that the one before left."""
+    three = (
+        "{name: low, event: x >= 1, reset: {n: 2*n}}, {name: high, event: x >= 1, priority: 2, reset: {n: n + 1}},"
+        "{name: never, event: x >= 1 and n <= 1/2, priority: 1, reset: {n: 100}}"
+    )
+    run = model(tmp_path, "x: 1, n: 0", three, "x: 0, n: 0", "2").simulate()
+    assert [m.edge for m in run.transitions][:2] == ["high", "low"]
+    assert run.final.state["n"] == 2
+
+
+def test_a_second_trigger_while_it_waits_ends_the_run(tmp_path):
+    run = model(
+        tmp_path, "x: y, y: -x, n: 0", "{name: e, event: x >= 1/2, delay: 9, reset: {n: 1}}", "x: 0, y: 1, n: 0"
+    )
+    end = run.simulate()
+    assert end.stop.reason == "final" and end.final.mode == "e-waits-already"
+    assert end.stop.time == pytest.approx(math.pi / 6 + 2 * math.pi, abs=1e-8)
+
+
+def test_delays_are_evaluated_when_the_condition_turns_true(tmp_path):
+    run = model(tmp_path, "x: 1, n: 0", "{name: e, event: x >= 1, delay: x/2, reset: {n: 10*x}}", "x: 0, n: 0", "2")
+    (made,) = [m for m in run.simulate().transitions if m.edge == "e"]
+    assert made.time == pytest.approx(1.5, abs=1e-12) and made.after["n"] == pytest.approx(10, abs=1e-12)
+
+
+def test_an_event_is_no_wall(tmp_path):
+    run = model(tmp_path, "x: 1, n: 0", "{name: e, event: x >= 1, reset: {n: 1}}", "x: 3, n: 0").simulate()
+    assert run.stop.reason == "until" and not run.transitions and run.final.state["x"] == 13
+
+
+def test_random_events_against_a_grid(tmp_path):
+    """Conditions over sines, judged on a fine grid: as many times of turning true as the run has."""
+    random = np.random.default_rng(4)
+    for _ in range(3):
+        a, b, c = (round(float(v), 3) for v in random.uniform(-0.8, 0.8, 3))
+        text = f"{{name: e, event: (x >= {a} and y <= {b}) or not (x < {c} or y > 0), reset: {{n: n + 1}}}}"
+        run = model(tmp_path, "x: y, y: -x, n: 0", text, "x: 0, y: 1, n: 0", "25").simulate()
+        t = np.linspace(0, 25, 2_000_001)
+        x, y = np.sin(t), np.cos(t)
+        holds = ((x >= a) & (y <= b)) | ~((x < c) | (y > 0))
+        rises = t[1:][holds[1:] & ~holds[:-1]]
+        assert times(run, "e") == pytest.approx(rises, abs=3e-5)
+
+
+@pytest.mark.parametrize("target", ["latex"])
+def test_exports_that_cannot_keep_events_refuse(tmp_path, target):
+    from hsdsl.export import files_of, source_of
+
+    made = model(tmp_path, "x: 1", "{name: e, event: x >= 1, reset: {x: 0}}", "x: 0")
+    with pytest.raises(UsageError, match="events"):
+        files_of(source_of(made, {}), target)
