@@ -79,6 +79,10 @@ def _transition(
 ) -> PartTransition | None:
     one, resolver = names.instance, board.symbols.resolver
     assert one is not None
+    if document.event is not None:
+        message, hint = "a part has no events", "use `when`, with a mode for each side of its surface"
+        board.report_once(document.event, "HS353", message, hint)
+        return None
     if (document.when is None) == (document.on is None):
         which = "one of `when` and `on`, not both" if document.when else "either `when` or `on`"
         board.report_once(document.when or document.to or document.name or one.key, "HS353",
