@@ -248,7 +248,7 @@ def _remembered(draft: Draft, events: Mapping[str, tuple[_Event, ...]], order: M
     )
 
 
-def _meaning(edge: Edge) -> Values:
+def _meaning(edge: Edge) -> dict[Any, Any]:
     """The new value of each symbol that an edge changes."""
     pairs = zip(edge.target_states, edge.reset, strict=True)
     meaning: dict[Any, Any] = {symbol(name): value for name, value in pairs if value != symbol(name)}
