@@ -21,7 +21,7 @@ from hsdsl.names import visible
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
-Assessment = Callable[["Execution", "Execution | None"], Verdict]
+Assessment = Callable[..., Verdict]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -83,7 +83,9 @@ class Differentiator:
         experiment = {k: given.get(k) if call.get(k) is None else call[k] for k in ("until", "samples")}
         change = overridden(self.pipeline.system, parameters, initial, experiment)
         span, samples = moving_times(change, by, values)
-        setting = Setting(plain, plain, self.pipeline.program.outputs, span, samples)
+        setting = Setting(
+            plain, plain, self.pipeline.program.outputs, span, samples, moving_parameters(change, by, values)
+        )
         return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
 
     def _with_entries(self, ready: _Ready) -> _Ready:
@@ -159,10 +161,23 @@ def moving_times(change: Overridden, by: Sequence[Target], values: Values) -> tu
     from hsdsl.sensitivity.overrides import time_slopes
 
     until, samples = time_slopes(change, by)
-    expressions = {f"slope_{i}_{k}": e for i, row in enumerate((until, *samples)) for k, e in enumerate(row)}
-    if not any(expressions.values()):
-        numbers = dict.fromkeys(expressions, values.kernel.arithmetic.zero)
+    rows = [dict(zip((t.label for t in by), row, strict=True)) for row in _numbers([until, *samples], values)]
+    return rows[0], rows[1:]
+
+
+def moving_parameters(change: Overridden, by: Sequence[Target], values: Values) -> dict[str, tuple[Number, ...]]:
+    """The derivatives of all parameters by each target."""
+    from hsdsl.sensitivity.overrides import parameter_slopes
+
+    rows = _numbers(list(parameter_slopes(change, by).values()), values)
+    return {target.label: tuple(row[k] for row in rows) for k, target in enumerate(by)}
+
+
+def _numbers(rows: Sequence[Sequence[Any]], values: Values) -> list[list[Number]]:
+    """Expressions of parameters as numbers."""
+    expressions = {f"slope_{i}_{k}": e for i, row in enumerate(rows) for k, e in enumerate(row)}
+    if all(e.is_Integer for e in expressions.values()):
+        numbers = {name: values.kernel.arithmetic.zero + int(e) for name, e in expressions.items()}
     else:
         numbers = values.evaluate(expressions)
-    rows = [{t.label: numbers[f"slope_{i}_{k}"] for k, t in enumerate(by)} for i in range(1 + len(samples))]
-    return rows[0], rows[1:]
+    return [[numbers[f"slope_{i}_{k}"] for k in range(len(row))] for i, row in enumerate(rows)]

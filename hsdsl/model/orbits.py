@@ -23,6 +23,7 @@ from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
 from hsdsl.orbits.section import NoReturn, Return, Section
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.sensitivity.result import Sensitivity
+from hsdsl.simulate.surfaces import TIE
 
 if TYPE_CHECKING:
     from hsdsl.execution import Array
@@ -123,7 +124,9 @@ class Orbits:
             found.append((np.inf, Guess(np.array(run.values[0][: len(states)], float), 0.0, times[0])))
         if len(points) == 1:
             found.append((np.inf, Guess(points[0], times[0], times[0])))
-        return [guess for _, guess in sorted(found, key=lambda each: each[0])][:MOST_GUESSES]
+        least = run.settings["until"] * TIE
+        lasting = [(change, guess) for change, guess in found if guess.time > least]
+        return [guess for _, guess in sorted(lasting, key=lambda each: each[0])][:MOST_GUESSES]
 
     def find(self) -> Orbit:
         """Find the orbit that the model's own run comes closest to.
@@ -133,9 +136,12 @@ class Orbits:
         run = self.model.simulate(scheme="located", **self._run_arguments())
         self._stiff = run.method == "radau"
         guesses = self.guesses(run)
+        ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
         if not guesses:
+            made = sum(made.edge == self.edge for made in run.transitions)
+            how = "makes the transition {} at one instant only" if made else "does not make the transition {}"
             raise UsageError(
-                f"the run does not make the transition {self.edge} up to t = {run.times[-1]:g} ({run.stop.reason})",
+                f"the run {how.format(self.edge)} up to t = {run.times[-1]:g}{ending or f' ({run.stop.reason})'}",
                 "choose another section, a later end, or other initial values",
             )
         problem = ""
@@ -145,7 +151,7 @@ class Orbits:
             except NotClosed as error:
                 problem = problem or str(error)
         raise UsageError(
-            f"no periodic orbit was found near the run: {problem}",
+            f"no periodic orbit was found near the run: {problem}{ending}",
             "begin closer to it with --set initial.NAME=VALUE, or try more laps",
         )
 
@@ -164,8 +170,10 @@ class Orbits:
         phase = guess.phase if forcing is None else guess.phase % forcing
         sections = self.section(parameters), self.section(parameters, COARSER)
         found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple)
-        if found.passage.time < SHRUNK * guess.time:
+        if not found.passage.time > SHRUNK * guess.time:
             raise NotClosed("passages become ever shorter, so the execution ends in a point")
+        if self.forced is False and _still(found):
+            raise NotClosed("it closes where the flow is at rest, so the execution ends in a point")
         return self.judge(found, parameters, forcing)
 
     def continued(self, parameter: str, start: Any, end: Any) -> Branch:
@@ -248,6 +256,19 @@ class Orbits:
                 if not np.isnan(slopes).any():
                     sides[edge] = multipliers_of(found, slopes, forced)
         return sides
+
+
+def _still(found: Closed) -> bool:
+    """Whether an orbit is a point that does not move: its states change by none of their sizes."""
+    run, names = found.passage.execution, [by.removeprefix("initial.") for by in found.passage.sensitivity.wrt]
+    moved = np.zeros(len(found.point))
+    for arc in run.arcs:
+        rows = [row for row in range(arc.first, arc.last + 1) if run.times[row] <= found.passage.time]
+        for k, name in enumerate(names[: len(moved)]):
+            if name in arc.states and rows:
+                column = np.asarray(run.values[rows, arc.states.index(name)], float)
+                moved[k] = max(moved[k], float(np.max(np.abs(column - found.point[k]))) / found.sizes[k])
+    return bool(np.max(moved, initial=0.0) <= SHRUNK)
 
 
 def _edge(model: Model, section: str) -> str:

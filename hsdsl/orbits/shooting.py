@@ -8,6 +8,7 @@ import numpy as np
 
 from hsdsl.execution import Array
 from hsdsl.orbits.section import NoReturn, Return, Section
+from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
 
 MOST_STEPS, MOST_HALVINGS = 40, 12
 SMALLEST = 1e-10  # singular values below this share of the largest one are directions in which orbits form families
@@ -102,15 +103,32 @@ def gap(passage: Return, point: Array, multiple: float | None) -> Array:
 
 
 def drifting(passage: Return) -> tuple[int, ...]:
-    """The states that shift the return by as much and change nothing else, and that do not return."""
+    """The states that shift the return by as much and change nothing else, all along a passage."""
     n = len(passage.point)
     found: list[int] = []
     for k in range(n):
         column = passage.slopes[:, k].copy()
         column[k] -= 1
-        if np.max(np.abs(column)) < SYMMETRY:
+        if np.max(np.abs(column)) < SYMMETRY and _shifts(passage, passage.sensitivity.wrt[k]):
             found.append(k)
     return tuple(found)
+
+
+def _shifts(passage: Return, by: str) -> bool:
+    """Whether a state that begins elsewhere shifts states by constants all along a passage, and no transition."""
+    run = passage.execution
+    for arc in run.arcs:
+        rows = [row for row in range(arc.first, arc.last + 1) if run.times[row] <= passage.time]
+        for column in (k for k, x in enumerate(arc.states) if rows and x in _columns(own(arc.states), by)):
+            moved = run.values[rows, column].astype(float)
+            still = moved[0] if arc.states[column] != shift_name(by) else 0.0
+            if np.max(np.abs(moved - still)) >= SYMMETRY:
+                return False
+    return True
+
+
+def _columns(states: tuple[str, ...], by: str) -> set[str]:
+    return {shift_name(by), *(derivative_name(x, by) for x in states)}
 
 
 def newton_step(here: Closed, multiple: float | None) -> Array:

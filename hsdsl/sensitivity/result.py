@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
+from hsdsl.sensitivity.landing import parted
 from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
 from hsdsl.sensitivity.ties import Tie, ties
 from hsdsl.sensitivity.touching import touched
@@ -59,6 +60,7 @@ class Setting:
     """What a sensitivity was computed of: the run without derivatives, ready to be made, and what moves with a target.
 
     ``span`` has the derivatives of ``until``, and ``samples`` those of each sample time; empty where none moves.
+    ``parameters`` has those of all parameters by each target.
     """
 
     plain: Prepared
@@ -66,6 +68,7 @@ class Setting:
     output_names: tuple[str, ...]
     span: Slopes
     samples: Sequence[Slopes]
+    parameters: Mapping[str, Sequence[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +131,7 @@ class Sensitivity:
     def breaks(self) -> tuple[tuple[Any, str], ...]:
         """Times from which on no derivative exists, and why; the verdict of the run has not been looked at."""
         found = [(tie.time, str(tie.reason)) for tie in self._parting]
+        found += self._landings
         stop = self.execution.stop
         if stop.reason == "not_finite":
             sentence = f"at t = {show(stop.time)} a guard is reached at rate zero within the error of the run"
@@ -137,24 +141,46 @@ class Sensitivity:
         return tuple(sorted(found, key=lambda found: found[0]))
 
     @cached_property
+    def _landings(self) -> list[tuple[Any, str]]:
+        """The first landing on a guard from which executions nearby go on in different ways."""
+        view = RunView(self.setting.plain, self.execution)
+        tied = {show(tie.time) for tie in self.ties}
+        for made in self.execution.transitions:
+            if show(made.time) in tied:  # its orders have been looked at
+                continue
+            after = made.after or {}
+            time = self._shifts(after)
+            state = self._followed(made.target, made.time, after, time, True)
+            if found := next(parted(view, made, time, state, self.setting.parameters), None):
+                return [found]
+        return []
+
+    @cached_property
     def touches(self) -> tuple[str, ...]:
         """Guards that the run touches within its error, without a transition: no derivative exists from there on."""
         return tuple(reason for _, reason in touched(RunView(self.setting.plain, self.run)))
 
+    @cached_property
+    def _smooth(self) -> Verdict:
+        """The verdict of the run where motion along surfaces counts as the flow of a mode of the system."""
+        if self.verdict.theorem == "holds" or self.run.assessment is None:
+            return self.verdict
+        return self.run.assessment(self.run, None, True)
+
     @property
     def exists(self) -> bool | None:
-        """Whether the derivatives exist; None where that is not known, as the run's verdict is ``unknown``."""
-        if self.breaks or self.verdict.theorem == "left":
+        """Whether the derivatives exist; None where that is not known, as something of the run could not be decided."""
+        if self.breaks or self._smooth.theorem == "left":
             return False
-        if self.verdict.theorem == "unknown" and self.touches:
+        if self._smooth.theorem == "unknown" and self.touches:
             return False
-        return True if self.verdict.theorem == "holds" else None
+        return True if self._smooth.theorem == "holds" else None
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why they do not exist, or are not known to."""
         own = tuple(reason for _, reason in self.breaks)
-        return own if self.verdict.theorem == "holds" else (*own, *self.touches, *self.verdict.reasons)
+        return own if self._smooth.theorem == "holds" else (*own, *self.touches, *self._smooth.reasons)
 
     def _exists_at(self, index: int) -> bool:
         """Whether the derivatives of a transition exist."""

@@ -179,10 +179,14 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
 
 
 def _assessment(
-    problem: Problem, notes: Callable[[], Diagnostics], execution: Execution, finer: Execution | None
+    problem: Problem,
+    notes: Callable[[], Diagnostics],
+    execution: Execution,
+    finer: Execution | None,
+    followed: bool = False,
 ) -> Verdict:
     if problem.settings.one_stop is not None:
         return Verdict("unknown", TWO_STEP)
     from hsdsl.simulate.verdict import RunView, assess  # not every run needs one
 
-    return assess(RunView(problem, execution, finer), notes())
+    return assess(RunView(problem, execution, finer, followed=followed), notes())

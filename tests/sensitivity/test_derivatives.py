@@ -259,6 +259,40 @@ def test_a_zeno_point_ends_derivatives() -> None:
     assert np.isnan(found.final.state["h"]["e"])
 
 
+@pytest.mark.parametrize("written", [False, True])
+def test_derivatives_through_sticking(written: bool) -> None:
+    """Sliding ends where the flow is tangent to its surface, for all executions from nearby: derivatives exist."""
+    model = hsdsl.load("models/gallery/stick-slip.yaml")
+    if written:
+        model = hsdsl.loads(model.completed())
+        assert model.sliding.program.modes == model.program.modes  # what is completed is not completed again
+    found = model.sensitivity("belt", until=6)
+    assert found.exists is True and not found.reasons
+    ends = [model.simulate(until=6, parameters={"belt": 0.1 + d}, tolerance=1e-13).final.state for d in (1e-6, -1e-6)]
+    for name, row in found.final.state.items():
+        assert row["belt"] == pytest.approx((ends[0][name] - ends[1][name]) / 2e-6, rel=1e-6)
+
+
+LANDING = """
+hsdsl: 1
+parameters: {{a: 1}}
+modes:
+  A: {{flow: {{x: 1, y: 0}}, transitions: [{{when: x >= 1, to: B, name: go, reset: {{y: {lands}}}}}]}}
+  B: {{flow: {{x: 1, y: 1 - x}}, transitions: [{{when: y >= 0, to: C, name: up}}]}}
+  C: {{flow: {{x: 0, y: 0}}}}
+initial: {{mode: A, x: 0, y: 0}}
+experiment: {{until: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("lands", "wrt", "exists"), [("a - 1", "a", False), ("y", "initial.y", False), ("0", "initial.x", True)]
+)
+def test_tangent_landings(lands: str, wrt: str, exists: bool) -> None:
+    """Only where states near the guard land on the surface at the rate zero too is there a derivative."""
+    assert hsdsl.loads(LANDING.format(lands=lands)).sensitivity(wrt).exists is exists
+
+
 MOVING_JUMP = """
 hsdsl: 1
 parameters: {w: 2}

@@ -14,6 +14,7 @@ import hsdsl
 from hsdsl import UsageError
 from hsdsl.cli.verbs import obey
 
+BELT = "models/gallery/stick-slip.yaml"
 OSCILLATOR = "models/oscillator-with-stop-1.yaml"
 
 
@@ -165,6 +166,13 @@ experiment: {{until: 20}}
         ("models/bouncing-ball.yaml", {"section": "bounce"}, "no periodic orbit"),
         (BALL.format(floor="A*sin(w*t) + A*sin(w**2*t)"), {"section": "hit"}, "without a common multiple"),
         (BALL.format(floor="A*t"), {"section": "hit"}, "outside of sines"),
+        (
+            BELT,
+            {"section": "catches_up", "settings": {"completion": "none"}},
+            "one instant only.*stops at t = 0.25",
+        ),
+        ("models/gallery/dry-friction.yaml", {"section": "turns_right"}, "ever shorter"),
+        ("models/gallery/lorenz-section.yaml", {"section": "up"}, "no periodic orbit"),
     ],
 )
 def test_bad_input(model: str, arguments: dict[str, Any], sentence: str) -> None:
@@ -185,7 +193,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_stick_slip_on_a_belt() -> None:
     """Sticking puts nearby executions on one line: a multiplier is zero. The period is that of two integrators."""
-    text = hsdsl.load("models/gallery/stick-slip.yaml").completed()
+    text = hsdsl.load(BELT).completed()
     orbit = hsdsl.loads(text).orbit("sliding_slower_faster->slower")
     assert orbit.period == pytest.approx(6.608448370445725, abs=1e-12)
     assert orbit.verdict == "stable"

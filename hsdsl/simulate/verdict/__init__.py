@@ -15,6 +15,7 @@ that the run allows itself.
 `crossings`     is each transition transversal, and its condition the same all around it?
 `landings`      does a reset land within the error of a surface, or jump?
 `misses`        surfaces that are almost reached or passed over; `endings`: what happens at the end
+`tangent`       arcs that leave a surface tangentially, as where sliding ends
 `transparent`   surfaces that are passed where their condition is false
 `flows`         does the flow vary unseen, jump, or have a slope without bound?
 `commutation`   do transitions that are reached together commute?
@@ -77,7 +78,8 @@ def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
     yield from diagnostics.departures
     if not diagnostics.departures and run.stop.reason not in LEFT and run.screen is not None:
         return  # it neither slid nor made crowded transitions
-    yield from slidings(run)
+    if not run.followed:
+        yield from slidings(run)
     if not diagnostics.departures:
         yield from accumulations(run)
     if run.stop.reason in LEFT:

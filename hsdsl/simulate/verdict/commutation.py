@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.execution import Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.finding import Finding
@@ -28,13 +29,15 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     for made in run.relied_transitions if run.doubts("choice") else ():
         if not made.alternatives:
             continue
-        place = run.place(made.source, made.time, tuple(made.before.values()))
-        names = [edge.name for edge in place.mode.edges]
-        tied = [names.index(name) for name in (made.edge, *made.alternatives)]
-        if commute(run, place, tied):
+        place, k = run.before(made)
+        names = run.edges(made.source)
+        rivals = [name for name in made.alternatives if not outranked(run, place, k, names.index(name), made)]
+        if not rivals:
+            continue
+        if commute(run, place, [k, *map(names.index, rivals)]):
             commuting.append(made.time)
             continue
-        others = " or ".join(made.alternatives)
+        others = " or ".join(rivals)
         found.append(
             Finding(
                 "choice",
@@ -48,6 +51,12 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     instants = list(dict.fromkeys(map(show, commuting)))
     listed = ", ".join(instants[:3]) + (f" and {len(instants) - 3} more" if len(instants) > 3 else "")
     return found, [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
+
+
+def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:
+    """Whether an edge has the surface of the one that was taken, and a lower priority: no error changes their order."""
+    error = tuple(abs(x) for x in place.x) if run.errors is None else run.around(place, run.row_before(made))
+    return place.outranks(k, other, error)
 
 
 def commute(run: RunView, place: Place, tied: Sequence[int], since: Number = 0) -> bool:

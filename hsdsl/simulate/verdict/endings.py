@@ -27,6 +27,8 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         if k == crossed or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
+        if crossed is not None and crossed != k and place.outranks(crossed, k, run.around(place, arc.last)):
+            continue
         finding = judged(run, place, k, arc.last, "is about to reach")
         if finding is None:
             continue

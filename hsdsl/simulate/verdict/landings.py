@@ -11,17 +11,15 @@ from collections.abc import Iterator
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Transition
-from hsdsl.integrators.stepper import State
 from hsdsl.program import JUMPS
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.place import ALONG, Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import LOOK_AT_RESET
+from hsdsl.simulate.verdict.tangent import leaves_along
 
-ALONG = 1e-3  # of what a surface may change by: less is along it
-ROUNDS = 3  # of Newton's method, back onto a guard
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
@@ -35,7 +33,8 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
         made = run.transitions[arc.jump - 1] if arc.jump else None
         for k in range(len(place.mode.edges) + len(place.mode.walls)):
             try:
-                found += _on(run, arc, place, k, made)
+                if not (run.followed and leaves_along(run, arc, k)):
+                    found += _on(run, arc, place, k, made)
             except DOMAIN_ERRORS:
                 continue  # `misses` looks along the arc
     for made in run.doubtful_transitions(LOOK_AT_RESET):
@@ -80,7 +79,7 @@ def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
     target = before.mode.edges[edge].target
     if k == edge and target == run.index(made.source) and _untouched(before, edge):
         return True
-    for moved in _along(run, before, edge, run.around(before, run.row_before(made))):
+    for moved in before.along_guard(edge, run.around(before, run.row_before(made))):
         landed = before.kernel.resets[edge](made.time, *moved)
         after = run.place(target, made.time, landed)
         here = before.kernel.resets[edge](made.time, *before.x)
@@ -96,20 +95,6 @@ def _untouched(place: Place, edge: int) -> bool:
     slopes = place.kernel.gradients[edge](place.t, *place.x)[1:]
     rows = zip(place.mode.states, place.mode.edges[edge].reset_texts, slopes, strict=True)
     return place.mode.affine and all(text == name for name, text, slope in rows if slope)
-
-
-def _along(run: RunView, place: Place, edge: int, error: State) -> Iterator[State]:
-    """The state moved by the error in each component, and then back onto the guard."""
-    for moved in place.moved_by(error):
-        x = moved
-        for _ in range(ROUNDS):
-            value = place.kernel.surfaces(place.t, *x)[edge]
-            slopes = place.kernel.gradients[edge](place.t, *x)[1:]
-            norm = sum((g * g for g in slopes), run.arithmetic.zero)
-            if not norm > 0:
-                break
-            x = tuple(a - value * g / norm for a, g in zip(x, slopes, strict=True))
-        yield x
 
 
 def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:

@@ -23,6 +23,7 @@ from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
+from hsdsl.simulate.verdict.tangent import leaves_along
 from hsdsl.simulate.verdict.transparent import Passed, passed_at, transparent, undecided_condition
 
 HALVINGS = 20
@@ -133,6 +134,8 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
     if last and run.crossed.get(arc.last) == k and each.end >= 1:
         return None  # `crossings` looks at how it is crossed
     look = run.between(arc, each.row)
+    if run.followed and each.row == arc.first and not each.start and leaves_along(run, arc, k):
+        return None
     try:
         places = [(look(run.arithmetic.zero + s), s) for s in _shares(each)]
         place, share = max(places, key=lambda each: each[0].value(k))

@@ -12,6 +12,8 @@ from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.surfaces import Surfaces
 
+ALONG = 1e-3  # of what a surface may change by: less is along it
+ROUNDS = 3  # of Newton's method, back onto a guard
 TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 
 
@@ -51,6 +53,19 @@ class Place:
             for way in (-1, 1):
                 yield (*self.x[:i], self.x[i] + way * e, *self.x[i + 1 :])
 
+    def along_guard(self, k: int, error: State) -> Iterator[State]:
+        """The state moved by the error in each component, and then back onto the guard of edge k."""
+        for moved in self.moved_by(error):
+            x = moved
+            for _ in range(ROUNDS):
+                value = self.kernel.surfaces(self.t, *x)[k]
+                slopes = self.kernel.gradients[k](self.t, *x)[1:]
+                norm = sum(g * g for g in slopes)
+                if not norm > 0:
+                    break
+                x = tuple(a - value * g / norm for a, g in zip(x, slopes, strict=True))
+            yield x
+
     def conditions(self, k: int, error: State) -> set[bool]:
         """What the condition of edge k is at the state and around it, anywhere in the box of the error."""
         found = {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
@@ -61,6 +76,17 @@ class Place:
             except (Undecided, *DOMAIN_ERRORS):
                 found = {True, False}
         return found
+
+    def outranks(self, j: int, k: int, error: State) -> bool:
+        """Whether edge j goes before edge k by priority wherever either may be reached: they have one surface."""
+        edges = self.mode.edges
+        if k >= len(edges) or not edges[j].priority > edges[k].priority:
+            return False
+        for x in self.moved_by(error):
+            values = self.kernel.surfaces(self.t, *x)
+            if not abs(values[j] - values[k]) <= self.surfaces.roundoff_bound(k, self.t, x):
+                return False
+        return True
 
     def name(self, k: int) -> str:
         """Surface k for a person."""

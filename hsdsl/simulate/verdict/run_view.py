@@ -34,12 +34,15 @@ class RunView:
         run is repeated, finer.
     upto : float
         Until when the run can be relied on.
+    followed : bool
+        Whether motion along surfaces counts as the flow of a mode of the system, as for derivatives.
     """
 
     problem: Problem
     execution: Execution
     against: Execution | None = None
     upto: float = inf
+    followed: bool = False
 
     @property
     def transitions(self) -> Sequence[Transition]:
