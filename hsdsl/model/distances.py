@@ -187,9 +187,12 @@ class _RunSpace:
         return number
 
     def space(self, depth: float | None) -> SpaceMetric:
+        from hsdsl.elaborate.product import flat_part
         from hsdsl.metrics.space import make_space
 
-        space = make_space(self.values.system, [float(v) for v in self.values.parameters])
+        visited = dict.fromkeys(arc.mode for run in (self.run, self.other) for arc in run.arcs)
+        system = flat_part(self.values.system, visited)
+        space = make_space(system, [float(v) for v in self.values.parameters])
         self.budget.start()
         return SpaceMetric(space, depth, self.budget, self.hops)
 

@@ -340,3 +340,40 @@ def test_the_centipede_costs_what_its_legs_cost():
     run = model.simulate(until=1)
     assert run.stop.reason == "until"
     assert len(run.transitions) > 30
+
+
+def test_distances_are_those_of_the_flat_model():
+    parts, flat = hsdsl.loads(ROOMS), hsdsl.loads(flat_rooms())
+    one = hsdsl.distance(parts.simulate(until=0.3), parts.simulate(until=0.3, initial={"a.T": 20.01}), model=parts)
+    other = hsdsl.distance(flat.simulate(until=0.3), flat.simulate(until=0.3, initial={"aT": 20.01}), model=flat)
+    assert (one.lower, one.upper) == pytest.approx((other.lower, other.upper), rel=1e-6)
+    assert one.lower > 0.009
+
+
+def test_the_flat_part_of_visited_modes_has_the_same_execution():
+    from hsdsl.elaborate.product import flat_part
+
+    model = hsdsl.loads(WALKER)
+    run = model.simulate(until=1.2)
+    flat = hsdsl.Model(flat_part(model.system, [arc.mode for arc in run.arcs])).simulate(until=1.2)
+    assert [t.edge for t in flat.transitions] == [t.edge for t in run.transitions]
+    assert [t.time for t in flat.transitions] == pytest.approx([t.time for t in run.transitions], abs=1e-12)
+    assert flat.final.mode == run.final.mode
+    assert flat.final.state == pytest.approx(run.final.state, abs=1e-12)
+
+
+@pytest.mark.parametrize("what", ["orbit", "sensitivity", "stream", "point", "complete", "export"])
+def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
+    from hsdsl.export import source_of
+
+    model = hsdsl.loads(ROOMS)
+    calls = {
+        "orbit": lambda: model.orbit("a.too_warm"),
+        "sensitivity": lambda: model.sensitivity("a.power"),
+        "stream": lambda: model.stream(tmp_path / "rows.csv"),
+        "point": lambda: model.distance("a=on b=on a.T=20 b.T=20", "a=on b=on a.T=20 b.T=20"),
+        "complete": model.completed,
+        "export": lambda: source_of(model, {}),
+    }
+    with pytest.raises(hsdsl.UsageError, match="system of parts"):
+        calls[what]()
