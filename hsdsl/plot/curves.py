@@ -99,7 +99,7 @@ def _points(run: Execution) -> tuple[Array, Array]:
     parts = np.ones(n, dtype=int)
     if run.coefficients.shape[1] > 1 or run.output_function is not None:
         share = np.maximum(duration / max(float(duration.sum()), np.finfo(float).tiny), 1 / n)
-        parts = np.where(duration > 0, np.clip(np.ceil(POINTS * share), 1, 64), 1).astype(int)
+        parts = np.where(duration > 0, np.maximum(np.ceil(POINTS * share), 1), 1).astype(int)
     for arc in run.arcs:
         parts[arc.last] = 1
         if arc.kind == "strip":

@@ -15,23 +15,28 @@ const modeAt = (run, i) => i < 0 ? "ended" : modeOf(run.arcs[run.arcOf[i]].mode)
 
 // Show the runs at a share of their time; `chosen` is a run and the number of its point.
 function show(share, chosen) {
-  const t = share * span()[1], at = pointsAt(t);
+  const time = chosen ? runs[chosen[0]].times[chosen[1]] : share * span()[1], at = pointsAt(time);
   if (chosen) at[chosen[0]] = chosen[1];
   cursor = share;
-  const time = runs.length === 1 && at[0] >= 0 ? runs[0].times[at[0]] : t;
   const modes = [...new Set(runs.map((run, k) => modeAt(run, at[k])))].join(", ");
   $("cursor").value = Math.round(1000 * share);
   $("now").textContent = `t = ${format(time, 5)}, ${modes}`;
   $("cursor").setAttribute("aria-valuetext", `t = ${format(time, 4)}, mode ${modes}`);
-  followers.forEach((follow) => follow(t, at));
-  drawCursor(t, at);
+  followers.forEach((follow) => follow(time, at));
+  drawCursor(time, at);
   showValues(time, at);
+}
+
+// A column at a time: between its points on a straight line, which is as dense as the curve that is drawn.
+function valueAt(run, ys, t, i) {
+  if (i < 0 || run.arcOf[i + 1] !== run.arcOf[i] || !(run.times[i + 1] > run.times[i]) || t <= run.times[i]) return ys[i];
+  return ys[i] + (ys[i + 1] - ys[i]) * Math.min(1, (t - run.times[i]) / (run.times[i + 1] - run.times[i]));
 }
 
 function showValues(time, at) {
   const row = (name, ...cells) => element("tr", {}, element("th", {textContent: name, scope: "row"}), ...cells);
   const text = (textContent) => element("td", {textContent});
-  const rows = model.columns.map((name) => row(withUnit(name), ...runs.map((run, k) => cell(column(run, name)[at[k]]))));
+  const rows = model.columns.map((name) => row(withUnit(name), ...runs.map((run, k) => cell(valueAt(run, column(run, name), time, at[k])))));
   const heads = runs.length > 1 ? [row("run", ...runs.map((run) => text(run.label)))] : [];
   const modes = row("mode", ...runs.map((run, k) => text(modeAt(run, at[k]))));
   $("values").tBodies[0].replaceChildren(...heads, modes, row("t", cell(time)), ...rows);

@@ -183,12 +183,13 @@ function drawCursor(t, at) {
   for (const [name, canvas] of shownPanels()) over(canvas, (made) => {
     line(made);
     runs.forEach((run, k) => {
-      const value = column(run, name)[at[k]];
-      dot(made, made.x(run.times[at[k]]), made.y(value), format(value, 5));
+      if (at[k] < 0) return;
+      const value = valueAt(run, column(run, name), t, at[k]);
+      dot(made, made.x(t), made.y(value), format(value, 5));
     });
   });
   for (const {canvas} of phases) over(canvas, (made) => made.points.forEach(([xs, ys], k) => {
-    const [a, b] = [xs[at[k]], ys[at[k]]];
+    const [a, b] = [xs, ys].map((each) => valueAt(runs[k], each, t, at[k]));
     dot(made, made.x(a), made.y(b), `${format(a, 5)}, ${format(b, 5)}`);
   }));
 }
