@@ -17,6 +17,7 @@ import sympy as sp
 
 from hsdsl.errors import Decided
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import absolute, maximum, minimum
 from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Ranges, SearchRange, at_most_zero, zero
@@ -188,16 +189,23 @@ class Dynamics:
 
     @cached_property
     def _levels(self) -> dict[str, float]:
-        """The largest level of each state in a surface of it alone."""
+        """The largest level of each state in a surface, or a branch of one, that is of it alone."""
         found: dict[str, float] = {}
+        for p in map(self.decider.normal_forms.of, self._branches()):
+            for name in p.names if len(p.names) == 1 else ():
+                coefficient = linear_in(p, name)
+                level = abs(p.terms.get((), Fraction(0)) / coefficient) if coefficient else Fraction(0)
+                found[name.name] = max(found.get(name.name, 0.0), float(min(level, _LARGEST)))
+        return found
+
+    def _branches(self) -> Iterator[Any]:
+        """The surfaces of all modes, and what they take `min`, `max` and `abs` of."""
         for mode in self.system.modes:
             for surface in (*(edge.surface for edge in mode.edges), *mode.walls):
-                p = self.decider.normal_forms.of(self.residual(surface))
-                for name in p.names if len(p.names) == 1 else ():
-                    coefficient = linear_in(p, name)
-                    level = abs(p.terms.get((), Fraction(0)) / coefficient) if coefficient else Fraction(0)
-                    found[name.name] = max(found.get(name.name, 0.0), float(min(level, _LARGEST)))
-        return found
+                residual = self.residual(surface)
+                yield residual
+                for kinked in residual.atoms(absolute, maximum, minimum):
+                    yield from kinked.args
 
     @cached_property
     def _common(self) -> Ranges:
