@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from docs.test_documents import run_hsdsl
 
+from hsdsl.cli.verbs import VERBS, command
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
 ROOM = str(ROOT / "models" / "thermostat.yaml")
@@ -62,6 +64,11 @@ def known(field: str, table: dict[str, str]) -> bool:
         return True
     above = [name for name in table if field.startswith((f"{name}.", f"{name}["))]
     return any(re.match(r"map|list", table[name]) for name in above)
+
+
+def test_every_verb_with_json_is_called():
+    verbs = {name for name in VERBS if any("--json" in parameter.opts for parameter in command(name).params)}
+    assert verbs == {call[0] for call in CALLS}
 
 
 @pytest.mark.parametrize("call", CALLS, ids=lambda call: " ".join(Path(word).name for word in call[:3]))
