@@ -12,7 +12,7 @@ from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.files import ModelFiles
 from hsdsl.names import SINCE, closest
 from hsdsl.parts import Part
-from hsdsl.schema import ModeDocument, ModelDocument, SystemDocument
+from hsdsl.schema import ModeDocument, ModelDocument
 from hsdsl.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.system import TIME
 
@@ -128,8 +128,7 @@ class SymbolTable:
     @cached_property
     def timed(self) -> bool:
         """Whether `since` is the time since the mode was entered: the file defines no such name."""
-        taken = SINCE in self.names or SINCE in self.inner_lets
-        return not taken and not (isinstance(self.document, SystemDocument) and bool(self.document.system))
+        return SINCE not in self.names and SINCE not in self.inner_lets
 
     def states_within(self, mode: str) -> frozenset[str]:
         """The states that expressions of a mode may use: its own ones and, where it has a flow, `since`."""
