@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -29,7 +29,8 @@ MOST_TOGETHER = 3  # edges whose motions along several guards at once are derive
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
-MOST_NODES = 2_000  # of a mode's flow, reset and guard, written out: beyond, no motion along a guard is derived
+MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
+MOST_WRITTEN = 40_000  # nodes of a mode's flow, once for each edge that may hold it: each motion is a mode of its own
 LONG = 200  # operations, from which on a term is not simplified
 Point = dict[sp.Symbol, float]
 
@@ -74,9 +75,10 @@ def contacts(mode: Mode, numbers: Sequence[str] = ()) -> dict[frozenset[int], Co
     Those along several guards are there for up to :data:`MOST_TOGETHER` such edges, where none changes what presses on
     the others.
     """
-    singles = {
-        frozenset((k,)): found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers)) is not None
-    }
+    loops = [k for k, edge in enumerate(mode.edges) if edge.target == mode.name]
+    if len(loops) * _size(mode.flow) > MOST_WRITTEN:
+        return {}
+    singles = {frozenset((k,)): found for k in loops if (found := contact(mode, k, numbers)) is not None}
     every = dict(singles)
     for size in range(2, len(singles) + 1) if len(singles) <= MOST_TOGETHER else ():
         for few in [few for few in every if len(few) == size - 1]:
@@ -184,14 +186,19 @@ class _Nearby:
 
     def is_small(self) -> bool:
         """Whether all of this written out is short enough to be differentiated twice as trees."""
-        sizes: dict[sp.Basic, int] = {}
+        return _size((*self.flows(), *self.moved, self.guard)) <= MOST_NODES
 
-        def size(expr: sp.Basic) -> int:
-            if expr not in sizes:
-                sizes[expr] = 1 + sum(map(size, expr.args))
-            return sizes[expr]
 
-        return sum(map(size, map(sp.sympify, (*self.flows(), *self.moved, self.guard)))) <= MOST_NODES
+def _size(expressions: Iterable[sp.Expr]) -> int:
+    """The nodes of expressions written out as trees."""
+    sizes: dict[sp.Basic, int] = {}
+
+    def size(expr: sp.Basic) -> int:
+        if expr not in sizes:
+            sizes[expr] = 1 + sum(map(size, expr.args))
+        return sizes[expr]
+
+    return sum(map(size, map(sp.sympify, expressions)))
 
 
 def _mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integer]:

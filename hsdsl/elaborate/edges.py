@@ -181,8 +181,9 @@ def _check_reset(
                 hint = "every transition into a mode starts it at 0"
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             symbols.report(key.place, "HS306", message, hint)
-    for state in states:
-        if state not in transition.reset and state not in symbols.states[source]:
+    own = symbols.states[source]
+    for state in () if states == own else states:
+        if state not in transition.reset and state not in own:
             message = (
                 f"the transition to '{target}' gives its state '{state}' no value, and '{source}' has no such state"
             )
