@@ -74,7 +74,7 @@ static void choose_entry(hs_run *run, const int *beyond, hs_time t) {
   run->chosen.theta = run->chosen.depth = 0.0;
   run->chosen.time = t;
   run->chosen.state = run->x;
-  run->chosen.piece.degree = 0;
+  run->chosen.piece = 0;
 }
 
 /* Enter a mode at (t, run->x), sizes in run->scale, and make the transitions that fire at once.

@@ -101,6 +101,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->values = numbers(store, m);
   run->ahead = numbers(store, m);
   run->magnitudes = numbers(store, m);
+  run->begun = numbers(store, m);
   run->noise = numbers(store, m);
   run->gradient = numbers(store, w + 1);
   run->both = numbers(store, 2 * (int64_t)w);
@@ -116,8 +117,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->crossings = take(store, m, sizeof(hs_crossing));
   for (int i = 0; i < m; i++) {
     hs_real *state = numbers(store, w);
-    const hs_polynomial piece = polynomial(store, run);
-    if (store->numbers) run->crossings[i].state = state, run->crossings[i].piece = piece;
+    if (store->numbers) run->crossings[i].state = state;
   }
 }
 

@@ -126,6 +126,7 @@ static int first_event(hs_run *run) {
   const hs_mode *mode = run->here.table;
   int guards = 0, tied = 0;
   hs_crossing *wall = 0;
+  run->weighed = 0;
   for (int k = 0; k < mode->surfaces; k++) {
     hs_crossing *const crossing = &run->crossings[k < mode->edges ? guards : k];
     const int found = first_crossing(run, k, crossing);

@@ -53,7 +53,7 @@ static int standing_on(hs_run *run) {
     crossing->theta = crossing->depth = 0.0;
     crossing->time = run->here.t;
     copy(crossing->state, run->x, run->here.dimension);
-    crossing->piece.degree = 0;
+    crossing->piece = 0;
   }
   return count;
 }
@@ -186,7 +186,10 @@ static int through_strip(hs_run *run) {
   const hs_time t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
-  if (crossing->theta > 0) append(run, t, crossing->state, &crossing->piece);
+  if (crossing->theta > 0) {
+    shortened(run, crossing->piece, crossing->theta, &run->cubic);
+    append(run, t, crossing->state, &run->cubic);
+  }
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   hs_time resumed = t1 + (run->epsilon - depth);
   const int without_value = reset(run, run->landed);

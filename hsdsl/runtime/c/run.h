@@ -51,7 +51,7 @@ typedef struct {
   hs_real theta, depth;
   hs_time time;
   hs_real *state;
-  hs_polynomial piece; /* of degree 0 where the crossing is the step's start */
+  const hs_polynomial *piece; /* of the whole step; 0 where the crossing is its start */
 } hs_crossing;
 
 /* The mode that a run is in, and the point there. */
@@ -181,6 +181,8 @@ typedef struct {
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
   hs_real *values, *ahead, *magnitudes, *noise; /* one for each surface */
+  hs_real *begun; /* magnitudes at the start of the located step, where `weighed` */
+  int weighed;
   int *active_surfaces, *beyond, *emerging;
   hs_real *source;      /* the flow that led to a transition, or between two states */
   int *tied;           /* one for each edge */

@@ -58,11 +58,15 @@ static int gradient_of(hs_run *run, int k, hs_time t, const hs_real *x) {
   return 0;
 }
 
-/* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
-static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise) {
+/* The magnitudes of all surfaces, for the bounds at one point. */
+static int magnitudes_at(hs_run *run, hs_time t, const hs_real *x, hs_real *magnitudes) {
+  return run->here.table->magnitudes(run->here.p, t, x, magnitudes) ? RAISED : 0;
+}
+
+/* The bound of surface k from the magnitudes at its point. */
+static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time t, const hs_real *x, int entry) {
   const hs_mode_state *here = &run->here;
-  if (here->table->magnitudes(here->p, t, x, run->magnitudes)) return RAISED;
-  hs_real total = run->magnitudes[k];
+  hs_real total = magnitudes[k];
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
   if (!row->values(here->p, t, x, g) && hs_finite(sum(g, row->count))) {
@@ -72,7 +76,13 @@ static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int e
       total = total + fabs(g[i]) * (s < 0 ? fabs(t) : hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0));
     }
   }
-  *noise = ROUNDOFF_UNITS * HS_UNIT * total;
+  return ROUNDOFF_UNITS * HS_UNIT * total;
+}
+
+/* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
+static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise) {
+  if (magnitudes_at(run, t, x, run->magnitudes)) return RAISED;
+  *noise = bound_from(run, run->magnitudes, k, t, x, entry);
   return 0;
 }
 
@@ -83,12 +93,13 @@ static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int e
 static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_time reset_at) {
   const hs_real *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
   int *const beyond = run->beyond;
+  if (run->here.table->surfaces && magnitudes_at(run, t, run->x, run->magnitudes)) return RAISED;
   if (reset_at < t && run->here.table->values(run->here.p, reset_at, run->x, run->noise)) return RAISED;
   for (int k = 0; k < run->here.table->surfaces; k++) {
     hs_real noise, rate;
     const int inside = jumped && beyond[k];
     run->active_surfaces[k] = run->emerging[k] = beyond[k] = 0;
-    if (roundoff_bound(run, k, t, run->x, 1, &noise)) return RAISED;
+    noise = bound_from(run, run->magnitudes, k, t, run->x, 1);
     if (since != 0 && fabs(values[k]) > noise) {
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
@@ -109,27 +120,30 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
 static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
   const hs_mode *mode = run->here.table;
   if (mode->values(run->here.p, t, x, run->values)) return RAISED;
+  const int raised = magnitudes_at(run, t, x, run->magnitudes);
   for (int k = 0; k < mode->surfaces; k++) {
-    hs_real noise;
     inside[k] = 0;
     if (k >= mode->edges || mode->edge[k].conditional) continue;
-    if (roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
-    inside[k] = run->values[k] < -noise;
+    if (raised) return RAISED;
+    inside[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 0);
   }
   return 0;
 }
 
 /* Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false. */
 static void leave(hs_run *run, hs_time t, const hs_real *x) {
-  for (int k = 0; k < run->here.table->surfaces; k++) {
-    hs_real r, noise;
-    if (!run->active_surfaces[k] || surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) continue;
-    if (fabs(r) > noise) run->active_surfaces[k] = 0, run->here.standing--;
+  const hs_mode *const mode = run->here.table;
+  if (mode->values(run->here.p, t, x, run->values)) return;
+  const int raised = magnitudes_at(run, t, x, run->magnitudes);
+  for (int k = 0; !raised && k < mode->surfaces; k++) {
+    if (!run->active_surfaces[k]) continue;
+    if (fabs(run->values[k]) > bound_from(run, run->magnitudes, k, t, x, 0))
+      run->active_surfaces[k] = 0, run->here.standing--;
   }
-  for (int k = 0; run->here.emerging && k < run->here.table->surfaces; k++) {
-    hs_real r, rate = 0.0;
-    if (!run->emerging[k] || surface(run, k, t, x, &r)) continue;
-    if (!(r <= 0) && (run->here.table->rates[k](run->here.p, t, x, &rate) || rate < 0)) continue;
+  for (int k = 0; run->here.emerging && k < mode->surfaces; k++) {
+    hs_real rate = 0.0;
+    if (!run->emerging[k]) continue;
+    if (!(run->values[k] <= 0) && (run->here.table->rates[k](run->here.p, t, x, &rate) || rate < 0)) continue;
     run->emerging[k] = 0, run->here.emerging--;
   }
 }
@@ -161,14 +175,17 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
 /* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
    On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
 static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
+  const hs_mode *const mode = run->here.table;
+  const int raised = mode->edges && (mode->values(run->here.p, t, x, run->values) ||
+                                     magnitudes_at(run, t, x, run->magnitudes));
   int count = 0;
-  for (int k = 0; k < run->here.table->edges; k++) {
-    hs_real r, rate, noise;
+  for (int k = 0; k < mode->edges; k++) {
+    hs_real rate;
     found[k] = 0;
-    if (run->here.table->edge[k].releases || surface(run, k, t, x, &r)) continue;
-    if (run->here.table->rates[k](run->here.p, t, x, &rate)) continue;
-    if (roundoff_bound(run, k, t, x, 0, &noise)) continue;
-    if (fabs(r) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1) found[k] = 1, count++;
+    if (raised || mode->edge[k].releases || mode->rates[k](run->here.p, t, x, &rate)) continue;
+    const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
+    if (fabs(run->values[k]) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1)
+      found[k] = 1, count++;
   }
   return count;
 }
@@ -374,7 +391,7 @@ static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *c
   if (status) return status == RAISED ? RAISED : (*found = failure(HS_DEEP, k), 0);
   crossing->edge = k;
   crossing->depth = hs_min(run->epsilon, values[k] / norm);
-  shortened(run, piece, crossing->theta, &crossing->piece);
+  crossing->piece = piece;
   return 1;
 }
 
@@ -383,8 +400,11 @@ static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *c
 static int judge(hs_run *run, const hs_real *values, hs_found *found) {
   const hs_mode *mode = run->here.table;
   *found = CLEAR;
-  for (int k = 0; k < mode->surfaces; k++)
-    if (!(values[k] <= 0) && roundoff_bound(run, k, run->trial.t1, run->z, 0, &run->noise[k])) return RAISED;
+  for (int k = 0, looked = 0; k < mode->surfaces; k++) {
+    if (values[k] <= 0) continue;
+    if (!looked++ && magnitudes_at(run, run->trial.t1, run->z, run->magnitudes)) return RAISED;
+    run->noise[k] = bound_from(run, run->magnitudes, k, run->trial.t1, run->z, 0);
+  }
   for (int k = 0; k < mode->surfaces; k++) {
     if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
     if (k >= mode->edges && !run->emerging[k]) return *found = failure(HS_WALL, k), 0;

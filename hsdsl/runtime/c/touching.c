@@ -44,7 +44,7 @@ static int touched(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   const hs_real *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
-  hs_real rate, noise, share = 1.0;
+  hs_real rate, share = 1.0;
   if (!may_be_touched(run, k)) return 0;
   const hs_real slope = slope_of(c, n, 1.0);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
@@ -57,8 +57,9 @@ static int touched(hs_run *run, int k, hs_crossing *crossing) {
     crossing->time = span->t + share * span->h;
     at(run, &span->piece, share, crossing->state);
   } else {
-    if (roundoff_bound(run, k, span->t, run->x, 0, &noise)) return RAISED;
-    if (!(fabs(run->ends[k]) <= noise)) return 0;
+    if (!run->weighed && magnitudes_at(run, span->t, run->x, run->begun)) return RAISED;
+    run->weighed = 1;
+    if (!(fabs(run->ends[k]) <= bound_from(run, run->begun, k, span->t, run->x, 0))) return 0;
   }
   const int ends = ends_at(run, k, crossing);
   if (ends != 1) return ends;

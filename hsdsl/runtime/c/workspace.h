@@ -20,8 +20,8 @@
 #define HS_SPACE(w, m, e, lines, states, kind, stages, extra, order, degree)                                       \
   (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
    ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + ((kind) == HS_RADAU ? HS_RADAU_SPACE(w) : 0) + \
-   4 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 3 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
-   (2 + (m)) * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
+   5 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 3 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
+   2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
 #define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
 #define HS_LOCATED_SPACE_OF(w, m, modes, derivatives, stages, extra, degree, most)                                 \
