@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import Literal
 
 from hsdsl.parts import Part
+from hsdsl.sparsity import Elimination, elimination
 
 JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 Hold = Literal["zero", "linear"]
@@ -136,11 +137,18 @@ class EdgeProgram:
 class Jacobian:
     """Derivatives of a mode's flow by its states: of n * n, row by row, those that are not zero everywhere.
 
-    ``routines`` has one routine, ``jacobian``, called like those of a mode, for the values at ``places``.
+    ``routines`` has one routine, ``jacobian``, called like those of a mode, for the values at ``places``. ``order`` is
+    that in which implicit steps eliminate the states; none where they solve dense systems.
     """
 
     routines: Routines
     places: tuple[int, ...]
+    order: tuple[int, ...] = ()
+
+    @property
+    def elimination(self) -> Elimination | None:
+        """The pattern of a sparse elimination."""
+        return elimination(self.places, self.order) if self.order else None
 
 
 @dataclass(frozen=True)

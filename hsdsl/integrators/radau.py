@@ -23,8 +23,10 @@ from hsdsl.integrators.implicit import RADAU as RADAU
 from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
 from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConvergence
 from hsdsl.integrators.scales import resolved, rows_of
+from hsdsl.integrators.sparse import ComplexSparseFactors, SparseFactors, sparse_factored, sparse_factored_complex
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
+from hsdsl.sparsity import Elimination
 
 
 def radau_stepper(
@@ -33,20 +35,25 @@ def radau_stepper(
     arithmetic: Arithmetic,
     scales: Sequence[Number],
     smooth: bool = True,
+    pattern: Elimination | None = None,
 ) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
 
-    ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump.
+    ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump;
+    ``pattern`` is that of a sparse elimination.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth)
+    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern)
 
     def error(h: Number, stages: Stages, end: State) -> State:
         return stages[3]
 
     return Stepper(RADAU.name, steps.step, steps.piece, error, landing=steps.landing, scales=steps.scales)
+
+
+_Both = tuple[Factors | SparseFactors, ComplexFactors | ComplexSparseFactors]
 
 
 class Steps:
@@ -65,7 +72,9 @@ class Steps:
         arithmetic: Arithmetic,
         scales: Sequence[Number],
         smooth: bool = True,
+        pattern: Elimination | None = None,
     ) -> None:
+        self._pattern = pattern
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
         self._largest, self._smooth = scales, smooth
         self._scales, self._floors = scales, list[Number]()
@@ -76,7 +85,7 @@ class Steps:
         self._rows: Matrix | None = None
         self._derived_at: Number = arithmetic.zero
         self._factored_for: Number = arithmetic.zero
-        self._factors: tuple[Factors, ComplexFactors] | None = None
+        self._factors: _Both | None = None
         self._last: tuple[Number, Number, Increments] | None = None
         self.derived = self.factorings = self.iterations = 0
 
@@ -138,27 +147,45 @@ class Steps:
         self._rows, self._derived_at, self._factors = rows_of(self._jacobian(t, *x), len(x)), t, None
         self.derived += 1
 
-    def _factor(self, h: Number) -> tuple[Factors, ComplexFactors]:
+    def _factor(self, h: Number) -> _Both:
         """Factor gamma - h J and alpha - i beta - h J, unless that is done."""
         if self._factors is None or self._factored_for != h:
             assert self._rows is not None
-            known, zero, n = self._known, self._arithmetic.zero, len(self._rows)
-            real = [[-h * d for d in row] for row in self._rows]
-            shifted = [list(row) for row in real]
-            turned = [[zero] * n for _ in real]
-            for i in range(n):
-                real[i][i] = known.gamma + real[i][i]
-                shifted[i][i] = known.alpha + shifted[i][i]
-                turned[i][i] = -known.beta
             self._factored_for = h
             self.factorings += 1
             try:
-                scales = self._largest
-                self._factors = factored(real, scales), factored_complex(shifted, turned, scales)
+                self._factors = self._dense(h, self._rows) if self._pattern is None else self._sparse(h, self._pattern)
             except Singular as problem:
                 self._factors = None
                 raise NoConvergence(str(problem)) from None
         return self._factors
+
+    def _dense(self, h: Number, rows: Matrix) -> _Both:
+        known, zero, n = self._known, self._arithmetic.zero, len(rows)
+        real = [[-h * d for d in row] for row in rows]
+        shifted = [list(row) for row in real]
+        turned = [[zero] * n for _ in real]
+        for i in range(n):
+            real[i][i] = known.gamma + real[i][i]
+            shifted[i][i] = known.alpha + shifted[i][i]
+            turned[i][i] = -known.beta
+        return factored(real, self._largest), factored_complex(shifted, turned, self._largest)
+
+    def _sparse(self, h: Number, pattern: Elimination) -> _Both:
+        """Factor the same matrices in the pattern of a sparse elimination."""
+        assert self._rows is not None
+        known, zero = self._known, self._arithmetic.zero
+        real, turned = [zero] * pattern.size, [zero] * pattern.size
+        unknowns = [(pattern.order[i], range(*pattern.start[i : i + 2])) for i in range(len(pattern.order))]
+        for unknown, row in unknowns:
+            for at in row:
+                real[at] = -h * self._rows[unknown][pattern.order[pattern.column[at]]]
+        shifted = list(real)
+        for own in pattern.diagonal:
+            real[own] = known.gamma + real[own]
+            shifted[own] = known.alpha + shifted[own]
+            turned[own] = -known.beta
+        return sparse_factored(pattern, real), sparse_factored_complex(pattern, shifted, turned)
 
     def _guess(self, t: Number, h: Number, x: State) -> Increments:
         """Go on with the last step's polynomial: behind its end, or inside it where it was tried from here."""

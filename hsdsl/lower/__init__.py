@@ -19,6 +19,7 @@ from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.functions import absolute, below, maximum, rebuilt
+from hsdsl.lower.ordering import ordering
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
@@ -253,7 +254,7 @@ class LoweredMode:
         places = tuple(k * width + column[state] for k, row in rows for state in row)
         values = tuple(slope for _, row in rows for slope in row.values())
         definition = Definition("jacobian", self.arguments, values, [s for _, part in parts for s in part.statements])
-        return lowered.Jacobian(print_routines((definition,), self.names.data), places)
+        return lowered.Jacobian(print_routines((definition,), self.names.data), places, ordering(places, width))
 
     def _diagnosis(self, expressions):
         for k, result in enumerate(self.place(expressions)):

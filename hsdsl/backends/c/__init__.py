@@ -3,6 +3,7 @@
 from hsdsl.backends.c.source import (
     constant_bodies,
     derivatives,
+    factors,
     lines,
     model_source,
     routine_functions,
@@ -10,4 +11,4 @@ from hsdsl.backends.c.source import (
     width,
 )
 
-__all__ = ["constant_bodies", "derivatives", "lines", "model_source", "routine_functions", "switching_bodies", "width"]
+__all__ = ["constant_bodies", "derivatives", "factors", "lines", "model_source", "routine_functions", "switching_bodies", "width"]

@@ -14,7 +14,7 @@ from textwrap import dedent
 from hsdsl.backends.c.printer import function_body
 from hsdsl.backends.c.routine import routine_function
 from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, surface_lines
-from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
+from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"^ +p\d+ = given\[\d+\]\n", re.MULTILINE)
@@ -74,7 +74,7 @@ def model_source(program: Program) -> str:
         f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
         f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, "
-        f"{derivatives(program)}, {table}}};\n"
+        f"{derivatives(program)}, {factors(program)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -93,6 +93,12 @@ def lines(program: Program) -> int:
 def derivatives(program: Program) -> int:
     """How many derivatives of a flow are not zero everywhere, of the mode with most."""
     return max(len(m.jacobian.places) for m in program.flows)
+
+
+def factors(program: Program) -> int:
+    """How many entries a matrix of an implicit step has, of the mode with most."""
+    found = ((m.jacobian.elimination, len(m.states)) for m in program.flows)
+    return max(n * n if of is None else of.size for of, n in found)
 
 
 def constant_bodies(program: Program) -> dict[str, str]:
@@ -155,6 +161,7 @@ class _Writer:
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
+            self.elimination(mode.jacobian),
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
@@ -165,6 +172,15 @@ class _Writer:
     def sparse(self, routine: str, places: Sequence[int]) -> str:
         """Write a routine with the places of its values."""
         return f"{{{routine}, {len(places)}, {self.table('int', 'places', list(map(str, places)))}}}"
+
+    def elimination(self, jacobian: Jacobian) -> str:
+        """Write the pattern of a sparse elimination."""
+        of = jacobian.elimination
+        if of is None:
+            return "0"
+        lists = (of.order, of.start, of.column, of.diagonal, of.place, of.own)
+        tables = ", ".join(self.table("int", "elimination", list(map(str, each))) for each in lists)
+        return self.table("hs_elimination", "pattern", [f"{{{of.size}, {tables}}}"])
 
     def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""

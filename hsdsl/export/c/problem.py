@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hsdsl.arithmetic import Arithmetic
-from hsdsl.backends.c import derivatives, lines, width
+from hsdsl.backends.c import derivatives, factors, lines, width
 from hsdsl.backends.c.printer import constant, literal
 from hsdsl.export.c.method import interpolation_text, method_text
 from hsdsl.export.c.names import names_text
@@ -72,6 +72,7 @@ def _sizes(problem: Problem) -> str:
         "EDGES": max(len(mode.edges) for mode in program.flows),
         "LINES": lines(program),
         "DERIVATIVES": derivatives(program),
+        "FACTORS": factors(program),
         "STATES": len(program.all_states),
         "OUTPUTS": len(program.outputs),
         "PARAMETERS": len(program.parameters),
@@ -85,7 +86,7 @@ def _sizes(problem: Problem) -> str:
 
 
 _SPACE = """HS_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_EDGES, PROBLEM_LINES, PROBLEM_STATES, \\
-  PROBLEM_KIND, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
+  PROBLEM_FACTORS, PROBLEM_KIND, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
 _LOCATED = """HS_LOCATED_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_MODES, \\
   PROBLEM_DERIVATIVES, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
 

@@ -68,6 +68,16 @@ HS_INLINE int factored_complex(int n, hs_real *restrict re, hs_real *restrict im
 HS_INLINE void solve_complex(int n, const hs_real *restrict re, const hs_real *restrict im, const int *restrict order,
                              const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b);
 
+/* sparse.c */
+static int sparse_factored(int n, const hs_elimination *of, hs_real *restrict a, hs_real *restrict row);
+static void sparse_solve(int n, const hs_elimination *of, const hs_real *restrict values, const hs_real *restrict right,
+                         hs_real *restrict y, hs_real *restrict found);
+static int sparse_factored_complex(int n, const hs_elimination *of, hs_real *restrict re, hs_real *restrict im,
+                                   hs_real *restrict c, hs_real *restrict d);
+static void sparse_solve_complex(int n, const hs_elimination *of, const hs_real *restrict re, const hs_real *restrict im,
+                                 const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b,
+                                 hs_real *restrict one, hs_real *restrict two);
+
 /* radau.c */
 HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h);
 static void radau_forget(hs_radau *radau);

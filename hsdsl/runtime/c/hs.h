@@ -46,6 +46,17 @@ typedef struct {
   const int *place;
 } hs_sparse;
 
+/* The pattern of a sparse elimination: see hsdsl/sparsity.py. */
+typedef struct {
+  int size; /* entries of the factors */
+  const int *order;
+  const int *start;
+  const int *column;
+  const int *diagonal;
+  const int *place;
+  const int *own;
+} hs_elimination;
+
 typedef struct {
   int target;           /* index of the target mode */
   int target_dimension; /* number of states it is entered with */
@@ -77,6 +88,7 @@ typedef struct {
   hs_surface_series *surface_series;
   const int *surface_line; /* for each surface; -1 where it is kinked */
   hs_sparse jacobian;      /* of the flow by the states, row by row */
+  const hs_elimination *elimination; /* 0 where implicit steps solve dense systems */
   int affine;              /* whether every surface's gradient is the same everywhere */
   int jumps;               /* whether the flow has `sign` or `floor` */
   const int *state;        /* for each state its number among those of all modes */
@@ -94,6 +106,7 @@ typedef struct {
   int lines; /* of series, of the mode with most */
   int states; /* of all modes, by name */
   int derivatives; /* of a flow that are not zero everywhere, of the mode with most */
+  int factors; /* entries of a matrix of an implicit step, of the mode with most */
   const hs_mode *mode;
 } hs_model;
 

@@ -7,6 +7,15 @@ HS_INLINE void weighted3(int n, const hs_real *w, hs_real *const v[3], hs_real *
   for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
 }
 
+/* Solve with the factors of the real matrix. */
+HS_INLINE void solved_real(hs_run *run, int n, const hs_real *right, hs_real *found) {
+  hs_radau *const radau = &run->radau;
+  if (n > 3 && run->here.table->elimination)
+    sparse_solve(n, run->here.table->elimination, radau->real, right, radau->scratch[0], found);
+  else
+    solve(n, radau->real, radau->order, right, found);
+}
+
 /* One iteration of Newton's method on Z = h A f(x + Z), in the coordinates that take A apart: the increments after it
    and the largest change of each state. Not 0 where the flow has no value there, or the change has none. */
 HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
@@ -26,8 +35,12 @@ HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
     radau->right[2][s] = h * g[2] - (known->alpha * u[2][s] - known->beta * u[1][s]);
   }
   const hs_real *const pair[2] = {radau->right[1], radau->right[2]};
-  solve(n, radau->real, radau->order, radau->right[0], d[0]);
-  solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
+  solved_real(run, n, radau->right[0], d[0]);
+  if (n > 3 && run->here.table->elimination)
+    sparse_solve_complex(n, run->here.table->elimination, radau->re, radau->im, pair, radau->scratch[0],
+                         radau->scratch[1], d[1], d[2]);
+  else
+    solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
   hs_real total = 0.0;
   for (int s = 0; s < n; s++) {
     const hs_real a = fabs(d[0][s]), b = fabs(d[1][s]), c = fabs(d[2][s]);
@@ -62,7 +75,7 @@ HS_INLINE int derive(hs_run *run, hs_time t) {
   hs_radau *const radau = &run->radau;
   const hs_sparse *const rows = &run->here.table->jacobian;
   if (rows->values(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
-  hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
+  if (!run->here.table->elimination) hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
   swap(&radau->rows, &radau->fresh);
   radau->derived = 1;
   radau->derived_at = t;
@@ -70,11 +83,33 @@ HS_INLINE int derive(hs_run *run, hs_time t) {
   return 0;
 }
 
+/* The same matrices in the pattern of a sparse elimination. */
+static int sparse_factor(hs_run *run, int n, hs_real h, const hs_elimination *of) {
+  hs_radau *const radau = &run->radau;
+  const hs_collocation *const known = run->method->collocation;
+  for (int i = 0; i < of->size; i++) radau->real[i] = radau->re[i] = radau->im[i] = 0.0;
+  for (int i = 0; i < run->here.table->jacobian.count; i++)
+    radau->real[of->place[i]] = radau->re[of->place[i]] = -h * radau->rows[i];
+  for (int i = 0; i < n; i++) {
+    const int own = of->diagonal[i];
+    radau->real[own] = known->gamma + radau->real[own];
+    radau->re[own] = known->alpha + radau->re[own];
+    radau->im[own] = -known->beta;
+  }
+  return sparse_factored(n, of, radau->real, radau->scratch[0]) ||
+         sparse_factored_complex(n, of, radau->re, radau->im, radau->scratch[0], radau->scratch[1]);
+}
+
 /* Factor gamma - h J and alpha - i beta - h J, unless that is done. */
 HS_INLINE int factor_for(hs_run *run, int n, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   if (radau->factored && radau->factored_for == h) return 0;
+  if (n > 3 && run->here.table->elimination) {
+    radau->factored_for = h;
+    radau->factored = !sparse_factor(run, n, h, run->here.table->elimination);
+    return radau->factored ? 0 : NO_CONVERGENCE;
+  }
   for (int i = 0; i < n * n; i++) {
     radau->real[i] = radau->re[i] = -h * radau->rows[i];
     radau->im[i] = 0.0;
@@ -166,8 +201,8 @@ HS_INLINE int estimate(hs_run *run, int n, hs_time t, hs_real h) {
     radau->right[0][s] = h * run->slope[s] + radau->right[0][s];
     radau->right[1][s] = h * inside[s] - radau->right[1][s];
   }
-  solve(n, radau->real, radau->order, radau->right[0], embedded);
-  solve(n, radau->real, radau->order, radau->right[1], along);
+  solved_real(run, n, radau->right[0], embedded);
+  solved_real(run, n, radau->right[1], along);
   for (int s = 0; s < n; s++) radau->error[s] = fabs(embedded[s]) >= fabs(along[s]) ? embedded[s] : along[s];
   return 0;
 }

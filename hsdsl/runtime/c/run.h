@@ -100,15 +100,16 @@ typedef struct {
   int aged;
 } hs_convergence;
 
-/* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of its square. */
+/* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of `factors`. */
 typedef struct {
   int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
   hs_time derived_at, start;
   hs_real factored_for, length;
   hs_convergence convergence;
-  hs_real *rows, *fresh;            /* the flow's derivatives */
+  hs_real *rows, *fresh;            /* the flow's derivatives; of a sparse system those that are not zero */
   hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
   int *order, *turned;             /* the order of their rows */
+  hs_real *scratch[2];             /* of sparse systems */
   hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
   hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
   hs_real *slopes[3], *right[3];

@@ -52,6 +52,13 @@ static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
+/* The derivative of a state's flow by itself. */
+static hs_real own_derivative(const hs_run *run, const hs_real *rows, int s) {
+  const hs_elimination *of = run->here.table->elimination;
+  if (!of) return rows[s * run->here.dimension + s];
+  return of->own[s] < 0 ? (hs_real)0.0 : rows[of->own[s]];
+}
+
 /* The scales over a step of length h from (t, x), none below a share of what the terms of its flow could move the state
    by, to run->resolved. `rows` are the derivatives of the flow, or 0. Not 0 where the flow has no value nearby. */
 static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows) {
@@ -64,7 +71,7 @@ static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const h
     if (flow_terms(run, t, x, run->unmoved, moved, least)) return 1;
     for (int s = 0; s < n; s++) {
       hs_real size = h * least[s];
-      if (rows) size = size / (1 + h * fabs(rows[s * n + s]));
+      if (rows) size = size / (1 + h * fabs(own_derivative(run, rows, s)));
       if (!(hs_finite(size) && size > SHARE * run->scales[s])) continue;
       moved[s] = hs_max(moved[s], size);
       further |= !run->lifted[s];

@@ -11,15 +11,15 @@
 #define HS_TAKEN(count, type) (((count) * (int)sizeof(type) + (int)sizeof(double) - 1) / (int)sizeof(double))
 #define HS_NUMBERS(count) HS_TAKEN(count, hs_real)
 
-/* w: states of the largest mode; m, e: surfaces and edges of the mode with most; modes, lines, states, derivatives: see hs_model.
+/* w: states of the largest mode; m, e: surfaces and edges of the mode with most; modes, lines, states, derivatives, factors: see hs_model.
    kind, stages, extra, order, degree: see hs_method. */
 #define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
 #define HS_STAGES(w, all) (HS_TAKEN(all, hs_real *) + ((all)-1) * HS_NUMBERS(w))
 #define HS_SPAN(w, degree) (2 * HS_NUMBERS(w) + HS_PIECE(w, degree))
-#define HS_RADAU_SPACE(w) (5 * HS_NUMBERS((w) * (w)) + 21 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
-#define HS_SPACE(w, m, e, lines, states, kind, stages, extra, order, degree)                                       \
+#define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
+#define HS_SPACE(w, m, e, lines, states, factors, kind, stages, extra, order, degree)                              \
   (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
-   ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + ((kind) == HS_RADAU ? HS_RADAU_SPACE(w) : 0) + \
+   ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0) + \
    5 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 3 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
    2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
