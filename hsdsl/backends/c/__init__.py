@@ -11,4 +11,13 @@ from hsdsl.backends.c.source import (
     width,
 )
 
-__all__ = ["constant_bodies", "derivatives", "factors", "lines", "model_source", "routine_functions", "switching_bodies", "width"]
+__all__ = [
+    "constant_bodies",
+    "derivatives",
+    "factors",
+    "lines",
+    "model_source",
+    "routine_functions",
+    "switching_bodies",
+    "width",
+]

@@ -1,0 +1,182 @@
+"""What large flat models cost: chains of masses with stops (`tests/chains.py`), and the grid of 625 modes.
+
+For each number of masses: processor seconds to load, lower and compile the first time, and again with everything kept;
+time of a run for each step and state; memory; and how many times as long SciPy and scikit-SUNDAE (CVODE, sparse) take,
+with events, to the same tolerance, each the fastest of runs that take turns with ours. Then a stiff chain by `radau`.
+
+    python benchmarks/scale.py [10 50 100 200 500]
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import sksundae as sun
+from scipy.integrate import solve_ivp
+from scipy.sparse import bmat, diags, eye
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from chains import chain
+from lint.grid import grid
+
+import hsdsl
+
+TOLERANCE, UNTIL, TURNS, REPETITIONS = 1e-6, 2.0, 3, 20
+STIFFNESS, GAP, BOUNCE = 4.0, 0.25, 0.5  # as in tests/chains.py
+START = """
+import resource, sys, time
+import hsdsl
+from hsdsl.runtime.kernel import CompiledModel, runtime
+def spent():
+    return time.process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+runtime()
+CompiledModel(hsdsl.load(sys.argv[2]).program)
+began = spent()
+model = hsdsl.load(sys.argv[1])
+CompiledModel(model.program)
+peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
+print(spent() - began, int(peak.split()[1]) / 1024)
+"""
+
+
+def started(text: str) -> tuple[float, float, float]:
+    """Seconds to compiled code the first time and the next, and the memory that the next one takes, in MB."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder, name) for name in ("model.yaml", "small.yaml")]
+        for path, content in zip(paths, (text, chain(1)), strict=True):
+            path.write_text(content)
+        environment = {**os.environ, "XDG_CACHE_HOME": folder}
+        command = [sys.executable, "-c", START, *map(str, paths)]
+        runs = [subprocess.run(command, env=environment, capture_output=True, check=True, text=True) for _ in "12"]
+    (first, _), (again, memory) = (map(float, run.stdout.split()) for run in runs)
+    return first, again, memory
+
+
+class Chain:
+    """The same chain for solvers that take a flow and events, restarted at each event."""
+
+    def __init__(self, n: int, damping: float) -> None:
+        self.n, self.damping = n, damping
+        self.at = np.array([(i * 7 % 11 - 5) / 40 for i in range(n)] + [(i * 5 % 13 - 6) / 8 for i in range(n)])
+
+    def flow(self, x: np.ndarray, out: np.ndarray) -> None:
+        n = self.n
+        out[:n] = x[n:]
+        force = STIFFNESS * x[:n] + self.damping * x[n:]
+        out[n:] = -2 * force
+        out[n + 1 :] += force[:-1]
+        out[n:-1] += force[1:]
+
+    def pattern(self) -> Any:
+        n = self.n
+        near = diags([np.ones(n - 1), np.ones(n), np.ones(n - 1)], [-1, 0, 1])
+        return bmat([[None, eye(n)], [near, near]]).tocsc()
+
+    def bounced(self, x: np.ndarray, k: int) -> np.ndarray:
+        x = x.copy()
+        x[self.n + k] *= -BOUNCE
+        return x
+
+    def by_scipy(self, until: float) -> int:
+        """Run by `solve_ivp`; returns how many impacts there were."""
+
+        def stop(k: int) -> Callable[[float, np.ndarray], float]:
+            def event(_: float, x: np.ndarray) -> float:
+                return x[k] - GAP
+
+            event.terminal, event.direction = True, 1  # type: ignore[attr-defined]
+            return event
+
+        def rates(_: float, x: np.ndarray) -> np.ndarray:
+            out = np.empty_like(x)
+            self.flow(x, out)
+            return out
+
+        events, t, x, count = [stop(k) for k in range(self.n)], 0.0, self.at, 0
+        while True:
+            found = solve_ivp(rates, (t, until), x, rtol=TOLERANCE, atol=TOLERANCE, events=events)
+            if found.status != 1:
+                return count
+            k = next(k for k, times in enumerate(found.t_events) if len(times))
+            t, x, count = found.t[-1], self.bounced(found.y[:, -1], k), count + 1
+
+    def by_cvode(self, until: float) -> int:
+        """Run by CVODE with its sparse solver, likewise."""
+
+        def rates(_: float, x: np.ndarray, out: np.ndarray) -> None:
+            self.flow(x, out)
+
+        def events(_: float, x: np.ndarray, out: np.ndarray) -> None:
+            out[:] = x[: self.n] - GAP
+
+        events.terminal, events.direction = [True] * self.n, [1] * self.n  # type: ignore[attr-defined]
+        options = {"rtol": TOLERANCE, "atol": TOLERANCE, "linsolver": "sparse", "sparsity": self.pattern()}
+        solver = sun.cvode.CVODE(rates, eventsfn=events, num_events=self.n, max_num_steps=1_000_000, **options)
+        t, x, count = 0.0, self.at, 0
+        while True:
+            found = solver.solve(np.array([t, until]), x)
+            if found.status != 2:
+                return count
+            k = int(np.flatnonzero(np.atleast_2d(found.i_events)[-1])[0])
+            t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1], k)
+            count += 1
+
+
+def fastest(*runs: Callable[[], Any]) -> list[float]:
+    """Seconds of the fastest of several runs of each, taking turns; the first is run more often, being short."""
+    best = [float("inf")] * len(runs)
+    for _ in range(TURNS):
+        for i, run in enumerate(runs):
+            for _ in range(1 if i else REPETITIONS):
+                began = perf_counter()
+                run()
+                best[i] = min(best[i], perf_counter() - began)
+    return best
+
+
+def row(n: int) -> str:
+    """One line of the table."""
+    first, again, memory = started(chain(n))
+    model, other = hsdsl.loads(chain(n, until=UNTIL)), Chain(n, 1 / 20)
+    found = model.simulate(tolerance=TOLERANCE)
+    peers = (lambda: other.by_scipy(UNTIL), lambda: other.by_cvode(UNTIL))
+    own, scipy, cvode = fastest(lambda: model.simulate(tolerance=TOLERANCE), *peers)
+    for peer in peers:
+        if peer() != len(found.transitions):
+            print(f"other impacts: {peer()}", end=" ")
+    each = own / len(found.times) / (2 * n) * 1e9
+    return (
+        f"{n:5}  {first:6.2f} s  {again:6.2f} s  {memory:5.0f} MB  {len(found.transitions):5}  {own * 1e3:8.2f} ms"
+        f"  {each:6.0f} ns  {scipy / own:6.0f} x  {cvode / own:6.0f} x"
+    )
+
+
+def main() -> None:
+    """Print the tables."""
+    print("    n     first     again    memory  impacts      run   step/state    SciPy     CVODE", flush=True)
+    for n in map(int, sys.argv[1:] or (10, 50, 100, 200, 500)):
+        print(row(n), flush=True)
+    first, again, memory = started(grid(25))
+    print(f"625 modes: {first:.2f} s, again {again:.2f} s, {memory:.0f} MB", flush=True)
+    model, other = hsdsl.loads(chain(200, 1e4, until=UNTIL)), Chain(200, 1e4)
+    options = {"method": "radau", "tolerance": TOLERANCE}
+    found = model.simulate(**options)
+    own, cvode = fastest(lambda: model.simulate(**options), lambda: other.by_cvode(UNTIL))
+    print(
+        f"stiff chain of 200: radau {own * 1e3:.1f} ms ({len(found.times)} rows, {len(found.transitions)} impacts), "
+        f"CVODE {cvode * 1e3:.1f} ms, {cvode / own:.1f} x",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main()
