@@ -203,13 +203,12 @@ static void enclose_in_discs(hs_view *v, int64_t row, double size) {
 /* Whether the flow may be along a step what its Taylor polynomial p does not show.
 
    F(s) = f(p(s)) is analytic where |s| < size; its coefficients are at most M/size**k there, M being how far f differs
-   from its first value over discs that hold p(s). The first d are those of the derivative of p. So along the step both
-   differ by at most M size**(1 - d)/(size - 1). */
+   from its first value over discs that hold p(s), those last enclosed. The first d are those of the derivative of p. So
+   along the step both differ by at most M size**(1 - d)/(size - 1). */
 static int disc_hides(hs_view *v, int64_t row, double size) {
   const double length = v->s->run.times[row + 1] - v->s->run.times[row];
   double share = 1 / (size - 1);
   for (int k = 1; k < v->s->run.degree; k++) share /= size;
-  enclose_in_discs(v, row, size);
   for (int i = 0; i < v->n; i++) {
     const double hidden = v->disc[v->f->flow.result[i]].radius * share;
     if (!(hidden <= v->enough[i] || hidden * length <= v->own[i])) return 1;
@@ -217,24 +216,35 @@ static int disc_hides(hs_view *v, int64_t row, double size) {
   return 0;
 }
 
-/* Whether no slope of the flow is without a bound along a step: it is analytic around it. */
-static int has_bound(hs_view *v, int64_t row) {
-  enclose_in_discs(v, row, LEAST_SIZE);
+/* Whether the flow is known to be analytic on the discs that it was enclosed over. */
+static int all_known(const hs_view *v) {
   for (int i = 0; i < v->n; i++)
     if (!hs_finite(v->disc[v->f->flow.result[i]].radius)) return 0;
   return 1;
+}
+
+/* Whether no slope of the flow is without a bound along a step: it is analytic around it. */
+static int has_bound(hs_view *v, int64_t row) {
+  enclose_in_discs(v, row, LEAST_SIZE);
+  return all_known(v);
 }
 
 static int flow_hides(hs_view *v, int64_t row) {
   if (v->f->affine && !v->f->steep) return 0;
   const double length = v->s->run.times[row + 1] - v->s->run.times[row];
   const int by_discs = v->s->taylor && v->table->series;
-  if (v->f->steep && !has_bound(v, row)) return 1;
-  for (int i = 0; by_discs && i < v->n; i++) v->enough[i] = shown_change(v, row, i) / (RESOLVED * length);
-  if (by_discs && !disc_hides(v, row, 2.0)) return 0;
+  if (by_discs) { /* where these hide nothing the flow is analytic around the step, and its slopes have a bound */
+    enclose_in_discs(v, row, LARGEST_SIZE);
+    for (int i = 0; i < v->n; i++) v->enough[i] = shown_change(v, row, i) / (RESOLVED * length);
+    if (!disc_hides(v, row, LARGEST_SIZE) && all_known(v)) return 0;
+  }
   look_at_whole(v, row);
-  if (by_discs)
-    if (!disc_hides(v, row, 2.0) || !disc_hides(v, row, 1.5) || !disc_hides(v, row, LEAST_SIZE)) return 0;
+  if (by_discs && !disc_hides(v, row, LARGEST_SIZE) && all_known(v)) return 0;
+  if (v->f->steep && !has_bound(v, row)) return 1;
+  for (double size = 1.5; by_discs && size >= LEAST_SIZE; size -= 0.25) {
+    enclose_in_discs(v, row, size);
+    if (!disc_hides(v, row, size)) return 0;
+  }
   return flow_open(v, row, 0, 0.0, 1.0);
 }
 

@@ -16,6 +16,7 @@
 #define RESOLVED 8          /* changes of a flow smaller than this share of what its step shows are seen */
 #define PLACES 64           /* of a mode where the round-off of its flow is looked at */
 #define LEAST_SIZE 1.25     /* of discs around a step */
+#define LARGEST_SIZE 2.0
 #define ROUNDS 48           /* of closing in on a turning point */
 
 typedef struct {

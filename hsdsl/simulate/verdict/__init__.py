@@ -32,7 +32,7 @@ from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import choices
-from hsdsl.simulate.verdict.crossings import crossings
+from hsdsl.simulate.verdict.crossings import crossings, summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.flows import flows
 from hsdsl.simulate.verdict.landings import landings
@@ -60,6 +60,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     left, unknown, margins = list(departures(run, diagnostics)), [*diagnostics.doubts], list[str]()
     if left:
         return Verdict("left", _once(left, unknown))
+    if run.screen is not None and not run.screen.doubts() and not run.execution.enters_beyond:
+        return Verdict("holds", (*summary(run, *run.screen.crossings), *run.screen.nearest_miss))
     found = list(reliability(run))
     for look in (crossings, choices, landings, misses, flows):
         findings, reasons = look(run)

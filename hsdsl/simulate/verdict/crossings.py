@@ -40,11 +40,11 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
         if margin is not None:
             least = margin if least is None else min(least, margin)
     if known is not None:
-        return found, _summary(run, *known)
-    return found, _summary(run, len(made), slowest, least)
+        return found, summary(run, *known)
+    return found, summary(run, len(made), slowest, least)
 
 
-def _summary(run: RunView, count: int, slowest: Number | None, least: Number | None) -> list[str]:
+def summary(run: RunView, count: int, slowest: Number | None, least: Number | None) -> list[str]:
     """Say how many transitions the flow made, at which rates, and by which margin."""
     if not count or slowest is None:
         return ["no transition"] if not run.execution.made else []

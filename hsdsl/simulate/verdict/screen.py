@@ -46,7 +46,7 @@ class Screen:
             taylor=problem.settings.method is not None and problem.settings.method.kind == "taylor",
         )
         rows, arcs, made = table.run.rows, table.run.arcs, table.run.transitions
-        self._ends = np.cumsum([0, made, arcs, arcs, rows, rows]).tolist()
+        self._ends = 0, made, made + arcs, made + 2 * arcs, made + 2 * arcs + rows, made + 2 * (arcs + rows)
         self._marks = np.empty(self._ends[-1], np.int32)
         start = self._marks.ctypes.data
         table.crossing, table.landing, table.ending, table.turning, table.changing = (
@@ -62,7 +62,7 @@ class Screen:
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
         if not words:
-            return bool(self.table.doubts) or any(self._marks[: self._ends[1]])
+            return bool(self.table.doubts) or bool(self.marked("crossing").any())
         return any(self.table.doubts & DOUBTS[word] for word in words)
 
     def marked(self, name: str) -> Array:
