@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
 
-from hsdsl.plot.style import PALETTE, save
+from hsdsl.plot.style import PALETTE, legend_below, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,13 +37,14 @@ def plot_branch(
             along = list(part)
             line = [along[0][0], *(b for _, b in along)]
             style, colour = ("-", PALETTE[5]) if stable else ("--", PALETTE[6])
-            axis.plot([p[0] for p in line], [p[1] for p in line], style, color=colour)
+            label = "stable" if stable else "unstable"
+            known = label in axis.get_legend_handles_labels()[1]
+            axis.plot([p[0] for p in line], [p[1] for p in line], style, color=colour, label="_" if known else label)
         for kind, marker in MARKERS.items():
             found = [(p, x) for name, p, x in marks if name == kind]
             if found:
                 axis.plot([p for p, _ in found], [x for _, x in found], marker, color=PALETTE[1], label=kind)
-        if marks:
-            axis.legend(frameon=False)
+        legend_below(figure, axis.get_legend_handles_labels()[0], 8.0)
         axis.set_xlabel(parameter, parse_math=False)
         axis.set_ylabel(f"{state} after the section", parse_math=False)
         axis.set_title(title, loc="left", fontsize=10, parse_math=False)

@@ -18,9 +18,9 @@ from matplotlib.patches import Patch
 from hsdsl.execution import Execution
 from hsdsl.names import shown
 from hsdsl.plot.curves import Curves, GuardLine, curves, modes_of
-from hsdsl.plot.panel import LETTER, draw_panel, draw_ribbons, name_bands, raise_of
+from hsdsl.plot.panel import draw_panel, draw_ribbons, name_bands, raise_of
 from hsdsl.plot.phase import draw_phase
-from hsdsl.plot.style import fills, looks
+from hsdsl.plot.style import fills, legend_below, looks
 from hsdsl.plot.view import Pair, View
 from hsdsl.report import words
 
@@ -182,12 +182,6 @@ def _legend(figure: FigureBase, top: Axes, data: Sequence[Curves], labels: Seque
         handles += [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes, light=False).items()]
     elif modes and not name_bands(top, data[0], plan.room):
         handles = [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes).items()]
-    if not handles:
-        return
-    widest = max(len(handle.get_label()) for handle in handles) * LETTER + 0.6
-    columns = min(len(handles), max(1, int(plan.size[0] / widest)))
-    legend = figure.legend(handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5)
-    for text in legend.get_texts():
-        text.set_parse_math(False)
-    if isinstance(figure, Figure) and (rows := -(-len(handles) // columns)):
+    rows = legend_below(figure, handles, plan.size[0])
+    if isinstance(figure, Figure):
         figure.set_figheight(figure.get_figheight() + rows * LINE)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hsdsl.execution import Array, Execution
-from hsdsl.plot.style import PALETTE, save
+from hsdsl.plot.style import PALETTE, legend_below, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,10 +33,12 @@ def plot_measured(path: str | os.PathLike[str], run: Execution, times: Array, co
             for start, end in pairwise(cuts):
                 dense = np.linspace(start, end, max(2, int(POINTS * (end - start) / (cuts[-1] or 1))))[:-1]
                 if len(dense):
-                    axis.plot(dense, run.sample(dense)[name].astype(float), color=PALETTE[0])
-            axis.plot(times, column, ".", color=PALETTE[1], markersize=3)
+                    axis.plot(dense, run.sample(dense)[name].astype(float), color=PALETTE[0], label="run")
+            axis.plot(times, column, ".", color=PALETTE[1], markersize=3, label="measured")
             axis.set_ylabel(name, parse_math=False)
         axes[-1].set_xlabel("time t")
+        drawn = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))  # one for all pieces of the run
+        legend_below(figure, list(drawn.values()), 9.0)
         return figure
 
     save(draw, path)

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hsdsl.plot.style import FAINT, PALETTE, save
+from hsdsl.plot.style import FAINT, PALETTE, legend_below, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LONGEST = 40  # letters of a label
+MOST = 12  # sequences in the legend
 
 
 def plot_nearby(
@@ -32,6 +33,7 @@ def plot_nearby(
         for k, sequence in enumerate(sequences):
             mine = [(r, d) for r, d, made in points if made == sequence and 0 < d < np.inf]
             label = ", ".join(sequence) or "no transition"
+            label = label if k < MOST else "_"  # matplotlib leaves it out of the legend
             label = label if len(label) <= LONGEST else f"{label[: LONGEST - 3]}... ({len(sequence)})"
             axis.plot([r for r, _ in mine], [d for _, d in mine], "o", color=PALETTE[k % len(PALETTE)], label=label)
         radii = sorted({r for r, *_ in points})
@@ -43,9 +45,10 @@ def plot_nearby(
         axis.set_xlabel("radius, relative to the scales")
         axis.set_ylabel("distance of the executions, rho")
         axis.set_title(title, loc="left", fontsize=10, parse_math=False)
-        legend = axis.legend(frameon=False, fontsize=8)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
+        if len(sequences) > MOST:
+            axis.plot([], [], "o", color="white", label=f"and {len(sequences) - MOST} other sequences")
+        rows = legend_below(figure, axis.get_legend_handles_labels()[0], 7.0)
+        figure.set_figheight(5 + 0.2 * rows)
         return figure
 
     save(draw, path)

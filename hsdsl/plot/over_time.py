@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from hsdsl.plot.style import save
+from hsdsl.plot.style import legend_below, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,7 @@ def plot_over_time(
         axis.set_xlabel("time t")
         axis.set_ylabel("distance")
         axis.set_title(title, loc="left", parse_math=False)
-        axis.legend(frameon=False)
+        legend_below(figure, axis.get_legend_handles_labels()[0], 9.0)
         return figure
 
     save(draw, path)

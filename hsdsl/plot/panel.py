@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.names import shown
 from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, modes_of
-from hsdsl.plot.style import ALARM, FAINT, Look, fills, looks
+from hsdsl.plot.style import ALARM, FAINT, LETTER, Look, fills, looks
 from hsdsl.plot.view import View
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 BOTH_SIDES = 60  # transitions up to which the values before and after are marked
 AFTER_ONLY = 400  # and up to which the value after is
 LONGEST = 24  # letters of a run's label
-LETTER = 0.085  # inches, about, of a letter in the name of a band
 
 
 def draw_panel(

@@ -19,7 +19,7 @@ from hsdsl.plot.curves import SEVERAL
 from hsdsl.store.atomic import replacing
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
 # The salt makes the SVG's ids repeatable.
 STYLE: dict[str, Any] = {
@@ -88,6 +88,21 @@ def write_figure(figure: Figure, file: BinaryIO, kind: str, dots: int = 150) -> 
             text.set_text(visible)
     dated = ("Date", "Creator", "Format", "Type") if kind == "svg" else ("Software",)
     figure.savefig(file, format=kind, dpi=dots, metadata=dict.fromkeys(dated))
+
+
+LETTER = 0.085  # inches, about, of a letter of a legend
+
+
+def legend_below(figure: FigureBase, handles: Sequence[Any], width: float) -> int:
+    """Put a legend below everything, where it covers nothing; return how many rows it has in ``width`` inches."""
+    if not handles:
+        return 0
+    widest = max(len(str(handle.get_label())) for handle in handles) * LETTER + 0.6
+    columns = min(len(handles), max(1, int(width / widest)))
+    legend = figure.legend(handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    return -(-len(handles) // columns)
 
 
 @contextmanager
