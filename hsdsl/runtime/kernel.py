@@ -20,7 +20,7 @@ from hsdsl.kernel import ModeKernel, Routine, Series, Taylor, Vector
 from hsdsl.program import Program, Tape
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
-from hsdsl.runtime.library import is_kept, load
+from hsdsl.runtime.library import LOOP, is_kept, load
 
 Address = int | None
 Double = ctypes.c_double
@@ -33,7 +33,6 @@ SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Dou
 LARGE = 1 << 17  # characters of a program
 SYMBOL = "hs_the_model"
 
-RUNTIME: tuple[str, str, Effort] = '#include "hs.c"\n', "hs_simulate", "-O1"  # -O2 compiles 1.6 times as long
 _loading = Lock()
 
 
@@ -51,7 +50,7 @@ def runtime() -> ctypes.CDLL:
 
 @cache
 def _runtime() -> ctypes.CDLL:
-    text, symbol, effort = RUNTIME
+    text, symbol, effort = LOOP
     library = load(text, symbol, lambda: text, effort)
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
@@ -71,7 +70,7 @@ def begin() -> None:
             runtime()
 
     with suppress(NoCompiler):
-        text, _, effort = RUNTIME
+        text, _, effort = LOOP
         if not is_kept(text, effort):
             Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
 

@@ -1,4 +1,8 @@
-"""C text to a loaded library: compiled at first use, kept by content in the user's cache folder."""
+"""C text to a loaded library: compiled at first use, kept by content in the user's cache folder.
+
+A wheel for one platform has the hand-written loop compiled already, in ``shipped``; another loop than that of the
+wheel's own C is not taken from there.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,32 @@ from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_com
 
 RUNTIME = Path(__file__).parent / "c"
 BACKENDS = Path(__file__).parents[1] / "backends"
+SHIPPED = Path(__file__).parent / "shipped"
 KIND = "compiled"
+
+
+# the text, symbol and effort of the loop; -O2 compiles 1.6 times as long
+LOOP: tuple[str, str, Effort] = '#include "hs.c"\n', "hs_simulate", "-O1"
+
+
+def ship(folder: Path) -> Path:
+    """Compile the loop into a folder, for a wheel.
+
+    Raises
+    ------
+    NoCompiler
+        There is no compiler, or it fails.
+    """
+    text, symbol, effort = LOOP
+    library = folder / _shipped(text, effort).name
+    _compile(find_compiler(), text, library, effort)
+    _tried(find_compiler(), library, symbol)
+    return library
+
+
+def _shipped(content: str, effort: Effort) -> Path:
+    """Where a library would be that came with this package."""
+    return SHIPPED / f"{key_of(content, _our_text(), ' '.join((effort, *FLAGS)), _processor())}.so"
 
 
 def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
@@ -29,6 +58,10 @@ def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -
     NoCompiler
         There is no compiler, or it fails.
     """
+    shipped = _shipped(content, effort)
+    loaded = _loaded(shipped) if shipped.exists() else None
+    if loaded is not None:
+        return loaded
     compiler = find_compiler()
     key = _key(content, compiler, effort)
     loaded = _kept(key)
@@ -40,21 +73,25 @@ def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -
 
 def _kept(key: str) -> ctypes.CDLL | None:
     path = find(KIND, key)
+    return None if path is None else _loaded(path)
+
+
+def _loaded(path: Path) -> ctypes.CDLL | None:
     try:
-        return None if path is None else ctypes.CDLL(str(path))
+        return ctypes.CDLL(str(path))
     except OSError:
         return None  # made for something else than what runs now: it is made again
 
 
 def is_kept(content: str, effort: Effort) -> bool:
-    """Whether the library of ``content`` was compiled before.
+    """Whether the library of ``content`` was compiled before, or came with this package.
 
     Raises
     ------
     NoCompiler
         There is no compiler.
     """
-    return find(KIND, _key(content, find_compiler(), effort)) is not None
+    return _shipped(content, effort).exists() or find(KIND, _key(content, find_compiler(), effort)) is not None
 
 
 def _key(content: str, compiler: Compiler, effort: Effort) -> str:

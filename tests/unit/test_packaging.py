@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from engines import needs_compiler
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -18,16 +19,32 @@ BESIDES = ("README.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", "schemas/mo
 BARE = "import sys; sys.modules['ziglang'] = None; from hsdsl.cli import main; main()"
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
+def build(folder: Path, **more: str) -> Path:
     pytest.importorskip("build")
     pytest.importorskip("hatchling")
-    folder = tmp_path_factory.mktemp("dist")
     words = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    words += ["--wheel"] if more else []
+    done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "warning" not in (done.stdout + done.stderr).lower()
     return folder
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("dist"))
+
+
+def run_there(wheel: Path, folder: Path, program: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """Run a model with the package of a wheel, and a cache of its own."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    environment = {key: value for key, value in os.environ.items() if key != "CC"} | more
+    environment |= {"PYTHONPATH": str(folder / "site"), "XDG_CACHE_HOME": str(folder / "cache")}
+    words = [sys.executable, "-c", program, "run", str(ROOT / "models" / "bouncing-ball.yaml")]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 def tracked() -> set[str]:
@@ -50,13 +67,19 @@ def test_wheel_and_sdist_hold_the_package(built):
 
 def test_the_wheel_runs_without_a_compiler_and_says_what_one_adds(built, tmp_path):
     (wheel,) = built.glob("*.whl")
-    site = tmp_path / "site"
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(site)
-    environment = {key: value for key, value in os.environ.items() if key != "CC"}
-    environment |= {"PATH": str(tmp_path), "PYTHONPATH": str(site), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    words = [sys.executable, "-c", BARE, "run", str(ROOT / "models" / "bouncing-ball.yaml")]
-    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "python engine" in done.stdout.lower() + done.stderr.lower()
+    done = run_there(wheel, tmp_path, BARE, PATH=str(tmp_path))
     assert done.stderr.count("slower than compiled code") == 1 and "pip install 'hsdsl[compiler]'" in done.stderr
-    assert (site / "hsdsl" / "cli").is_dir()
+
+
+@needs_compiler
+def test_the_wheel_of_a_platform_has_the_loop_compiled(built, tmp_path):
+    (pure,) = built.glob("*.whl")
+    (wheel,) = build(tmp_path / "dist", HSDSL_SHIP_LOOP="1").glob("*.whl")
+    assert wheel.name.startswith("hsdsl-") and "-py3-none-" in wheel.name and not wheel.name.endswith("-any.whl")
+    compiled = []
+    for each in (pure, wheel):
+        folder = tmp_path / each.name
+        folder.mkdir()
+        assert not run_there(each, folder, "from hsdsl.cli import main; main()").stderr
+        compiled.append(len(list((folder / "cache" / "hsdsl" / "compiled").iterdir())))
+    assert compiled == [2, 1]  # the loop and the model, the model alone
