@@ -165,8 +165,8 @@ def limits_of(runs: Sequence[Curves], name: str) -> tuple[float, float]:
 def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
     """Choose the lower and upper end of an axis.
 
-    A range of round-off (relative to 1 + |x|, as local errors are) is shown as constant. Where the run ended badly its
-    last values are arbitrary, and the last thirtieth of the time does not count.
+    A range of round-off, relative to the values, is shown as constant; small values are not. Where the run ended badly
+    its last values are arbitrary, and the last thirtieth of the time does not count.
     """
     if ends_badly and len(time) > 1:
         before = time <= time[0] + 0.97 * (time[-1] - time[0])
@@ -176,8 +176,8 @@ def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
     size = max(abs(low), abs(high))
-    if high - low <= 1e-12 * (1 + size):
-        room = 0.1 * size if size > 1e-12 else 1.0
+    if high - low <= 1e-12 * size:
+        room = 0.1 * size or 1.0
         return low - room, high + room
     room = high / 16 - low / 16
     return low - room, high + room

@@ -26,7 +26,8 @@ function rangeOf(...arrays) {
   let low = Infinity, high = -Infinity;
   for (const array of arrays) for (const x of array) if (Number.isFinite(x)) { if (x < low) low = x; if (x > high) high = x; }
   if (low > high) return [0, 1];
-  const room = high > low ? 0.06 * (high - low) : 0.5 * Math.abs(low) || 1;
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const room = high - low > 1e-12 * size ? 0.06 * (high - low) : 0.1 * size || 1; // a range of round-off is none
   return [low - room, high + room];
 }
 
@@ -56,7 +57,7 @@ function frame(canvas, across, up, {title = "", bottom = true, left = 58} = {}) 
   context.textAlign = "center";
   context.textBaseline = "top";
   for (const [value, text] of bottom ? ticks(across, Math.max(2, (box.right - box.left) / 80)) : [])
-    context.fillText(text, x(value), box.bottom + 5);
+    context.fillText(text, Math.min(x(value), width - context.measureText(text).width / 2), box.bottom + 5);
   if (title) {
     context.fillStyle = palette.text;
     context.textAlign = "left";
@@ -85,6 +86,14 @@ function trace({context, box, x, y}, arcOf, xs, ys, {colour, dashes}) {
   }
   context.stroke();
   context.restore();
+}
+
+// A text that is cut where it would be wider.
+function fitted(context, text, width) {
+  if (context.measureText(text).width <= width) return text;
+  let letters = text.length;
+  while (letters > 1 && context.measureText(`${text.slice(0, letters)}\u2026`).width > width) letters--;
+  return `${text.slice(0, letters)}\u2026`;
 }
 
 // A dot with a text, on the side where there is room.

@@ -130,7 +130,7 @@ function level({context, box, y}, {value, label}) {
   const high = at < (box.top + box.bottom) / 2;
   context.textAlign = "right";
   context.textBaseline = high ? "bottom" : "top";
-  context.fillText(label, box.right - 3, at + (high ? -2 : 2), (box.right - box.left) / 2);
+  context.fillText(fitted(context, label, (box.right - box.left) / 2), box.right - 3, at + (high ? -2 : 2));
 }
 
 function ending({context, box, x}, t) {
@@ -171,8 +171,9 @@ function drawPhases() {
   }
 }
 
-// The cursor at a time; `at` is the point of each run, -1 where it has ended.
+// The cursor at a time; `at` is the point of each run, -1 where it has ended. Values of several runs are in the table.
 function drawCursor(t, at) {
+  const said = (...numbers) => runs.length > 1 ? "" : numbers.map((x) => format(x, 5)).join(", ");
   const line = ({context, box, x}) => {
     if (x(t) < box.left - 1 || x(t) > box.right + 1) return;
     context.strokeStyle = palette.focus;
@@ -185,12 +186,12 @@ function drawCursor(t, at) {
     runs.forEach((run, k) => {
       if (at[k] < 0) return;
       const value = valueAt(run, column(run, name), t, at[k]);
-      dot(made, made.x(t), made.y(value), format(value, 5));
+      dot(made, made.x(t), made.y(value), said(value));
     });
   });
   for (const {canvas} of phases) over(canvas, (made) => made.points.forEach(([xs, ys], k) => {
     const [a, b] = [xs, ys].map((each) => valueAt(runs[k], each, t, at[k]));
-    dot(made, made.x(a), made.y(b), `${format(a, 5)}, ${format(b, 5)}`);
+    dot(made, made.x(a), made.y(b), said(a, b));
   }));
 }
 
