@@ -33,6 +33,7 @@ from typing import NamedTuple
 import pytest
 from typer import Context
 
+import hsdsl
 from hsdsl.cli import main
 from hsdsl.cli.verbs import VERBS, command
 
@@ -168,6 +169,21 @@ def test_every_block_of_commands_has_a_mark(name):
         mark = block.kind + (f": {block.argument}" if block.argument else "")
         if block.language in MARKED:
             assert MARK.fullmatch(mark), f"{name}: expected a mark above this block, got '{mark}':\n{block.text}"
+
+
+WHOLE = re.compile(r"^hsdsl: 1$.*^(modes|automata):", re.MULTILINE | re.DOTALL)
+MODELS = [
+    pytest.param(block.text, id=name)
+    for name in NAMES
+    for block in blocks(ROOT / name)
+    if block.language == "yaml" and block.kind != "file" and WHOLE.search(block.text) and "mistakes" not in name
+]
+
+
+@pytest.mark.parametrize("text", MODELS)
+def test_whole_models_are_models(text):
+    """Models that a page shows without a run; the others are run."""
+    assert hsdsl.loads(text).system.modes
 
 
 @pytest.mark.parametrize("name", NAMES)
