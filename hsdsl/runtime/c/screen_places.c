@@ -68,12 +68,12 @@ static int crossed_at_end(const hs_view *v) {
   return made->time > run->times[v->last] + tie_of(v->s, made->time) ? -1 : made->edge;
 }
 
-/* Whether other surfaces are about to be reached where the arc ends. */
+/* Whether other surfaces are about to be reached where the arc ends, at a crossing, or at a jump or kink of an input. */
 static int ends_close(hs_view *v, int all) {
   const hs_screen *s = v->s;
   const double t = s->run.times[v->last], *x = recorded_row(&s->run, v->last);
   const int64_t step = v->segment, there = segment_at(s->timeline, t);
-  if (v->crossed < 0 && !all && (t >= s->until || !s->timeline->jump[there])) return 0;
+  if (v->crossed < 0 && !all && t >= s->until) return 0;
   if (v->crossed >= 0 || all) bind(v, v->mode, there);
   int close = evaluate_surfaces(v, t, x);
   for (int k = 0; k < v->table->surfaces && !close; k++) {

@@ -11,16 +11,23 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.commutation import commute
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.judged import judged
+from hsdsl.simulate.verdict.judged import has_condition, judged, may_hold
+from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
 TWICE = 2  # as long as it takes to reach a surface: reached together
 
 
 def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]:
-    """Surfaces about to be reached where another is crossed or an input jumps: an error may change their order."""
+    """Surfaces about to be reached where another is crossed or an input jumps: an error may change their order.
+
+    Where an input has a kink, a surface may turn back.
+    """
     place, until = run.at_row(arc, arc.last), run.problem.settings.until
-    if crossed is None and (place.t >= until or not run.problem.timeline.at(place.t).jump):
+    if crossed is None and place.t >= until:
+        return
+    if crossed is None and not run.problem.timeline.at(place.t).jump:
+        yield from _at_a_kink(run, arc, place)
         return
     if crossed is None:
         place = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
@@ -45,6 +52,20 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
                 f"the order of {place.name(crossed)} and {place.name(k)} at t = {show(place.t)} is within the error"
             )
             yield Finding("order", "unknown", f"{sentence}, and it matters")
+
+
+def _at_a_kink(run: RunView, arc: Arc, after: Place) -> Iterator[Finding]:
+    """Surfaces that rise up to a kink of an input and no further."""
+    before = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
+    for k in range(len(after.mode.edges) + len(after.mode.walls)):
+        if not before.rate(k) > 0 >= after.rate(k) or before.value(k) > before.roundoff_bound(k):
+            continue
+        if has_condition(before, k) and not may_hold(run, before, k, arc.last):
+            continue
+        margin = SAFE * run.shift(before, k, arc.last) + before.roundoff_bound(k)
+        if abs(before.value(k)) <= margin:
+            where = f"the surface of {before.name(k)} at t = {show(before.t)}, where an input has a kink"
+            yield Finding("miss", "unknown", f"the run turns back within the error of {where}")
 
 
 def at_the_end(run: RunView) -> Iterator[Finding]:
