@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from threading import Event, RLock, Thread
 from typing import Any
@@ -72,13 +72,19 @@ def _tick() -> None:
                     work.draw(work.text())
 
 
-@contextmanager
-def in_notebook() -> Generator[Show | None]:
-    """Show progress below the cell of a notebook; yields None elsewhere."""
+def in_notebook() -> AbstractContextManager[Show | None]:
+    """Show progress below the cell of a notebook; gives None elsewhere."""
     ipython: Any = sys.modules.get("IPython")
     if ipython is None or getattr(ipython.get_ipython(), "kernel", None) is None:
-        yield None
-        return
+        return _NOWHERE
+    return _below_cell(ipython)
+
+
+_NOWHERE: AbstractContextManager[Show | None] = nullcontext()  # made once: a short run takes no longer than to make one
+
+
+@contextmanager
+def _below_cell(ipython: Any) -> Generator[Show | None]:
     handles: list[Any] = []
 
     def draw(text: str | None) -> None:
