@@ -30,7 +30,7 @@ MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
 MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
-MOST_WRITTEN = 40_000  # nodes of a mode's flow, once for each edge that may hold it: each motion is a mode of its own
+MOST_WRITTEN = 10_000  # nodes of a mode's flow, once for each edge that holds it: each motion is a mode of its own
 LONG = 200  # operations, from which on a term is not simplified
 Point = dict[sp.Symbol, float]
 
@@ -75,10 +75,13 @@ def contacts(mode: Mode, numbers: Sequence[str] = ()) -> dict[frozenset[int], Co
     Those along several guards are there for up to :data:`MOST_TOGETHER` such edges, where none changes what presses on
     the others.
     """
-    loops = [k for k, edge in enumerate(mode.edges) if edge.target == mode.name]
-    if len(loops) * _size(mode.flow) > MOST_WRITTEN:
-        return {}
-    singles = {frozenset((k,)): found for k in loops if (found := contact(mode, k, numbers)) is not None}
+    singles: dict[frozenset[int], Contact] = {}
+    most = MOST_WRITTEN // max(1, _size(mode.flow))
+    for k in range(len(mode.edges)):
+        if (found := contact(mode, k, numbers)) is not None:
+            singles[frozenset((k,))] = found
+        if len(singles) > most:
+            return {}
     every = dict(singles)
     for size in range(2, len(singles) + 1) if len(singles) <= MOST_TOGETHER else ():
         for few in [few for few in every if len(few) == size - 1]:

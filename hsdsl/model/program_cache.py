@@ -32,6 +32,7 @@ _PACKAGE = Path(__file__).parents[1]
 # what a program depends on, besides the modules of the package itself
 _READERS = ("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model")
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
+LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
 Row = list[Any]
 Part = tuple[tuple[str, ...], ...]  # names that a model is reduced to, and then those that the rest is reduced to
 
@@ -104,10 +105,13 @@ def _rows(program: Program) -> list[Row]:
         if isinstance(value, Fraction):
             return f"{value.numerator}/{value.denominator}"
         if isinstance(value, (tuple, list)):
-            return [plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+            items = [plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+            return items if len(items) < LONG else kept([LIST, *items])
         if not is_dataclass(value):
             return value
-        row = [type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))]
+        return kept([type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))])
+
+    def kept(row: Row) -> int:
         number = numbers.setdefault(json.dumps(row), len(rows))
         if number == len(rows):
             rows.append(row)
@@ -121,6 +125,9 @@ def _read(rows: list[Row]) -> Program:
     """Read a table; it raises ValueError, TypeError, KeyError or IndexError where it is none of a program."""
     pieces: list[Any] = []
     for name, *row in rows:
+        if name == LIST:
+            pieces.append(row)
+            continue
         kind = _PIECES[name]
         pieces.append(kind(*(read(item, pieces) for read, item in zip(_decoders(kind), row, strict=True))))
     return _checked(Program)(pieces[-1], pieces)
@@ -144,7 +151,12 @@ def _decoder(kind: Any) -> Decoder:
         return lambda value, pieces: piece(pieces[value], pieces)
     if origin is tuple and arguments[-1] is Ellipsis:
         one = _decoder(arguments[0])
-        return lambda value, pieces: tuple([one(item, pieces) for item in value])
+
+        def read(value: Any, pieces: list[Any]) -> tuple[Any, ...]:
+            items = pieces[value] if type(value) is int else value
+            return tuple([one(item, pieces) for item in items])
+
+        return read
     if origin in (Union, types.UnionType):
         (other,) = (a for a in arguments if a is not type(None))
         given = _decoder(other)
