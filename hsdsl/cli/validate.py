@@ -31,4 +31,6 @@ def _look(path: Path) -> tuple[dict[str, Any], str]:
     model = load(path)
     model.resolve()
     modes, edges = len(model.system.modes), sum(len(mode.edges) for mode in model.system.modes)
-    return {"valid": True}, f"valid, {counted(modes, 'mode')}, {counted(edges, 'transition')}"
+    parts = len(model.system.parts)
+    size = counted(parts, "part") if parts else counted(modes, "mode")
+    return {"valid": True}, f"valid, {size}, {counted(edges, 'transition')}"

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from hsdsl.arithmetic import Number
-from hsdsl.execution import Arc, Array, Execution, Point, Transition, Verdict
+from hsdsl.execution import Arc, Array, Execution, Point, Stop, Transition, Verdict
 from hsdsl.parts import Part, numbered, numbers_of, present, product_name
 from hsdsl.simulate import Prepared
 
-_AS_THEY_ARE = ("model", "digest", "engine", "scheme", "method", "stop", "output_names", "seconds", "digits", "title",
+_AS_THEY_ARE = ("model", "digest", "engine", "scheme", "method", "output_names", "seconds", "digits", "title",
                 "overrides")  # fmt: skip
 _MADE_LATER = ("settings", "times", "outputs", "depth")
 
@@ -40,6 +40,7 @@ def visible_run(run: Execution, prepared: Prepared) -> Execution:
     return Execution.deferred(
         later,
         **{name: getattr(run, name) for name in _AS_THEY_ARE},
+        stop=view.stop,
         output_function=None if run.output_function is None else view.output_values,
         assessment=view.assessment,
         repetition=view.repetition,
@@ -139,6 +140,15 @@ class _View:
         named = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(named, key=lambda k: abs(values[k]))
         return dict(zip(mode.edges[k].target_states, kernel.resets[k](made.time, *x), strict=True))
+
+    @property
+    def stop(self) -> Stop:
+        """Why the run ended, with the name of the product mode that it ended in."""
+        stop = self.run.stop
+        for mode in self.prepared.program.modes:
+            if f"mode {mode.name}" in stop.message:
+                return replace(stop, message=stop.message.replace(f"mode {mode.name}", f"mode {self.final.mode}"))
+        return stop
 
     @cached_property
     def final(self) -> Point:

@@ -383,7 +383,7 @@ class SystemDocument(ModelDocument):
         "Kinds of parts by name, each with its modes, or in a file.",
         {"clock": {"modes": {"run": {"flow": {"s": 1}}}}, "leg": {"file": "leg.yaml"}},
     )
-    system: Table[InstanceDocument] = mapping(
+    system: StateTable[InstanceDocument] = mapping(
         "The parts of the model by name: their automata, numbers and connections. A model has either these or `modes`.",
         {"a": {"automaton": "room", "initial": {"mode": "on", "T": 20}, "inputs": {"beside": "b.T"}}},
     )

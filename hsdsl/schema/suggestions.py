@@ -58,6 +58,7 @@ _ADD = {
     "times": "write times: [0, 1, 2], or file: and the name of a CSV file",
     "values": "write values: and one value for each of the times",
     "file": "write file: and the name of a CSV file",
+    "automaton": "write automaton: and a key of `automata`",
     "time": "write time: and when that is",
     **{size: f"write {size}: and a number or an expression" for size in ("radius", "width", "height")},
 }

@@ -42,6 +42,9 @@ class Parts:
         self.roster = roster_of(symbols, document)
         self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
         instances = self.roster.instances.values()
+        if not document.system:
+            place = next(iter(document.automata)).place
+            symbols.report(place, "HS350", "the model has automata and no `system`", "name its parts under `system`")
         self.parts: tuple[Part, ...] = tuple(one.part for one in instances)
         symbols.parts = self.parts
         self.parameters: tuple[Parameter, ...] = tuple(p for one in instances for p in self._parameters_of(one))
