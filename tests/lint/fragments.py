@@ -22,8 +22,10 @@ def completed(fragment: str) -> str:
     if not re.search(r"^\w", fragment, re.MULTILINE):
         return fragment
     lines = [fragment.rstrip("\n")]
-    lines += [line for key, line in MISSING if not re.search(rf"^{key}:", fragment, re.MULTILINE)]
-    if not re.search(r"^initial:", fragment, re.MULTILINE):
+    of_parts = re.search(r"^system:", fragment, re.MULTILINE)
+    missing = [(key, line) for key, line in MISSING if not (of_parts and key == "modes")]
+    lines += [line for key, line in missing if not re.search(rf"^{key}:", fragment, re.MULTILINE)]
+    if not of_parts and not re.search(r"^initial:", fragment, re.MULTILINE):
         lines.append(initial("\n".join(lines)))
     return "\n".join(lines) + "\n"
 
