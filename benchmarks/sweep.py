@@ -1,9 +1,9 @@
 """Oscillators with a stop, restitution and initial velocity varied: a sweep on two Dask workers of this machine against
 `model.ensemble` with two threads, and the memory of every process while it goes on.
 
-    python benchmarks/sweep.py [--rows 1000000] [--baseline 50000] [--rounds 3] [--method taylor] [--here]
+    python benchmarks/sweep.py [--rows 1000000] [--baseline 50000] [--rounds 5] [--method taylor] [--here]
 
-Both begin warm. The ensemble is timed before and after, `--rounds` times each, on fewer rows; its best rate counts.
+Both begin warm, and take turns on `--baseline` rows, `--rounds` times. Then one sweep has all rows.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 
 import hsdsl
 from hsdsl.processes import processor_seconds
+from hsdsl.sweep import load
 from hsdsl.sweep.variation import read
 
 MODEL = Path(__file__).parent.parent / "models" / "oscillator-with-stop-1.yaml"
@@ -57,7 +58,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--baseline", type=int, default=50_000)
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--method", choices=("taylor", "file"), default="taylor")
     parser.add_argument("--here", action="store_true")
     given = parser.parse_args()
@@ -65,28 +66,35 @@ def main() -> None:
     if given.method == "taylor":
         settings |= {"scheme": "located", "method": "taylor", "tolerance": 1e-9}
     model, memory = hsdsl.load(MODEL), list[tuple[float, list[float]]]()
+    ensembles, sweeps = list[tuple[float, float]](), list[tuple[float, float]]()
     rate_of_ensemble(model, 100, settings)
-    before = [rate_of_ensemble(model, given.baseline, settings) for _ in range(given.rounds)]
     with tempfile.TemporaryDirectory() as folder, workers(given.here) as (where, processes):
-        model.sweep(VARY, Path(folder) / "warm", random=1000, **settings, **where)
+
+        def processors() -> float:
+            return process_time() + sum(map(processor_seconds, processes))
+
+        def rate_of_sweep(name: str, rows: int, **more: Any) -> tuple[float, float]:
+            began, busy = perf_counter(), processors()
+            model.sweep(VARY, Path(folder) / name, random=rows, **settings, **where, **more)
+            return rows / (perf_counter() - began), rows / (processors() - busy)
 
         def watch(done: int, rows: int) -> None:
             if done >= rows * len(memory) / 4:
                 memory.append((done / rows, [resident(each) for each in ("self", *processes)]))
 
-        def processors() -> float:
-            return process_time() + sum(map(processor_seconds, processes))
-
-        began, busy = perf_counter(), processors()
-        found = model.sweep(VARY, Path(folder) / "sweep", random=given.rows, progress=watch, **settings, **where)
-        rate, by_processors = given.rows / (perf_counter() - began), given.rows / (processors() - busy)
-        size = sum(path.stat().st_size for path in found.chunks.values())
-    rounds = before + [rate_of_ensemble(model, given.baseline, settings) for _ in range(given.rounds)]
-    rates, of_processors = np.transpose(rounds)
-    print(f"ensemble, {given.baseline:,} rows, 2 threads: {rates.max():,.0f} rows/s (of {rates.round(-1).tolist()})")
-    print(f"sweep, {given.rows:,} rows in {len(found.chunks)} files of {size / 1e6:.1f} MB in all: {rate:,.0f} rows/s")
-    print(f"ratio {rate / rates.max():.2f} of the best, {rate / np.median(rates):.2f} of the median")
-    print(f"a second of processors: ensemble {np.median(of_processors):,.0f} rows, sweep {by_processors:,.0f}")
+        rate_of_sweep("warm", 1000)
+        for k in range(given.rounds):  # in turn, as other programs on the machine come and go
+            ensembles.append(rate_of_ensemble(model, given.baseline, settings))
+            sweeps.append(rate_of_sweep(str(k), given.baseline))
+        rate, _ = rate_of_sweep("large", given.rows, progress=watch)
+        size = sum(path.stat().st_size for path in load(Path(folder) / "large").chunks.values())
+    for what, found in (("ensemble, 2 threads", ensembles), ("sweep, 2 workers", sweeps)):
+        walls, busy = np.transpose(found)
+        print(f"{what}: {given.baseline:,} rows at {', '.join(f'{rate:,.0f}' for rate in walls)} rows/s,")
+        print(f"    {np.median(busy):,.0f} rows for each second of a processor")
+    ratios = np.array(sweeps)[:, 0] / np.array(ensembles)[:, 0]
+    print(f"ratio: median {np.median(ratios):.2f} of rounds {', '.join(f'{ratio:.2f}' for ratio in ratios)}")
+    print(f"one sweep of {given.rows:,} rows, {size / 1e6:.1f} MB of files: {rate:,.0f} rows/s")
     for share, sizes in memory:
         print(f"at {share:4.0%}: MB of this process and the workers: {', '.join(f'{size:.0f}' for size in sizes)}")
 
