@@ -7,7 +7,8 @@
 ``options``       options of the file, of ``--set`` and of a call
 ``values``        parameters, constants and initial states, of one run or of many instances
 ``settings``      the numbers of a run; ``automatic`` chooses its method, ``engines`` its loop
-``ensemble``      many instances; ``workers`` runs them
+``ensemble``      many instances, from an ``ensemble_request``; ``workers`` runs them
+``sweeps``        many instances into a dataset; ``chunk_work`` makes a part of it
 ``stream``        a run whose rows go to a file while it goes on
 ``estimate``      a run's error, by a finer run
 ``distances``     distances of runs; ``points`` those of points

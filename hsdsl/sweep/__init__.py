@@ -5,7 +5,7 @@
 `recording`    what is kept of each run
 `manifest`     what a dataset is of: model, values, settings; its format has a version
 `rows`         an ensemble as an Arrow table with the columns of a dataset
-`dataset`      a folder with a manifest and a file for each chunk of rows
+`dataset`      a folder with a manifest and a file for each chunk of rows; `summary` and `picture` show it
 `schedule`     chunks to processes of this machine, or (`cluster`) to the workers of Dask
 =============  ================================================================================
 

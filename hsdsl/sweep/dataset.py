@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
@@ -131,54 +129,16 @@ class Sweep:
 
     def as_json(self) -> dict[str, Any]:
         """Its numbers, and where it is."""
-        described = self.manifest.plain()
-        kept = ("model", "sha256", "title", "random", "seed", "record", "settings", "rows", "chunk", "hsdsl")
-        vary = [
-            {key: value for key, value in item.items() if key != "values"} | _span(item) for item in described["vary"]
-        ]
-        counts = {"done": self.done, "complete": self.complete, "stops": self.reasons}
-        return {"folder": str(self.folder)} | {key: described[key] for key in kept} | {"vary": vary} | counts
+        from hsdsl.sweep.summary import as_json
+
+        return as_json(self)
 
     @property
     def summary(self) -> str:
         """What it is of, how far it is, how its runs ended, and the range of each number."""
-        manifest = self.manifest
-        lines = [visible(manifest.title or manifest.model)]
-        lines += [f"  {text}" for text in _described(manifest)]
-        share = f"{self.done:,} of {self.rows:,} rows in {len(self.chunks)} of {manifest.chunks} files"
-        lines += [f"  {share}" + ("" if self.complete else "; the command that made it goes on")]
-        lines += ["stops  " + ", ".join(f"{count:,} {reason}" for reason, count in self.reasons.items())]
-        return "\n".join([*lines, *self._ranges()])
+        from hsdsl.sweep.summary import summary
 
-    def _ranges(self) -> Iterator[str]:
-        numbers = ["transitions", "time", *(name for name in self.columns if name.startswith("final."))]
-        found: dict[str, list[Array]] = {name: [] for name in numbers}
-        for table in self.batches(numbers):
-            for name in numbers:
-                values = table.column(name).to_numpy().astype(float)
-                values = values[np.isfinite(values)]
-                found[name] += (
-                    [np.array([values.min(), values.max(), values.sum(), len(values)])] if len(values) else []
-                )
-        for name, parts in found.items():
-            if parts:
-                low, high, total, count = np.transpose(parts)
-                yield f"{name:14} {low.min():<12.6g} to {high.max():<12.6g} mean {total.sum() / count.sum():.6g}"
-
-
-def _span(item: Mapping[str, Any]) -> dict[str, Any]:
-    values = item.get("values")
-    return {} if values is None else {"from": values[0], "to": values[-1], "count": len(values)}
-
-
-def _described(manifest: Manifest) -> Iterator[str]:
-    variation = manifest.variation
-    for grid in variation.grids:
-        yield f"{grid.name}: {len(grid.values)} values from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
-    for each in variation.draws:
-        yield f"{each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
-    if variation.draws:
-        yield f"{variation.random:,} draws with seed {variation.seed}"
+        return summary(self)
 
 
 def path_of(folder: Path, chunk: int) -> Path:

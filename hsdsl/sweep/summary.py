@@ -1,0 +1,67 @@
+# pyarrow has no types.
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+"""A sweep's dataset in a few lines, or as JSON: what varies, how far it is, how runs ended, ranges of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.execution import Array
+from hsdsl.names import visible
+from hsdsl.sweep.manifest import Manifest
+
+if TYPE_CHECKING:
+    from hsdsl.sweep.dataset import Sweep
+
+KEPT = ("model", "sha256", "title", "random", "seed", "record", "settings", "rows", "chunk", "hsdsl")
+
+
+def as_json(sweep: Sweep) -> dict[str, Any]:
+    """The numbers of a sweep, and where it is."""
+    described = sweep.manifest.plain()
+    vary = [{key: value for key, value in item.items() if key != "values"} | _span(item) for item in described["vary"]]
+    counts = {"done": sweep.done, "complete": sweep.complete, "stops": sweep.reasons}
+    return {"folder": str(sweep.folder)} | {key: described[key] for key in KEPT} | {"vary": vary} | counts
+
+
+def _span(item: Mapping[str, Any]) -> dict[str, Any]:
+    values = item.get("values")
+    return {} if values is None else {"from": values[0], "to": values[-1], "count": len(values)}
+
+
+def summary(sweep: Sweep) -> str:
+    """A sweep in a few lines."""
+    manifest = sweep.manifest
+    share = f"  {sweep.done:,} of {sweep.rows:,} rows in {len(sweep.chunks)} of {manifest.chunks} files"
+    share += "" if sweep.complete else "; the command that made it goes on"
+    stops = "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in sweep.reasons.items())
+    title = visible(manifest.title or manifest.model)
+    return "\n".join([title, *(f"  {text}" for text in _described(manifest)), share, stops, *_ranges(sweep)])
+
+
+def _described(manifest: Manifest) -> Iterator[str]:
+    variation = manifest.variation
+    for grid in variation.grids:
+        yield f"{grid.name}: {len(grid.values)} values from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
+    for each in variation.draws:
+        yield f"{each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
+    if variation.draws:
+        yield f"{variation.random:,} draws with seed {variation.seed}"
+
+
+def _ranges(sweep: Sweep) -> Iterator[str]:
+    """The least, the largest and the mean of each column of numbers."""
+    names = ["transitions", "time", *(name for name in sweep.columns if name.startswith("final."))]
+    found: dict[str, list[Array]] = {name: [] for name in names}
+    for table in sweep.batches(names):
+        for name in names:
+            values = table.column(name).to_numpy().astype(float)
+            values = values[np.isfinite(values)]
+            found[name] += [np.array([values.min(), values.max(), values.sum(), len(values)])] if len(values) else []
+    for name, parts in found.items():
+        if parts:
+            low, high, total, count = np.transpose(parts)
+            yield f"{name:14} {low.min():<12.6g} to {high.max():<12.6g} mean {total.sum() / count.sum():.6g}"
