@@ -356,3 +356,17 @@ def test_the_runtime_is_compiled_once() -> None:
     kernel.begin()
     assert kernel.runtime() is kernel.runtime()
     assert not kernel.is_kept("nothing", effort) and kernel.is_kept(text, effort)
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_processes_that_begin_together_compile_once(tmp_path):
+    log, compiler = tmp_path / "log", tmp_path / "cc"
+    compiler.write_text(f'#!/bin/sh\necho "$*" >> {log}\nexec {shutil.which("cc") or shutil.which("gcc")} "$@"\n')
+    compiler.chmod(0o755)
+    environment = os.environ | {"CC": str(compiler), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    words = [sys.executable, "-m", "hsdsl", "run", str(ROOT / "models" / "bouncing-ball.yaml"), "-q"]
+    begun = [subprocess.Popen(words, env=environment) for _ in range(3)]
+    assert [process.wait() for process in begun] == [0, 0, 0]
+    libraries = [line for line in log.read_text().splitlines() if "-shared" in line]
+    assert len(libraries) == 2  # the loop and the model
