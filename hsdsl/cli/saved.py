@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hsdsl.errors import UsageError
+
 if TYPE_CHECKING:
     from hsdsl.execution import Execution
     from hsdsl.model import Model
@@ -18,6 +20,8 @@ def run_of(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | P
         run = load(path)
         neighbour = path.parent / Path(run.model).name
         return run, neighbour if not Path(run.model).exists() and neighbour.exists() else None
+    if path.suffix.lower() in (".csv", ".parquet"):
+        raise UsageError(f"{path} is a table: expected a run", "save runs with --out RUN.npz, which loses nothing")
     from hsdsl.model import load as load_model
 
     model = load_model(path)  # read once: it may come through a pipe

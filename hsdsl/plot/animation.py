@@ -31,6 +31,7 @@ FORMATS = (".gif", ".mp4")
 FPS = 25
 SHORTEST, LONGEST = 4.0, 20.0  # seconds of a film whose speed nobody chose
 MOST = 5000  # frames
+FAR = 100  # pictures: what reaches farther, at the end of a run that failed, would take minutes to draw
 INCHES, DPI = 6.4, 100
 HINT = "write a .gif, which needs nothing else, or install ffmpeg"
 
@@ -96,6 +97,8 @@ def animate(
         from matplotlib.figure import Figure
 
         figure, scene, cursor = _set_up(Figure(layout="constrained"), run, samples, shapes)
+        ends = np.array([scene.get_xlim(), scene.get_ylim()])
+        middle, view = ends.mean(axis=1), float(np.ptp(ends, axis=1).max())
         file = Path(folder) / f"film{target.suffix.lower()}"
         with _writer(target).saving(figure, str(file), DPI) as writer:
             for row, time in enumerate(times.tolist()):
@@ -104,7 +107,8 @@ def animate(
                 for artist in [*scene.patches, *scene.lines]:
                     artist.remove()
                 for drawn in shapes_at(samples, shapes, row):
-                    draw_shape(scene, drawn)
+                    if drawn.reach(middle) <= FAR * view:
+                        draw_shape(scene, drawn)
                 cursor.set_xdata([time, time])
                 said = f"t = {words.number(time, 4)}{f' {unit}' if unit else ''}, {shown(str(samples.mode[row]), 40)}"
                 scene.set_xlabel(visible(said), loc="left", parse_math=False)

@@ -38,6 +38,10 @@ class Drawn:
             return self.points[0] + corners @ turned
         return _zigzag(*self.points) if self.kind == "spring" else self.points
 
+    def reach(self, point: Array) -> float:
+        """How far its farthest coordinate is from that of a point."""
+        return float(np.abs(self.extent - point).max())
+
     @property
     def extent(self) -> Array:
         """Points that a picture must have room for."""

@@ -106,6 +106,12 @@ def test_a_file_that_is_no_run_is_refused(command, tmp_path):
     assert answer.code == 2 and str(tmp_path / "run.npz") in answer.err
 
 
+def test_a_table_is_refused_as_a_run(command, tmp_path):
+    (tmp_path / "run.csv").write_text("time,x\n0,1\n")
+    answer = command("plot", tmp_path / "run.csv", "--out", tmp_path / "a.png")
+    assert answer.code == 2 and "is a table: expected a run" in answer.err and "--out RUN.npz" in answer.err
+
+
 def test_a_film_is_written(command, model, tmp_path):
     answer = command("run", model(BALL), *ENGINE, "--animate", tmp_path / "ball.gif", "--speed", "10")
     assert answer.code == 0 and (tmp_path / "ball.gif").read_bytes().startswith(b"GIF89a")

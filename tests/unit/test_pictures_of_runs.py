@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import time
 from dataclasses import replace
 
 import hand_made
@@ -235,6 +236,20 @@ def test_a_film_lasts_as_the_run_or_as_its_speed_says(tmp_path):
     for speed in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(UsageError, match="positive speed"):
             frame_times(run, speed)
+
+
+def test_a_film_of_a_run_that_blows_up_ends(tmp_path):
+    """The last values are of size 1e15: shapes there are left out, as they would be drawn for minutes."""
+    model = hsdsl.loads(
+        "hsdsl: 1\nmodes: {grow: {flow: {x: x**2}}}\nscene: [{circle: [x + 1e6, 1], radius: x/10}]\n"
+        "initial: {mode: grow, x: 1}\nexperiment: {until: 3}\n"
+    )
+    began = time.perf_counter()
+    run = model.animate(tmp_path / "film.gif", speed=1, engine="python")
+    assert not run.stop.complete and (tmp_path / "film.gif").stat().st_size > 1000
+    assert time.perf_counter() - began < 30
+    circle = Drawn("circle", np.array([[1e6 + 1, 1.0]]), (0.1,))
+    assert circle.reach(np.array([1e6, 1.0])) == pytest.approx(1.1)
 
 
 def test_a_film_has_its_frames(tmp_path):
