@@ -190,6 +190,7 @@ CODES: dict[str, str] = {
     "HS321": "a setting outside its range",
     "HS322": "a scale of a name that is not a state",
     "HS323": "an event that cannot be one",
+    "HS325": "equations that do not give the unknowns of `solve`",
     # systems of parts
     "HS350": "an instance or an automaton that does not exist",
     "HS351": "an input or a parameter of an instance that does not fit its automaton",

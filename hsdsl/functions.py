@@ -95,6 +95,33 @@ class below(_Kinked):
         return below(number, bound, one.diff(s), other.diff(s))
 
 
+class solution(sp.Function):
+    """Unknown i of n linear equations A x = b, of i, n, the entries of A row by row, and b.
+
+    It is written out by `hsdsl.lower`, and so no function of a kernel.
+    """
+
+    is_real = is_extended_real = is_finite = True
+
+    @property
+    def system(self):
+        """The place of the unknown, the rows of A, and b."""
+        i, n = int(self.args[0]), int(self.args[1])
+        entries, constants = self.args[2 : 2 + n * n], self.args[2 + n * n :]
+        return i, tuple(entries[k * n : k * n + n] for k in range(n)), tuple(constants)
+
+    def fdiff(self, argindex=1):
+        """By b_r the entry i, r of the inverse of A; by A_rc minus that times unknown c."""
+        _, rows, _ = self.system
+        n, place = len(rows), argindex - 3
+        if place < 0:
+            return sp.S.Zero
+        r, c = divmod(place, n) if place < n * n else (place - n * n, None)
+        unit = [sp.S.One if k == r else sp.S.Zero for k in range(n)]
+        inverse = solution(*self.args[: 2 + n * n], *unit)
+        return inverse if c is None else -inverse * solution(sp.Integer(c), *self.args[1:])
+
+
 class sinh(sp.sinh):
     """The hyperbolic sine, real."""
 

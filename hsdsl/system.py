@@ -302,6 +302,7 @@ class HybridSystem:
     parts: tuple[Part, ...] = ()  # of a composed system, whose last states are the numbers of their modes
     definitions: tuple[Definition, ...] = ()  # for people: they are substituted everywhere
     functions: tuple[FunctionText, ...] = ()
+    unknowns: tuple[str, ...] = ()  # of linear equations: their solutions are substituted everywhere
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

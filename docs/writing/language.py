@@ -26,7 +26,8 @@ parentheses and functions. An *inequality* has an expression on either side of o
 `since` is [the time since the mode was entered](../meaning.md#m12-time-in-a-mode): `when: since >= 2` leaves a mode
 after 2. A transition with `event` in the place of `when` is made where
 [a condition turns true](../meaning.md#m13-events). A function of `functions` is [written out](../meaning.md#words)
-where it is called: `hill(x, 2)`.
+where it is called: `hill(x, 2)`. The unknowns of `solve` are what
+[linear equations](../meaning.md#words) give.
 
 An *output* belongs to the modes in which all its names mean something. One of the whole model is read in each mode with
 that mode's own `let`; one of a mode goes before it. Elsewhere it has no value: not-a-number in arrays, an empty cell in

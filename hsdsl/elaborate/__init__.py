@@ -106,7 +106,7 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
             _report_timeout(symbols.resolver)
         except ValueError as error:  # a check at birth that no diagnostic foresaw
             raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
-        top = symbols.scope(("time", "parameters", "inputs", "states", "let"), "")
+        top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
         return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
 
 
@@ -159,7 +159,13 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         parts=parts,
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
+        unknowns=_unknowns(document),
     )
+
+
+def _unknowns(document: ModelDocument) -> tuple[str, ...]:
+    given = [document.solve, *(mode.solve for mode in document.modes.values())]
+    return tuple(str(name) for solve in given if solve is not None for name in solve.unknowns)
 
 
 def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Iterator
 
+from hsdsl.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.names import did_you_mean, shown
@@ -75,12 +76,18 @@ def _number(value: Value) -> str:
 
 def define_lets(symbols: SymbolTable) -> None:
     """The meaning of every top-level `let`, in ``symbols.values``: it may use states, and says which it used."""
-    base = symbols.scope(("time", "parameters", "inputs", "states"), "").values
+    solve = symbols.document.solve
+    symbols.values |= placeholders(solve)
+    base = symbols.scope(("time", "parameters", "inputs", "states", "unknowns"), "").values
     refused: Meanings = {}
     earlier: Meanings = {}
     scope = Scope(ChainMap(refused, earlier, base))  # pyright: ignore[reportArgumentType]
     for name in definition_order(symbols.document.let, "`let` names", refused):
         symbols.values[name] = earlier[name] = symbols.number(symbols.document.let[name], scope)
+    if solve is not None:
+        solved = solutions(symbols, solve, scope)
+        unknowns = dict.fromkeys(map(str, solve.unknowns))
+        symbols.values |= unknowns if solved is None else with_solutions(symbols.values, solved)
 
 
 def substituted_definitions(document: ModelDocument) -> Iterator[Definition]:

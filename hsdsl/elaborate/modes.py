@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from hsdsl.elaborate.edges import elaborate_edges, surface
 from hsdsl.elaborate.resolver import all_of
+from hsdsl.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.schema import ModeDocument
@@ -57,7 +58,7 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
     """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
     states = symbols.states_within(str(name))
     place = f"the mode '{name}'"
-    own: Meanings = {}
+    own: Meanings = placeholders(document.solve, str(name))
     refused: Meanings = {}
     scope = Scope(ChainMap(refused, own, symbols.values, symbols.elsewhere), states, place)  # pyright: ignore[reportArgumentType]
     for key in definition_order(document.let, "`let` names", refused):
@@ -66,6 +67,9 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
             message = f"'{key}' is a `let` name of {place}, and also {KINDS[kind]}"
             symbols.report(key.place, "HS301", message, "give one of them another name")
         own[key] = symbols.number(document.let[key], scope)
+    if document.solve is not None:
+        solved = solutions(symbols, document.solve, scope, str(name))
+        own |= dict.fromkeys(map(str, document.solve.unknowns)) if solved is None else with_solutions(own, solved)
     return scope
 
 
@@ -88,7 +92,7 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
 def output_scope(symbols: SymbolTable) -> Scope:
     """The names that can be used in an output of the whole model."""
     inner: Meanings = {name: state(name) for name in symbols.inner_lets}
-    return symbols.scope(("time", "parameters", "inputs", "states", "let"), "", inner)
+    return symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "", inner)
 
 
 def _check_name(symbols: SymbolTable, name: Key) -> None:

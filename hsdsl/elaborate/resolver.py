@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from hsdsl.errors import Findings
 from hsdsl.expression import Expected, ExpressionError, numeric, parse, symbolic
-from hsdsl.expression.inequality import Inequality, inequality, the_comparison
+from hsdsl.expression.inequality import Inequality, equation, inequality, the_comparison
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.expression.syntax import Call, Tree
 from hsdsl.expression.timebox import Box
@@ -83,6 +83,11 @@ class ExpressionResolver:
     def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
         """The SymPy Boolean of a condition."""
         return self._built(scalar, scope, "condition", lambda tree: symbolic.condition(tree, scope, scalar.value))
+
+    def equation(self, scalar: Scalar, scope: Scope) -> tuple[Value, Value] | None:
+        """Both sides of an equation."""
+        text = scalar.value
+        return self._built(scalar, scope, "condition", lambda tree: equation(tree, scope, text))
 
     def trigger(self, scalar: Scalar, scope: Scope) -> Trigger | None:
         """The condition of an event."""

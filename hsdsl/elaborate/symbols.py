@@ -18,7 +18,7 @@ from hsdsl.system import TIME
 
 KINDS = {
     "functions": "a function", "parameters": "a parameter", "inputs": "an input", "states": "a state",
-    "let": "a `let` name",
+    "let": "a `let` name", "unknowns": "an unknown of `solve`",
 }  # fmt: skip
 Meanings = dict[str, Meaning]
 
@@ -53,6 +53,7 @@ class SymbolTable:
         self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
         keys = [(kind, getattr(document, kind)) for kind in ("functions", "parameters", "inputs")]
         keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
+        keys += [("unknowns", document.solve.unknowns)] if document.solve is not None else []
         for kind, names in keys:
             for key in names:
                 taken = self.names.setdefault(key, kind)

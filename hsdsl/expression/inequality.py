@@ -30,6 +30,17 @@ def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
     return Inequality(left, comparison.operators[0], right)
 
 
+def equation(tree: Tree, scope: Scope, text: str) -> tuple[Value, Value]:
+    """The two sides of an equation whose names the scope has.
+
+    Raises ExpressionError: as `symbolic.number`, and where there is no single equation.
+    """
+    if not (isinstance(tree, Comparison) and tree.operators == ("==",)):
+        raise ExpressionError.at(tree, "HS325", "expected one equation", "write it as left == right")
+    left, right = (symbolic.number(side, scope, text) for side in tree.operands)
+    return left, right
+
+
 def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
     """The tree, if it is exactly one inequality.
 

@@ -12,7 +12,15 @@ from hsdsl.errors import Span
 from hsdsl.expression import Expected, parse
 from hsdsl.expression.scope import functions_called
 from hsdsl.expression.syntax import Name, Tree, walk
-from hsdsl.schema import InputFile, InputSamples, ModeDocument, ModelDocument, ParameterEntry, ReferenceDocument
+from hsdsl.schema import (
+    InputFile,
+    InputSamples,
+    ModeDocument,
+    ModelDocument,
+    ParameterEntry,
+    ReferenceDocument,
+    SolveDocument,
+)
 from hsdsl.source import Scalar
 
 Role = Literal[
@@ -20,6 +28,7 @@ Role = Literal[
     "function",  # the function `name`, over its arguments
     "input",  # the input `name`, or one of its samples
     "let",  # the named subexpression `name`, of `mode` or of the whole model
+    "equation",  # an equation of `solve`, of `mode` or of the whole model
     "flow",  # the derivative of the state `name` in `mode`
     "domain",  # a wall of `mode`
     "when",  # the surface of a transition
@@ -34,7 +43,13 @@ Role = Literal[
     "experiment",  # the setting `name`
     "reference",  # a number in `reference`
 ]
-_WANTED: dict[Role, Expected] = {"domain": "inequality", "when": "inequality", "if": "condition", "event": "condition"}
+_WANTED: dict[Role, Expected] = {
+    "domain": "inequality",
+    "when": "inequality",
+    "if": "condition",
+    "event": "condition",
+    "equation": "condition",
+}
 
 
 @dataclass(frozen=True)
@@ -85,6 +100,7 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
             yield SourceExpression("input", entry, name)
     for name, scalar in document.let.items():
         yield SourceExpression("let", scalar, name)
+    yield from _of_solve(document.solve, None)
     for name, mode in document.modes.items():
         yield from _of_mode(str(name), mode)
     for name, scalar in document.outputs.items():
@@ -111,6 +127,7 @@ def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[S
 def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
     for key, scalar in mode.let.items():
         yield SourceExpression("let", scalar, key, name)
+    yield from _of_solve(mode.solve, name)
     for key, scalar in (mode.flow or {}).items():
         yield SourceExpression("flow", scalar, key, name)
     for index, scalar in enumerate(mode.domain):
@@ -127,6 +144,11 @@ def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
             yield SourceExpression("reset", scalar, key, name, index)
     for key, scalar in mode.outputs.items():
         yield SourceExpression("output", scalar, key, name)
+
+
+def _of_solve(solve: SolveDocument | None, mode: str | None) -> Iterator[SourceExpression]:
+    equations = solve.equations if solve is not None else ()
+    yield from (SourceExpression("equation", scalar, "", mode, index) for index, scalar in enumerate(equations))
 
 
 def _of_reference(reference: ReferenceDocument) -> Iterator[Scalar | None]:

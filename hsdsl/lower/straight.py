@@ -15,7 +15,8 @@ from itertools import accumulate, count
 
 import sympy as sp
 
-from hsdsl.functions import rebuilt
+from hsdsl.functions import rebuilt, solution
+from hsdsl.lower.elimination import solved
 from hsdsl.lower.printer import LARGEST_PRODUCT
 from hsdsl.system import TIME
 
@@ -48,6 +49,7 @@ class Cut:
         self._letter = letter
         self._numbers: Iterator[int] = count()
         self._done: dict[sp.Basic, tuple[sp.Basic, int]] = {}
+        self._solutions: dict[tuple, list[sp.Basic]] = {}
 
     def name(self, expr: sp.Basic) -> sp.Basic:
         """Give an expression a name of its own, unless it is a name or a number."""
@@ -71,6 +73,8 @@ class Cut:
 
     def _node(self, expr: sp.Basic) -> tuple[sp.Basic, int]:
         parts = [self._cut(a) for a in expr.args]
+        if isinstance(expr, solution):
+            return self._solved(expr.func(*(self.name(part) for part, _ in parts))), 1
         if self._powers and expr.is_Pow and expr.exp.is_Integer and abs(expr.exp) <= LARGEST_PRODUCT:
             parts = [(self.name(part), 1) if abs(expr.exp) > 1 else (part, size) for part, size in parts]
         if expr.is_Pow and expr.base.is_Pow:
@@ -85,6 +89,13 @@ class Cut:
         if args == expr.args:
             return expr, 1 + sum(size for _, size in parts)
         return rebuilt(expr, args), 1 + sum(size for _, size in parts)
+
+    def _solved(self, expr: sp.Basic) -> sp.Basic:
+        """The name of an unknown of linear equations, which are solved by statements once for all unknowns."""
+        place, rows, constants = expr.system
+        if (rows, constants) not in self._solutions:
+            self._solutions[rows, constants] = solved(rows, constants, self.name)
+        return self._solutions[rows, constants][place]
 
     def _narrow(self, operation: type, parts: list[tuple[sp.Basic, int]]) -> list[tuple[sp.Basic, int]]:
         """Name the first operands together, as long as the rest is too wide or too large."""

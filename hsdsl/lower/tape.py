@@ -17,6 +17,7 @@ from math import inf
 import sympy as sp
 
 from hsdsl.lower.routines import Definition, print_routines
+from hsdsl.lower.straight import Cut
 from hsdsl.program import Operation, Tape
 from hsdsl.system import TIME
 
@@ -86,12 +87,27 @@ class _Writer:
         if expr.is_Pow:
             return self._power(expr.base, expr.exp)
         name = type(expr).__name__
+        if name == "solution":
+            return self._solution(expr)
         if name == "below":
             number, bound, one, other = expr.args
             return self._operation("below", self.line(number), self.line(one), self.line(other), constant=bound)
         if name not in _DERIVATIVES:
             raise Kinked(name)
         return _DERIVATIVES[name](self, *map(self.line, expr.args))
+
+    def _solution(self, expr) -> int:
+        """The line of an unknown of linear equations: the statements that solve them are lines."""
+        cut, fixed = Cut(f"solved {len(self._known)} "), {}
+        unknown = cut.down(expr)
+        for symbol, value in cut.statements:
+            value = value.xreplace(fixed)
+            if self._is_constant(value):
+                fixed[symbol] = value
+            else:
+                self._known[symbol] = self.line(value)
+                self._moving.add(symbol)
+        return self.line(unknown.xreplace(fixed))
 
     def _is_constant(self, expr) -> bool:
         return not (expr.free_symbols & self._moving)

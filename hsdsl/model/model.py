@@ -513,6 +513,9 @@ class Model:
         if files is None:
             raise UsageError("expected a model that was read from text")
         read = elaborate_files(files)
+        if read.system.unknowns:
+            message = "a model with `solve` cannot be written with its completions"
+            raise UsageError(message, "write its solutions under `let`")
         text = completed_text(read.text, read.root, read.system)
         declared = {name for mode in read.document.modes.values() for name in mode.flow or ()}
         if text is not None and not declared >= {*read.system.states}:

@@ -16,6 +16,7 @@ from hsdsl.schema.documents import (
     ReferenceDocument,
     ReferenceStateDocument,
     ReferenceTransitionDocument,
+    SolveDocument,
     SystemDocument,
     TransitionDocument,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "ReferenceDocument",
     "ReferenceStateDocument",
     "ReferenceTransitionDocument",
+    "SolveDocument",
     "SystemDocument",
     "TransitionDocument",
     "json_schema",

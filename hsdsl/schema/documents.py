@@ -11,6 +11,7 @@ from hsdsl.schema.fields import (
     ArgumentName,
     Completion,
     Document,
+    Equation,
     Expression,
     Flag,
     Hold,
@@ -98,6 +99,15 @@ class FunctionDocument(Document):
     expression: Expression = required("Its value.", "x**2/(k**2 + x**2)", alias="is")
 
 
+class SolveDocument(Document):
+    """Unknowns that linear equations give, for use as names of `let`; they are solved at each evaluation."""
+
+    unknowns: Items[ArgumentName] = required("The names of the unknowns.", ["a", "force"])
+    equations: Items[Equation] = required(
+        "As many equations, linear in the unknowns.", ["m*a == force - m*g", "force == k*x - d*a"]
+    )
+
+
 class TransitionDocument(Document):
     """An edge that leaves a mode: with `when` and `to`, or with `event`."""
 
@@ -156,6 +166,9 @@ class ModeDocument(Document):
     final: Flag = optional("Whether the run ends on entering the mode. It then needs no `flow`.", True, default=False)
     let: Table[Expression] = mapping(
         "Named subexpressions of this mode, each of earlier ones; they shadow the top ones.", {"force": "-k*x"}
+    )
+    solve: SolveDocument | None = optional(
+        "Unknowns of this mode, which linear equations give.", {"unknowns": ["a"], "equations": ["m*a == -k*x"]}
     )
     outputs: Table[Expression] = mapping(
         "Outputs of this mode. They go before those of the model with the same name, and have no value in modes that "
@@ -271,6 +284,9 @@ class ModelDocument(Document):
         "Name: expression of `t` and parameters, or samples, or a CSV file.", {"u": "20*cos(2.5*t)"}
     )
     let: Table[Expression] = mapping("Named subexpressions, each of earlier ones.", {"energy": "v**2/2"})
+    solve: SolveDocument | None = optional(
+        "Unknowns that linear equations give.", {"unknowns": ["a"], "equations": ["m*a == -k*x"]}
+    )
     modes: ModeTable[ModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
     outputs: Table[Expression] = mapping(
         "Name: expression, recorded with the states. Each mode reads it with its own `let`; it has no value in a "
@@ -394,6 +410,8 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     (): (SystemDocument, "a model"),
     ("parameters", "*"): (ParameterEntry, "a parameter"),
     ("functions", "*"): (FunctionDocument, "a function"),
+    ("solve",): (SolveDocument, "`solve`"),
+    ("modes", "*", "solve"): (SolveDocument, "`solve`"),
     ("inputs", "*", "<samples>"): (InputSamples, "an input"),
     ("inputs", "*", "<file>"): (InputFile, "an input"),
     ("modes", "*"): (ModeDocument, "a mode"),

@@ -65,6 +65,10 @@ def _inequality(value: Any) -> Scalar:
     return _expression(value, "an inequality, such as x >= 1")
 
 
+def _equation(value: Any) -> Scalar:
+    return _expression(value, "an equation, such as m*a == force")
+
+
 def _text(value: Any) -> Scalar | None:
     scalar = _single(value, "a text")
     return None if is_empty(scalar) else scalar
@@ -208,6 +212,7 @@ _NUMBER_OR_TEXT: dict[str, Any] = {"type": ["number", "string"]}
 _ANY_SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean", "null"]}
 
 Expression = Annotated[Scalar, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
+Equation = Annotated[Scalar, PlainValidator(_equation), WithJsonSchema({"type": "string"})]
 Inequality = Annotated[Scalar, PlainValidator(_inequality), WithJsonSchema({"type": "string"})]
 OptionalExpression = Annotated[Scalar | None, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
 OptionalCondition = Annotated[

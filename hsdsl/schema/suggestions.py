@@ -53,6 +53,8 @@ _ADD = {
     "when": "write when: and the inequality at which the transition fires, such as x >= 1",
     "to": "write to: and the mode that is entered",
     "of": "write of: [x], the names of the function's arguments",
+    "unknowns": "write unknowns: [a, b], the names of what is solved for",
+    "equations": "write equations: and as many texts such as m*a + b == f",
     "is": "write is: and an expression of the function's arguments",
     "value": "write value: and the parameter's number or expression",
     "times": "write times: [0, 1, 2], or file: and the name of a CSV file",

@@ -39,6 +39,7 @@ class Parts:
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
         self.symbols = symbols
         self._refuse_modes(document)
+        self._refuse_equations(document)
         self.roster = roster_of(symbols, document)
         self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
         instances = self.roster.instances.values()
@@ -59,6 +60,13 @@ class Parts:
         self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
         self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
+
+    def _refuse_equations(self, document: SystemDocument) -> None:
+        inner = [mode.solve for kind in document.automata.values() for mode in getattr(kind, "modes", {}).values()]
+        for solve in (document.solve, *inner):
+            if solve is not None:
+                place = (solve.equations or solve.unknowns)[0].place
+                self.symbols.report(place, "HS353", "a system of parts has no `solve`", "write solutions under `let`")
 
     def _refuse_modes(self, document: SystemDocument) -> None:
         """Report `modes` or `initial` next to a system."""

@@ -38,6 +38,8 @@ def document(source: Source) -> str:
     system = source.system
     if any(edge.of_event for mode in system.modes for edge in mode.edges):
         raise UsageError("a model with events cannot be written as LaTeX", "write them as modes, with `when`")
+    if system.unknowns:
+        raise UsageError("a model with `solve` cannot be written as LaTeX", "write its solutions under `let`")
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
     math = Mathematics(_names(system), named_functions(system.functions, parameters))
     lines = [*(f"% {line}" for line in source.heading), _HEAD, rf"\section*{{{escaped(system.title or source.name)}}}"]
