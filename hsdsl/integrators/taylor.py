@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 from typing import ClassVar, Literal
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, NOTHING, Arithmetic, Number
 from hsdsl.integrators.scales import root
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Taylor
@@ -121,30 +121,35 @@ def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, a
 
     Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap. With l
     the largest coefficient of order m relative to the tolerance, h = l**(-1/m); one more of order m + 1 asks for less
-    only where it exceeds l/h. A state that has been zero so far is held against the first of its own terms.
+    only where it exceeds l/h. A state that has been zero so far, or too small for digits, is held against the first of
+    its own terms.
     """
     least, before = None, arithmetic.zero
     for m in (len(stages) - 1, len(stages)):
         largest = arithmetic.zero
         for c, s in zip(stages[m - 1], scales, strict=True):
-            if s > 0:
+            if tolerance * s > NOTHING:
                 largest = max(largest, abs(c) / (tolerance * s))
         if largest > 0 and (least is None or largest * least > before):
             h = root(largest, m, arithmetic)
             least = h if least is None else min(h, least)
         before = largest
     for i, s in enumerate(scales):
-        if not s > 0:
+        if not tolerance * s > NOTHING:
             for h in _from_zero(tuple(c[i] for c in stages), tolerance, arithmetic):
                 least = h if least is None else min(h, least)
     return least
 
 
 def _from_zero(c: State, tolerance: Number, arithmetic: Arithmetic) -> Iterator[Number]:
-    """The steps that keep the terms left out below the tolerance, relative to the first that is not 0."""
+    """The steps that keep the terms left out below the tolerance, relative to the first that is not 0.
+
+    A state whose first term is in the later half of them, as that of a mass at the other end of a chain, has too few
+    digits to keep any.
+    """
     last = len(c) - 1
     first = next((k for k in range(last - 1) if c[k] != 0), last)
     allowed = tolerance * abs(c[first])
     for k in (last - 1, last):
-        if first < k and c[k] != 0 and allowed > 0:  # below the least number there are no digits to keep
+        if first <= last // 2 and c[k] != 0 and allowed > NOTHING:
             yield root(abs(c[k]) / allowed, k - first, arithmetic)

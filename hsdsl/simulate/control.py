@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import NOTHING, Arithmetic, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.settings import Settings
 
@@ -33,7 +33,6 @@ MOST_REJECTIONS = 2_000  # in a stretch
 STRETCH = 1e-3  # of the largest step: the time in which rejections are counted together
 BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
-NOTHING = 2.0**-960  # below this numbers have no digits left
 LEAST_BEFORE = 0.3  # a root of the one before likewise
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from chains import chain
 from engines import needs_compiler
+from scipy.special import jv
 
 import hsdsl
 from hsdsl.backends.c import model_source
@@ -142,3 +143,22 @@ def test_the_pattern_of_an_elimination_is_that_of_its_fill():
     assert [of.column[of.start[i] : of.start[i + 1]] for i in range(n)] == [
         np.flatnonzero(row).tolist() for row in present
     ]
+
+
+def test_a_wave_through_a_chain_begins_where_numbers_have_no_digits():
+    """Masses far from the one that moves are at 1e-200 and less at first, and follow Bessel functions."""
+    n, middle = 51, 26
+    names = ["0", *(f"x{i}" for i in range(1, n + 1)), "0"]
+    rows = zip(names, names[1:-1], names[2:], strict=False)
+    flow = ", ".join(f"{x}: v{x}, v{x}: {left} - 2*{x} + {right}" for left, x, right in rows)
+    start = ", ".join(f"{x}: {int(x == names[middle])}, v{x}: 0" for x in names[1:-1])
+    run = hsdsl.loads(f"""
+hsdsl: 1
+modes: {{a: {{flow: {{{flow}}}}}}}
+initial: {{mode: a, {start}}}
+experiment: {{until: 5, method: taylor}}
+""").simulate()
+    assert run.stop.reason == "until"
+    assert len(run.times) < 400
+    for i in (middle, middle + 1, middle - 3, n):
+        assert run.final.state[f"x{i}"] == pytest.approx(jv(2 * (i - middle), 10), abs=1e-9)

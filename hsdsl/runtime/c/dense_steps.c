@@ -143,7 +143,7 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
 static hs_real smaller(hs_real least, hs_real h) { return h != h ? least : least != least ? h : hs_min(h, least); }
 
 /* The step at which the first terms of a state that are left out stay below the tolerance beside the first that is not
-   0; not-a-number where there are none. */
+   0; not-a-number where there are none, or where that is in the later half. */
 static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
   const int order = run->method->order;
   const hs_real *c = series_of(run, s);
@@ -151,7 +151,7 @@ static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
   int first = 1;
   while (first < order && c[first] == 0) first++;
   const hs_real allowed = tolerance * fabs(c[first]);
-  if (first == order || !(allowed > 0)) return NAN; /* below the least number there are no digits to keep */
+  if (first > (order + 2) / 2 || !(allowed > HS_NOTHING)) return NAN;
   for (int m = order; m <= order + 1; m++)
     if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / allowed, m - first));
   return least;
@@ -165,12 +165,12 @@ static hs_real proposed_step(const hs_run *run, int n, hs_real tolerance) {
   for (int m = order; m <= order + 1; m++) {
     hs_real largest = 0.0;
     for (int s = 0; s < n; s++)
-      if (run->scales[s] > 0) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
+      if (tolerance * run->scales[s] > HS_NOTHING) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
     if (largest > 0 && (least != least || largest * least > before)) least = smaller(least, root(largest, m));
     before = largest;
   }
   for (int s = 0; s < n; s++)
-    if (!(run->scales[s] > 0)) least = smaller(least, from_zero(run, s, tolerance));
+    if (!(tolerance * run->scales[s] > HS_NOTHING)) least = smaller(least, from_zero(run, s, tolerance));
   return least;
 }
 
