@@ -68,3 +68,39 @@ def numbers_of(parts: Sequence[Part], name: str) -> dict[str, int]:
 def present(parts: Sequence[Part], state: Mapping[str, Any]) -> frozenset[str]:
     """The states that the product mode at a state of the system has."""
     return frozenset(name for part in parts for name in part.states[part.number(state)])
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where parts are among the states of their system, as numbers and letters for other languages.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        The place of each part's number among the states, -1 for a part with one mode.
+    owners : tuple of int
+        The part that each state is of, -1 for the numbers of modes.
+    owned : tuple of str
+        For each state and each mode of its part ``1`` where the mode has it, else ``0``.
+    """
+
+    numbers: tuple[int, ...]
+    owners: tuple[int, ...]
+    owned: tuple[str, ...]
+
+
+def layout_of(parts: Sequence[Part], states: Sequence[str]) -> Layout:
+    """Where parts are among the states of their system; nowhere where there are no parts."""
+    if not parts:
+        return Layout((), (), ())
+    places = {name: k for k, name in enumerate(states)}
+    owner = {name: k for k, part in enumerate(parts) for own in part.states for name in own}
+    owners = tuple(owner.get(name, -1) for name in states)
+    return Layout(
+        tuple(places[part.name] if part.is_numbered else -1 for part in parts),
+        owners,
+        tuple(
+            "" if k < 0 else "".join(str(int(name in own)) for own in parts[k].states)
+            for name, k in zip(states, owners, strict=True)
+        ),
+    )

@@ -34,6 +34,7 @@ TARGETS = {
 
 
 DOCUMENTS = ("latex", "mermaid")  # targets that do not run
+OF_PARTS = ("c", "web")  # targets that keep systems of parts
 
 
 def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
@@ -49,6 +50,9 @@ def files_of(source: Source, target: str) -> dict[str, bytes]:
     Raises UsageError: an unknown target, or a model that the target cannot keep.
     """
     _check_target(target)
+    if source.system.parts and target not in OF_PARTS:
+        hint = f"--to {' or '.join(OF_PARTS)}, or write the modes of a small one out"
+        raise UsageError(f"{target} has no systems of parts", hint)
     return import_module(f"hsdsl.export.{target}").files(source)
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from hsdsl import __version__
-from hsdsl.errors import UsageError
 from hsdsl.export.identifiers import ascii_name
 from hsdsl.model import Model
 from hsdsl.names import visible
@@ -60,8 +59,6 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
 
     Raises UsageError: a name, value or combination that a run would refuse, too.
     """
-    if model.program.parts:
-        raise UsageError("a system of parts cannot be exported", "write the modes of a small one out")
     prepared = model.pipeline.prepare({**arguments, "engine": "python"})
     completed = model.pipeline.sliding if prepared.settings.completion == "auto" else model.pipeline
     return Source(completed.system, prepared, model, arguments)

@@ -110,14 +110,15 @@ def numbers(driver: Any) -> dict[str, Any]:
     text = driver.execute_script("""
       const names = (mode, edge) =>
         edge === undefined ? model.modes[mode].states : model.modes[mode].edges[edge].states;
-      const by = (list, x) => Object.fromEntries(list.map((name, k) => [name, x[k]]));
+      const by = (mode, list, x) => Object.fromEntries(list.map((name, k) => [name, x[k]])
+        .filter((_, k) => mode === undefined || hasState(mode, k)));
       const last = run.times.length - 1;
       return JSON.stringify({
         time: run.time, end: run.times[last], parameters: run.parameters,
         final: Object.fromEntries(model.columns.map((name, k) => [name, run.columns[k][last]])),
         transitions: run.transitions.map((made) => ({time: made.time, edge: edgeOf(made.mode, made.edge),
-          resumed: made.resumed, before: by(names(made.mode), made.before),
-          after: Number.isNaN(made.resumed) ? null : by(names(made.mode, made.edge), made.after),
+          resumed: made.resumed, before: by(made.mode, names(made.mode), made.before),
+          after: Number.isNaN(made.resumed) ? null : by(made.target, names(made.mode, made.edge), made.after),
           alternatives: made.alternatives.map((k) => edgeOf(made.mode, k))})),
         modes: run.arcs.map((arc) => model.modes[arc.mode].name)});
     """)

@@ -364,7 +364,7 @@ def test_the_flat_part_of_visited_modes_has_the_same_execution():
 
 @pytest.mark.parametrize("what", ["orbit", "sensitivity", "stream", "point", "complete", "export"])
 def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
-    from hsdsl.export import source_of
+    from hsdsl.export import files_of, source_of
 
     model = hsdsl.loads(ROOMS)
     calls = {
@@ -373,7 +373,7 @@ def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
         "stream": lambda: model.stream(tmp_path / "rows.csv"),
         "point": lambda: model.distance("a=on b=on a.T=20 b.T=20", "a=on b=on a.T=20 b.T=20"),
         "complete": model.completed,
-        "export": lambda: source_of(model, {}),
+        "export": lambda: files_of(source_of(model, {}), "rust"),
     }
-    with pytest.raises(hsdsl.UsageError, match="system of parts"):
+    with pytest.raises(hsdsl.UsageError, match=r"systems? of parts"):
         calls[what]()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hsdsl.export.c.text import array, string
-from hsdsl.program import ModeProgram
+from hsdsl.parts import layout_of
+from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate import Problem
 
 STRINGS = "const char *const"
@@ -25,7 +26,21 @@ def names_text(problem: Problem, title: str) -> str:
     parts.append(_strings("problem_start_state", problem.states))
     parts.append(_strings("problem_parameter", program.parameters))
     parts.append(_strings("problem_output", program.outputs))
-    return "".join(parts)
+    return "".join([*parts, *_parts(program)])
+
+
+def _parts(program: Program) -> Iterable[str]:
+    """The parts of a system, and what their modes have."""
+    parts = program.parts
+    layout = layout_of(parts, program.modes[0].states)
+    yield array("const int", "problem_part_number", map(str, layout.numbers))
+    yield array("const int", "problem_owner", map(str, layout.owners))
+    yield _strings("problem_part", (part.name for part in parts))
+    kinds = {part.modes: f"part_modes_{k}" for k, part in enumerate(parts)}
+    for modes, name in kinds.items():
+        yield _strings(name, modes, "static ")
+    yield array(f"{STRINGS} *const", "problem_part_mode", (kinds[part.modes] for part in parts))
+    yield _strings("problem_owned", layout.owned)
 
 
 def _mode(k: int, mode: ModeProgram) -> str:

@@ -46,6 +46,13 @@ extern const char *const problem_start_state[];
 extern const char *const problem_parameter[];
 extern const char *const problem_output[];
 
+/* Of a system of parts: the state that is the number of each part's mode, from 1 on, or -1 where it has one mode; names
+   of parts and their modes; the part that each state is of, or -1; of each mode of that a 1 where it has the state. */
+extern const int problem_part_number[], problem_owner[];
+extern const char *const problem_part[];
+extern const char *const *const problem_part_mode[];
+extern const char *const problem_owned[];
+
 /* Of each parameter whether others decide it, and whether it decides the times of inputs, which stay as exported. */
 extern const int problem_derived[], problem_structural[];
 
@@ -75,6 +82,7 @@ def _sizes(problem: Problem) -> str:
         "FACTORS": factors(program),
         "STATES": len(program.all_states),
         "OUTPUTS": len(program.outputs),
+        "PARTS": len(program.parts),
         "PARAMETERS": len(program.parameters),
         "INPUTS": len(program.inputs),
         "DATA": len(problem.timeline.segments[0].data),

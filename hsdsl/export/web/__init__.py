@@ -12,13 +12,14 @@ from hsdsl.execution import Execution
 from hsdsl.export.source import Source
 from hsdsl.export.web.model import model_of
 from hsdsl.export.web.wasm import PARTS, wasm_module
+from hsdsl.model.visible import visible_run
 from hsdsl.names import visible
 from hsdsl.plot.parts import filled, inert, scripts, shared
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Problem, prepare
 
-SCRIPTS = ("controls.js", "scene.js", "facts.js", "page.js")
+SCRIPTS = ("controls.js", "scene.js", "facts.js", "parts.js", "page.js")
 
 
 def files(source: Source) -> dict[str, bytes]:
@@ -51,9 +52,10 @@ def _exported(source: Source) -> Execution:
     """The run of the exported settings, by the compiled loop where there is a compiler."""
     problem = source.problem.with_settings(source.problem.settings)
     try:
-        return prepare(problem, CompiledModel(problem.program)).simulate()
+        prepared = prepare(problem, CompiledModel(problem.program))
     except NoCompiler:
-        return prepare(problem).simulate()
+        prepared = prepare(problem)
+    return visible_run(prepared.simulate(), prepared)
 
 
 def page(model: dict[str, Any], module: bytes) -> str:

@@ -12,12 +12,14 @@ from hsdsl.execution import Execution
 from hsdsl.export.source import Source
 from hsdsl.export.web.numbers import SETTINGS, fixed
 from hsdsl.names import visible
+from hsdsl.parts import layout_of, numbered
 from hsdsl.plot.style import colours
-from hsdsl.program import ModeProgram
+from hsdsl.program import ModeProgram, Program
 from hsdsl.report import words
 from hsdsl.runtime import structures
 
 Data = dict[str, Any]
+MOST_COLOURS = 28  # of product modes; then they begin again
 
 
 def model_of(source: Source, shown: Source, run: Execution) -> Data:
@@ -27,6 +29,7 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
     """
     system, problem = source.system, source.problem
     program, states = problem.program, problem.program.all_states
+    hidden = numbered(program.parts)
     colour = colours([mode.name for mode in program.modes])
     return {
         "title": visible(system.title or source.name),
@@ -37,9 +40,10 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
         "states": len(states),
         "outputs": len(shown.problem.program.outputs),
         "width": width(program),
-        "columns": [*states, *program.outputs],
+        "columns": [*(name for name in states if name not in hidden), *program.outputs],
         "units": {name: visible(unit) for name, unit in program.units.items()},
         "modes": [_mode(mode, colour[mode.name]) for mode in program.modes],
+        "parts": _parts(program),
         "startStates": list(problem.states),
         "scene": [{"kind": shape.kind, "points": shape.points, "numbers": shape.numbers} for shape in system.scene],
         "settings": list(SETTINGS),
@@ -50,6 +54,22 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
         "failures": structures.FAILURES,
         "verdict": {"theorem": run.verdict.theorem, "reasons": [visible(text) for text in run.verdict.reasons]},
         "exported": visible(words.stop(run)),
+    }
+
+
+def _parts(program: Program) -> Data | None:
+    """What the page needs to name product modes; None where there are no parts."""
+    parts = program.parts
+    if not parts:
+        return None
+    layout = layout_of(parts, program.all_states)
+    return {
+        "names": [visible(part.name) for part in parts],
+        "modes": [list(map(visible, part.modes)) for part in parts],
+        "numbers": layout.numbers,
+        "owners": layout.owners,
+        "owned": layout.owned,
+        "colours": list(colours([str(k) for k in range(MOST_COLOURS)]).values()),
     }
 
 
@@ -85,6 +105,7 @@ def _parameters(source: Source) -> Iterator[Data]:
             "high": high if most is None else most,
             "given": name in source.problem.settings.overrides,
             "fixed": name in frozen,
+            "hidden": False,
         }
 
 
@@ -103,7 +124,9 @@ def _bounds(source: Source, values: Mapping[str, Any]) -> dict[str, tuple[float 
 
 def _starts(source: Source, run: Execution) -> Iterator[Data]:
     problem = source.problem
+    shown = frozenset(run.arcs[0].states)
     for name, value in zip(problem.states, problem.x, strict=True):
+        hidden = bool(problem.program.parts) and name not in shown  # a mode, or what it lacks: as exported
         reach = _largest(run, name) or 1.0
         yield {
             "name": f"initial.{name}",
@@ -113,8 +136,9 @@ def _starts(source: Source, run: Execution) -> Iterator[Data]:
             "value": float(value),
             "low": float(value) - reach,
             "high": float(value) + reach,
-            "given": f"initial.{name}" in problem.settings.overrides,
-            "fixed": False,
+            "given": hidden or f"initial.{name}" in problem.settings.overrides,
+            "fixed": hidden,
+            "hidden": hidden,
         }
 
 

@@ -39,6 +39,7 @@ function addControl(control, place) {
 
 function showControl(control, computed) {
   const row = rows.get(control.name);
+  if (control.hidden) return;
   if (computed !== undefined) row.shown = computed;
   const value = values.get(control.name) ?? row.shown;
   row.row.classList.toggle("set", values.has(control.name));
@@ -74,10 +75,10 @@ function decoded(text) {
 function buildControls() {
   const groups = [["parameters", "Parameters"], ["initial", "Initial state"]];
   for (const [group, title] of groups) {
-    const own = model.controls.map((control, i) => [control, i]).filter(([control]) => control.group === group);
+    const own = model.controls.map((control, i) => [control, i]).filter(([control]) => control.group === group && !control.hidden);
     if (own.length) $("controls").append(element("h2", {textContent: title}), ...own.map((pair) => addControl(...pair)));
   }
-  const fixed = model.controls.filter((control) => control.fixed).map((control) => control.name);
+  const fixed = model.controls.filter((control) => control.fixed && !control.hidden).map((control) => control.name);
   $("notes-on-settings").textContent = fixed.length ? `Fixed in a page: ${fixed.join(", ")}. They decide when an input ` +
     "switches, or how errors are controlled; export again with --set to change them." : "";
   $("notes-on-settings").className = "faint";

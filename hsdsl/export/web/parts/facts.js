@@ -56,10 +56,11 @@ function noted({kind, mode, surface, number, time: t, other}) {
   }[model.notices[kind]];
 }
 
-function changes({mode, edge, before, after, resumed}) {
+function changes({mode, edge, target, before, after, resumed}) {
   if (Number.isNaN(resumed)) return "the run ended first";
   const from = model.modes[mode].states, to = model.modes[mode].edges[edge].states;
-  const texts = to.map((name, k) => [name, after[k], before[from.indexOf(name)]]).filter(([, a, b]) => a !== b)
+  const had = (name) => hasState(mode, from.indexOf(name)) ? before[from.indexOf(name)] : undefined;
+  const texts = to.map((name, k) => [name, after[k], had(name)]).filter(([, a, b], k) => a !== b && hasState(target, k))
     .map(([name, a, b]) => `${name}: ${b === undefined ? "" : `${format(b)} \u2192 `}${format(a)}`);
   return texts.join(", ") || "unchanged";
 }
@@ -69,7 +70,7 @@ function transitionRow(made, index) {
   const tied = made.alternatives.map((k) => edgeOf(made.mode, k)).join(", ");
   const name = element("td", {textContent: tied ? `${edge.name} (with ${tied})` : edge.name});
   if (tied) name.title = `reached together with ${tied}`;
-  const to = element("td", {textContent: `${modeOf(made.mode)} \u2192 ${modeOf(edge.target)}`});
+  const to = element("td", {textContent: `${modeOf(made.mode)} \u2192 ${modeOf(made.target)}`});
   return element("tr", {}, element("td", {textContent: index}), cell(made.time), name, to, element("td", {textContent: changes(made)}));
 }
 

@@ -34,7 +34,7 @@ function received(result) {
   if (result.refusal) {
     showRefusal(result);
   } else {
-    run = {...result, failed: !["until", "final"].includes(model.reasons[result.reason].split(" ")[0])};
+    run = {...withProducts(result), failed: !["until", "final"].includes(model.reasons[result.reason].split(" ")[0])};
     runs = [run];
     zoomTo(...(zoomed && zoomed[1] <= span()[1] ? zoomed : []));
     if (model.scene.length) measureScene(run);

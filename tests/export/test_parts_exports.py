@@ -1,0 +1,70 @@
+"""Exports of systems of parts: the runs of their product modes, by the same names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from export.c_builds import COMPILERS
+from export.test_c import same
+from export.web_pages import browser, complaints, exported, in_browser, numbers, opened
+
+import hsdsl
+
+MODELS = Path(__file__).parents[2] / "models" / "parts"
+ENDING = """
+hsdsl: 1
+parameters: {fast: 3}
+inputs:
+  u: {times: [0, 0.2], values: [1, 2], hold: zero}
+automata:
+  leg:
+    parameters: {speed: 1}
+    modes:
+      air: {flow: {s: speed*u}, transitions: [{name: down, when: s >= 0.4, to: ground, reset: {f: s/2}}]}
+      ground:
+        flow: {f: u}
+        transitions: [{name: down, when: f >= 0.5, to: air, reset: {s: 0}}, {name: ends, when: t >= 0.9, to: end}]
+      end: {final: true}
+  body: {modes: {move: {flow: {x: 1 + count(leg.air)}}}}
+system:
+  body: {automaton: body, initial: {x: 0}}
+  leg: {automaton: leg, count: 3, initial: {mode: air, s: index/20}, parameters: {speed: fast + index}}
+experiment: {until: 2}
+"""
+# the run ends in the strip of a transition that is not made
+STRIP = {"scheme": "relaxed", "method": "rk4", "step": 1e-2, "relaxation": 0.1}
+RUNS = [
+    ("centipede", {"until": 0.5}),
+    ("runner", {"until": 1, "scheme": "relaxed", "method": "rk4", "step": 1e-3, "relaxation": 1e-3}),
+    ("ENDING", {}),
+    ("ENDING", {"until": 0.2, **STRIP}),
+]
+
+
+def model_of(name: str) -> hsdsl.Model:
+    return hsdsl.loads(ENDING) if name == "ENDING" else hsdsl.load(MODELS / f"{name}.yaml")
+
+
+@pytest.mark.skipif("gcc" not in COMPILERS, reason="without gcc")
+@pytest.mark.parametrize(("name", "arguments"), RUNS)
+def test_a_program_in_c_prints_product_modes(name, arguments, tmp_path):
+    found = same(tmp_path, model_of(name), COMPILERS["gcc"], **arguments)
+    assert len(found["transitions"]) > 1
+
+
+@in_browser
+def test_a_page_shows_product_modes(tmp_path):
+    model = hsdsl.loads(ENDING)
+    arguments = {"until": 1.0, "method": "dopri5"}
+    with browser() as driver:
+        found = numbers(opened(driver, exported(model, tmp_path, **arguments)))
+        assert not complaints(driver)
+    run = model.simulate(**arguments)
+    assert found["modes"] == [arc.mode for arc in run.arcs]
+    assert [made["edge"] for made in found["transitions"]] == [made.edge for made in run.transitions]
+    for one, other in zip(found["transitions"], run.transitions, strict=True):
+        assert one["before"] == pytest.approx(other.before, rel=1e-9, abs=1e-9)
+        assert one["after"] == pytest.approx(other.after, rel=1e-9, abs=1e-9)
+    final = {state: value for state, value in found["final"].items() if value is not None}
+    assert final.keys() == run.final.state.keys()
