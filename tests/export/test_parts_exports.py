@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from export.c_builds import COMPILERS
+from export.c_builds import COMPILERS, exported
 from export.test_c import same
-from export.web_pages import browser, complaints, exported, in_browser, numbers, opened
+from export.web_pages import browser, complaints, in_browser, numbers, opened
 
 import hsdsl
 
@@ -58,7 +59,7 @@ def test_a_page_shows_product_modes(tmp_path):
     model = hsdsl.loads(ENDING)
     arguments = {"until": 1.0, "method": "dopri5"}
     with browser() as driver:
-        found = numbers(opened(driver, exported(model, tmp_path, **arguments)))
+        found = numbers(opened(driver, next(exported(model, tmp_path, "web", **arguments).glob("*.html"))))
         assert not complaints(driver)
     run = model.simulate(**arguments)
     assert found["modes"] == [arc.mode for arc in run.arcs]
@@ -68,3 +69,31 @@ def test_a_page_shows_product_modes(tmp_path):
         assert one["after"] == pytest.approx(other.after, rel=1e-9, abs=1e-9)
     final = {state: value for state, value in found["final"].items() if value is not None}
     assert final.keys() == run.final.state.keys()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_unit_has_a_mode_for_each_part(version, tmp_path):
+    fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
+    from fmpy.validation import validate_fmu
+
+    model = hsdsl.loads(ENDING)
+    changed = {"initial": {"leg[2].mode": "ground", "leg[2].f": 0.1}}
+    run = model.simulate(**changed)
+    path = str(next(exported(model, tmp_path, f"fmi{version}", **changed).glob("*.fmu")))
+    assert validate_fmu(path) == []
+    kinds = {v.name: (v.variability, v.causality) for v in fmpy.read_model_description(path).modelVariables}
+    modes = [f"leg[{k}].mode" for k in (1, 2, 3)]
+    assert [name for name, kind in kinds.items() if kind == ("discrete", "output")] == modes
+    assert not kinds.keys() & {"leg[1]", "der(leg[1])"}
+    for way, exactly in (("ModelExchange", 1e-5), ("CoSimulation", 1e-9)):
+        found = fmpy.simulate_fmu(path, fmi_type=way, stop_time=0.85, output_interval=0.05, relative_tolerance=1e-10,
+                                  output=["body.x", *modes])  # fmt: skip
+        _, last = np.unique(found["time"][::-1], return_index=True)
+        rows = found[::-1][last]
+        table = run.sample(rows["time"])
+        assert rows["body.x"] == pytest.approx(table["body.x"], abs=exactly)
+        settled = [k for k, t in enumerate(rows["time"]) if min(abs(t - made.time) for made in run.transitions) > 1e-4]
+        for k in settled:
+            numbers = {name: ("air", "ground", "end").index(mode) + 1
+                       for name, mode in (item.split("=") for item in table.mode[k].split()[1:])}  # fmt: skip
+            assert [rows[name][k] for name in modes] == list(numbers.values())

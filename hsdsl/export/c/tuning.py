@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from hsdsl.backends.c import constant_bodies, width
 from hsdsl.export.c.text import array
+from hsdsl.parts import numbered
 from hsdsl.program import Program
 from hsdsl.simulate import Problem
 
@@ -79,10 +80,11 @@ def derivations(problem: Problem) -> str:
         if name in own:
             functions.append(_function(f"parameter_{i}", bodies[f"parameter_{i}"]))
             calls.append(f"  bad |= parameter_{i}(p, p + {i});")
+    kept = {f"initial.{name}" for name in numbered(program.parts)} | overrides.keys()
     start = [
         f"  x[{i}] = out[{program.initial_states.index(name)}];"
         for i, name in enumerate(problem.states)
-        if f"initial.{name}" not in overrides
+        if f"initial.{name}" not in kept
     ]
     functions.append(_function("initial", bodies["initial"]))
     text = _DERIVE.format(calls="\n".join(calls), start="\n".join(start), width=width(program) + 1)

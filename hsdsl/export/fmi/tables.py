@@ -7,6 +7,7 @@ from hsdsl.backends.c.printer import literal
 from hsdsl.export.c.text import array, comment, string
 from hsdsl.export.fmi.variables import Unit, switched
 from hsdsl.lower.slopes import lower_given
+from hsdsl.parts import numbered
 
 _HEADER = """
 #ifndef VARIABLES_H
@@ -17,6 +18,7 @@ _HEADER = """
 enum {{ FMU_TIME, FMU_STATE, FMU_DERIVATIVE, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT, FMU_MODE, FMU_INDICATOR }};
 
 #define FMU_VARIABLES {variables}
+#define FMU_STATES {states} /* those that flow, before the numbers of the modes of parts */
 #define FMU_INPUTS {inputs}
 #define FMU_SLOPES {slopes}
 #define FMU_TOKEN {token}
@@ -63,6 +65,7 @@ def header(unit: Unit, token: str) -> str:
     """The text of ``variables.h``."""
     return comment(unit.source.heading) + _HEADER.format(
         variables=len(unit.variables),
+        states=len(unit.references("state")),
         inputs=len(unit.source.system.inputs),
         slopes=max(len(slopes.places) for slopes in unit.slopes),
         token=string(token),
@@ -82,17 +85,23 @@ def numbers(unit: Unit) -> str:
         array("const fmu_variable", "fmu_variables", variables),
         array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0}"]),
         array("const double", "fmu_input_start", (literal(variable.start or 0.0) for variable in inputs)),
-        array("const double", "fmu_nominal", map(literal, unit.nominals)),
+        array("const double", "fmu_nominal", map(literal, [*unit.nominals, *_ones(unit)])),
         _slopes(unit),
         _given(unit),
     ]
     return "".join(parts)
 
 
+def _ones(unit: Unit) -> list[float]:
+    """A size for each number of a part's mode."""
+    return [1.0] * len(numbered(unit.problem.program.parts))
+
+
 def _slopes(unit: Unit) -> str:
     program = unit.problem.program
-    derivatives, outputs = unit.references("derivative"), unit.references("output")
-    states, inputs = unit.references("state"), unit.references("input")
+    nothing = [len(unit.variables) for _ in _ones(unit)]
+    derivatives, outputs = unit.references("derivative") + nothing, unit.references("output")
+    states, inputs = unit.references("state") + nothing, unit.references("input")
     parts, rows = list[str](), list[str]()
     for k, (mode, slopes) in enumerate(zip(program.flows, unit.slopes, strict=True)):
         own = [program.all_states.index(name) for name in mode.states]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -17,6 +18,7 @@ from hsdsl.execution import Execution
 from hsdsl.export.c.tuning import derived, structural
 from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
+from hsdsl.parts import numbered
 from hsdsl.simulate import Problem
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
@@ -73,8 +75,7 @@ class Unit:
         outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
         surfaces = max(len(mode.edges) + len(mode.walls) for mode in self.problem.program.flows)
         indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
-        listed = "; ".join(f"{k} {mode.name}" for k, mode in enumerate(system.modes))
-        return (*_inputs(self.source), *outputs, Variable("mode", 0, "mode", about=f"the mode: {listed}"), *indicators)
+        return (*_inputs(self.source), *outputs, *_modes(self.source), *indicators)
 
     @property
     def nominals(self) -> list[float]:
@@ -103,7 +104,7 @@ def _time() -> tuple[Variable, ...]:
 def _states(source: Source) -> tuple[Variable, ...]:
     problem, units = source.problem, source.system.units
     start = dict(zip(problem.states, problem.x, strict=True))
-    names = problem.program.all_states
+    names = continuous(source)
     scale = nominals(source)
     states = (
         Variable("state", i, name, units.get(name), float(start.get(name, 0.0)), nominal=scale[i])
@@ -112,10 +113,38 @@ def _states(source: Source) -> tuple[Variable, ...]:
     return (*states, *(Variable("derivative", i, f"der({name})", units.get(name)) for i, name in enumerate(names)))
 
 
+def continuous(source: Source) -> list[str]:
+    """The states of all modes that flow; behind them are the numbers of the modes of parts."""
+    program = source.problem.program
+    hidden = numbered(program.parts)
+    return [name for name in program.all_states if name not in hidden]
+
+
+def _modes(source: Source) -> tuple[Variable, ...]:
+    """The number of the mode, or of a system of parts those of each part's mode, from 1 on, among its states."""
+    system, program = source.system, source.problem.program
+    if not program.parts:
+        return (Variable("mode", 0, "mode", about=f"the mode: {_listed([mode.name for mode in system.modes], 0)}"),)
+    return tuple(
+        Variable(
+            "mode",
+            program.all_states.index(part.name),
+            f"{part.name}.mode",
+            about=f"the mode: {_listed(part.modes, 1)}",
+        )
+        for part in program.parts
+        if part.is_numbered
+    )
+
+
+def _listed(modes: Sequence[str], first: int) -> str:
+    return "; ".join(f"{k} {name}" for k, name in enumerate(modes, first))
+
+
 def nominals(source: Source) -> list[float]:
     """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
     run, given = source.model.simulate(**source.arguments), source.problem.settings.scale
-    return [float(given.get(name) or _power(_size(run, name))) for name in source.problem.program.all_states]
+    return [float(given.get(name) or _power(_size(run, name))) for name in continuous(source)]
 
 
 def _size(run: Execution, name: str) -> float:

@@ -100,7 +100,7 @@ fmi2Status fmi2GetInteger(fmi2Component i, const fmi2ValueReference references[]
   instance *own = i;
   for (size_t k = 0; k < count; k++) {
     if (references[k] >= FMU_VARIABLES || fmu_variables[references[k]].kind != FMU_MODE) return answer(own, FMU_ERROR);
-    values[k] = fmu_mode(own->unit);
+    values[k] = fmu_mode(own->unit, references[k]);
   }
   return fmi2OK;
 }
@@ -212,19 +212,19 @@ fmi2Status fmi2SetTime(fmi2Component i, fmi2Real time) {
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component i, const fmi2Real x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_set_states(((instance *)i)->unit, x);
   return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component i, fmi2Real x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_get_states(((instance *)i)->unit, x);
   return fmi2OK;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component i, fmi2Real slopes[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   return answer(i, fmu_get_derivatives(((instance *)i)->unit, slopes));
 }
 
@@ -234,7 +234,7 @@ fmi2Status fmi2GetEventIndicators(fmi2Component i, fmi2Real z[], size_t count) {
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component i, fmi2Real x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_get_nominals(((instance *)i)->unit, x);
   return fmi2OK;
 }

@@ -147,7 +147,7 @@ fmi3Status fmi3GetInt32(fmi3Instance i, const fmi3ValueReference references[], s
   for (size_t k = 0; k < count; k++) {
     if (length != count || references[k] >= FMU_VARIABLES || fmu_variables[references[k]].kind != FMU_MODE)
       return answer(own, FMU_ERROR);
-    values[k] = fmu_mode(own->unit);
+    values[k] = fmu_mode(own->unit, references[k]);
   }
   return fmi3OK;
 }
@@ -361,19 +361,19 @@ fmi3Status fmi3SetTime(fmi3Instance i, fmi3Float64 time) {
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance i, const fmi3Float64 x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_set_states(((instance *)i)->unit, x);
   return fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance i, fmi3Float64 x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_get_states(((instance *)i)->unit, x);
   return fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance i, fmi3Float64 slopes[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   return answer(i, fmu_get_derivatives(((instance *)i)->unit, slopes));
 }
 
@@ -383,7 +383,7 @@ fmi3Status fmi3GetEventIndicators(fmi3Instance i, fmi3Float64 z[], size_t count)
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance i, fmi3Float64 x[], size_t count) {
-  if (count != PROBLEM_STATES) return answer(i, FMU_ERROR);
+  if (count != FMU_STATES) return answer(i, FMU_ERROR);
   fmu_get_nominals(((instance *)i)->unit, x);
   return fmi3OK;
 }
@@ -396,7 +396,7 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance i, size_t *count) {
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance i, size_t *count) {
   (void)i;
-  *count = PROBLEM_STATES;
+  *count = FMU_STATES;
   return fmi3OK;
 }
 

@@ -163,17 +163,21 @@ fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
   }
 }
 
-int fmu_mode(const fmu *unit) { return unit->now.shows_before ? unit->now.before_mode : unit->now.mode; }
+int fmu_mode(const fmu *unit, unsigned reference) {
+  const fmu_data *now = &unit->now;
+  if (PROBLEM_PARTS) return (int)(now->shows_before ? now->before : now->state)[fmu_variables[reference].index];
+  return now->shows_before ? now->before_mode : now->mode;
+}
 
 void fmu_set_time(fmu *unit, double time) { unit->now.time = time; }
 
-void fmu_set_states(fmu *unit, const double *x) { memcpy(unit->now.state, x, PROBLEM_STATES * sizeof *x); }
+void fmu_set_states(fmu *unit, const double *x) { memcpy(unit->now.state, x, FMU_STATES * sizeof *x); }
 
-void fmu_get_states(const fmu *unit, double *x) { memcpy(x, unit->now.state, PROBLEM_STATES * sizeof *x); }
+void fmu_get_states(const fmu *unit, double *x) { memcpy(x, unit->now.state, FMU_STATES * sizeof *x); }
 
 void fmu_get_nominals(const fmu *unit, double *x) {
   (void)unit;
-  memcpy(x, fmu_nominal, PROBLEM_STATES * sizeof *x);
+  memcpy(x, fmu_nominal, FMU_STATES * sizeof *x);
 }
 
 /* Whether a state is beyond a surface: a flow that has no value there goes on as it was, until the event is found. */
@@ -189,7 +193,7 @@ fmu_status fmu_get_derivatives(fmu *unit, double *slopes) {
   double x[PROBLEM_WIDTH + 1], out[PROBLEM_WIDTH + 1];
   const hs_mode *mode = fmu_table(unit);
   const double *p = fmu_bind(unit);
-  for (int i = 0; i < PROBLEM_STATES; i++) slopes[i] = 0.0;
+  for (int i = 0; i < FMU_STATES; i++) slopes[i] = 0.0;
   if (!p) return FMU_NO_VALUE;
   if (unit->now.ended || !mode->dimension) return FMU_OK;
   fmu_local(unit, x);
@@ -198,7 +202,8 @@ fmu_status fmu_get_derivatives(fmu *unit, double *slopes) {
   if (none && !is_beyond(mode, p, unit->now.time, x)) return FMU_NO_VALUE;
   for (int s = 0; s < mode->dimension; s++) {
     const int state = mode->state[s];
-    slopes[state] = unit->slopes[state] = none ? unit->slopes[state] : out[s];
+    unit->slopes[state] = none ? unit->slopes[state] : out[s];
+    if (state < FMU_STATES) slopes[state] = unit->slopes[state];
   }
   return FMU_OK;
 }

@@ -50,7 +50,7 @@ void fmu_reset(fmu *unit);
 
 fmu_status fmu_get(fmu *unit, unsigned reference, double *value);
 fmu_status fmu_set(fmu *unit, unsigned reference, double value);
-int fmu_mode(const fmu *unit);
+int fmu_mode(const fmu *unit, unsigned reference); /* of a variable of the kind FMU_MODE */
 
 void fmu_set_time(fmu *unit, double time);
 void fmu_set_states(fmu *unit, const double *x);
