@@ -10,10 +10,11 @@ from hsdsl.expression import symbolic
 from hsdsl.expression.inequality import the_comparison
 from hsdsl.expression.parse import parse
 from hsdsl.expression.scope import Function, Scope, state
-from hsdsl.expression.syntax import Name, Tree, walk
+from hsdsl.expression.syntax import Call, Expected, Name, Tree, mapped, walk
 from hsdsl.functions import CONSTANTS
 
 _NONE: dict[str, Function] = {}
+RANGES = ("sum", "min", "max", "count")  # that one argument may range over instances of parts
 
 
 def names_in(text: str) -> list[str]:
@@ -26,27 +27,40 @@ def value(text: str, functions: Mapping[str, Function] = _NONE) -> Any:
 
     Raises ExpressionError: a function that there is not, a constant without a value, too large.
     """
-    tree = parse(text)
+    tree = _parsed(text)
     return symbolic.number(tree, _scope(tree, functions), text).expr
 
 
 def condition(text: str, functions: Mapping[str, Function] = _NONE) -> Any:
     """The SymPy Boolean; errors as for :func:`value`."""
-    tree = parse(text, "condition")
+    tree = _parsed(text, "condition")
     return symbolic.condition(tree, _scope(tree, functions), text)
 
 
 def inequality(text: str, functions: Mapping[str, Function] = _NONE) -> tuple[Any, str, Any]:
     """Both sides of an inequality with its sign; errors as for :func:`value`."""
-    tree = parse(text, "inequality")
+    tree = _parsed(text, "inequality")
     comparison, scope = the_comparison(tree, "when", text), _scope(tree, functions)
     left, right = (symbolic.number(side, scope, text).expr for side in comparison.operands)
     return left, comparison.operators[0], right
 
 
+def _parsed(text: str, expected: Expected = "number") -> Tree:
+    """The tree of a text, in which a sum over instances of parts is one name."""
+
+    def whole(tree: Tree) -> Tree:
+        inside = text[tree.start : tree.end]
+        if isinstance(tree, Call) and tree.function in RANGES and len(tree.arguments) == 1 and "." in inside:
+            return Name(inside, tree.start, tree.end)
+        return mapped(tree, whole)
+
+    tree = parse(text, expected)
+    return whole(tree) if "." in text else tree
+
+
 def _scope(tree: Tree, functions: Mapping[str, Function]) -> Scope:
     named = {node.name: state(node.name) for node in walk(tree) if isinstance(node, Name)}
-    scope = Scope({**named, **functions})
+    scope = Scope({**named, **functions}, expanded=(lambda t: t) if any("." in name for name in named) else None)
     if faults := scope.faults(tree):
         raise faults[0]
     return scope

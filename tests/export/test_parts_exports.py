@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from export.c_builds import COMPILERS, exported
 from export.test_c import same
+from export.test_latex import check
 from export.web_pages import browser, complaints, in_browser, numbers, opened
 
 import hsdsl
+from hsdsl.export import files_of, source_of
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 ENDING = """
@@ -97,3 +99,26 @@ def test_a_unit_has_a_mode_for_each_part(version, tmp_path):
             numbers = {name: ("air", "ground", "end").index(mode) + 1
                        for name, mode in (item.split("=") for item in table.mode[k].split()[1:])}  # fmt: skip
             assert [rows[name][k] for name in modes] == list(numbers.values())
+
+
+@pytest.mark.parametrize("name", ["rooms", "runner", "ENDING"])
+def test_documents_show_automata_and_connections(name):
+    source = source_of(model_of(name), {})
+    (text,) = (content.decode() for content in files_of(source, "latex").values())
+    check(text)
+    (diagram,) = (content.decode() for content in files_of(source, "mermaid").values())
+    arrows = [line.split(" : ", 1)[1] for line in diagram.splitlines() if line.startswith("    i") and "-->" in line]
+    expected = {
+        "rooms": ["left #61; room#91;index - 1#93;.T", "right #61; room#91;index + 1#93;.T"],
+        "ENDING": ["leg.air"],
+    }
+    assert name not in expected or arrows == expected[name]
+    for part in source.system.parts:
+        for mode in part.modes:
+            assert mode in text and f": {mode}" in diagram
+
+
+@pytest.mark.parametrize("target", ["jax", "matlab", "rust"])
+def test_other_targets_refuse_parts(target):
+    with pytest.raises(hsdsl.UsageError, match="parts"):
+        files_of(source_of(model_of("rooms"), {}), target)

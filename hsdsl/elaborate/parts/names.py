@@ -17,13 +17,13 @@ from hsdsl.elaborate.parts.instances import Instance, Roster
 from hsdsl.elaborate.resolver import resolved_expression
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression import ExpressionError, parse, selection, syntax
+from hsdsl.expression.plain import RANGES
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
 from hsdsl.names import SINCE, did_you_mean
 from hsdsl.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
-_RANGES = ("sum", "min", "max", "count")
 _IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
 
 
@@ -310,7 +310,7 @@ class Names(Mapping[str, Meaning]):
 
     def expanded(self, tree: Tree) -> Tree:
         """The same expression with sums over instances written out."""
-        if isinstance(tree, Call) and tree.function in _RANGES and len(tree.arguments) == 1:
+        if isinstance(tree, Call) and tree.function in RANGES and len(tree.arguments) == 1:
             found = self._range(tree, tree.arguments[0])
             if found is not None:
                 return found

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from hsdsl.elaborate.functions import named_functions
 from hsdsl.errors import UsageError
+from hsdsl.export.latex.automata import of_parts
 from hsdsl.export.latex.escaping import escaped
+from hsdsl.export.latex.layout import equations, stacked
 from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
 from hsdsl.expression.plain import names_in
 from hsdsl.expression.scope import state
 from hsdsl.system import Edge, HybridSystem, Mode
 
-WIDEST = 90  # signs of a formula that fit into a line, roughly: a longer one is a paragraph that breaks by itself
-_COMMAND = re.compile(r"\\[A-Za-z]+|[{}^_ ]")
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[margin=25mm]{geometry}
 \usepackage{amsmath}
@@ -46,6 +45,8 @@ def document(source: Source) -> str:
     lines += [escaped(system.source), ""] if system.source else []
     lines += _parameters(source, math)
     lines += _inputs(system, math)
+    if system.parts:
+        return "\n".join([*lines, *of_parts(source, math), *_settings(source), r"\end{document}", ""])
     shared = _where(system, None, [text for mode in system.modes for text in _texts(mode)], math)
     lines += [r"\subsection*{Definitions}", *shared] if shared else []
     for mode in system.modes:
@@ -63,10 +64,11 @@ def _names(system: HybridSystem) -> Iterable[str]:
 
 
 def _parameters(source: Source, math: Mathematics) -> list[str]:
-    if not source.system.parameters:
+    own = [p for p in source.system.parameters if "." not in p.name]  # others are those of parts
+    if not own:
         return []
     given = source.problem.settings.overrides
-    values = [(p, math.expression(str(given.get(p.name, p.text)))) for p in source.system.parameters]
+    values = [(p, math.expression(str(given.get(p.name, p.text)))) for p in own]
     columns = [("symbol", [rf"\({math.name(p.name)}\)" for p, _ in values])]
     columns += [("value", [rf"\({value}\)" for _, value in values])]
     columns += [("unit", [escaped(p.unit or "") for p, _ in values])]
@@ -98,11 +100,11 @@ def _mode(system: HybridSystem, mode: Mode, math: Mathematics) -> list[str]:
     if mode.states:
         lines.append("States " + ", ".join(_state(system, math, name) for name in mode.states) + ".")
     flow = zip(mode.states, mode.flow_texts, strict=True)
-    lines += _equations([(rf"\dot{{{math.name(s)}}}", math.expression(text)) for s, text in flow])
+    lines += equations([(rf"\dot{{{math.name(s)}}}", math.expression(text)) for s, text in flow])
     own = _where(system, mode.name, _texts(mode), math)
     lines += ["with", *own] if own else []
     if mode.walls:
-        lines += ["The flow is meant where", *_stacked([math.inequality(wall.text) for wall in mode.walls])]
+        lines += ["The flow is meant where", *stacked([math.inequality(wall.text) for wall in mode.walls])]
     if mode.edges:
         lines.append(r"\begin{itemize}")
         for edge in mode.edges:
@@ -136,7 +138,7 @@ def _where(system: HybridSystem, mode: str | None, texts: Iterable[str], math: M
             needed.add(name)
             waiting += names_in(known[name].text)
     used = [definition for definition in known.values() if definition.name in needed and definition.mode == mode]
-    return _equations([(math.name(d.name), math.expression(d.text)) for d in used])
+    return equations([(math.name(d.name), math.expression(d.text)) for d in used])
 
 
 def _edge(edge: Edge, math: Mathematics) -> list[str]:
@@ -146,21 +148,7 @@ def _edge(edge: Edge, math: Mathematics) -> list[str]:
     changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in resets if text != name]
     priority = f", with priority {edge.priority}" if edge.priority else ""
     line = rf"\item \textbf{{{escaped(edge.name)}}} to {escaped(edge.target)}, {when}{condition}{priority}"
-    return [line + (":" if changed else "."), *_equations(changed)]
-
-
-def _equations(pairs: list[tuple[str, str]]) -> list[str]:
-    """Equations below each other, aligned; where one is too long for that, each is a paragraph."""
-    if not pairs:
-        return []
-    if any(len(_COMMAND.sub("", left + right)) > WIDEST for left, right in pairs):
-        return [r"\begin{flushleft}", *(rf"\({left} = {right}\)\par" for left, right in pairs), r"\end{flushleft}"]
-    rows = [rf"{left} &= {right}" for left, right in pairs]
-    return [r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}"]
-
-
-def _stacked(formulas: list[str]) -> list[str]:
-    return [r"\begin{gather*}", " \\\\\n".join(formulas), r"\end{gather*}"]
+    return [line + (":" if changed else "."), *equations(changed)]
 
 
 def _run(source: Source, math: Mathematics) -> list[str]:
@@ -174,5 +162,9 @@ def _run(source: Source, math: Mathematics) -> list[str]:
         value = initial.get(name, number) if text is None else None
         values.append((rf"{math.name(name)}(0)", math.expression(str(text)) if value is None else math.number(value)))
     start = escaped(problem.program.modes[problem.mode].name)
-    lines = [r"\subsection*{Run}", rf"It starts in mode {start}" + (" at" if values else "."), *_equations(values)]
-    return [*lines, *(rf"{escaped(line)}. \par" for line in source.heading[-3:] if line.startswith(("scheme", "with")))]
+    lines = [r"\subsection*{Run}", rf"It starts in mode {start}" + (" at" if values else "."), *equations(values)]
+    return [*lines, *_settings(source)]
+
+
+def _settings(source: Source) -> list[str]:
+    return [rf"{escaped(line)}. \par" for line in source.heading[-3:] if line.startswith(("scheme", "with"))]

@@ -36,6 +36,10 @@ class Mathematics:
         """A name."""
         return self.names[name]
 
+    def symbol(self, name: str) -> str:
+        """A name as it is in an expression, also one of an automaton."""
+        return self.printer.doprint(symbol(name))
+
     def expression(self, text: str) -> str:
         """An expression, as it was written."""
         return self.printer.doprint(plain.value(text, self.functions))
@@ -78,6 +82,14 @@ def _word(word: str) -> str:
 class _Printer(LatexPrinter):
     def __init__(self, names: dict[Any, str]) -> None:
         super().__init__({"symbol_names": names, "ln_notation": False, "mul_symbol": r"\,"})
+
+    def _print_Symbol(self, expr: Any, style: str = "plain") -> str:
+        if expr in self._settings["symbol_names"]:
+            return super()._print_Symbol(expr, style)
+        base, dot, attribute = expr.name.rpartition(".")  # of an instance, or a sum over several
+        if "(" in expr.name:
+            return rf"\text{{{escaped(expr.name)}}}"
+        return _form(expr.name) if not dot else rf"\text{{{escaped(base)}}}.{_form(attribute)}"
 
     def _print_Rational(self, expr: Any) -> str:
         p, q = int(expr.p), int(expr.q)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import Any
 
+from hsdsl.export.automata import Automata, automata_of, pairs
 from hsdsl.export.source import Source
 from hsdsl.names import visible
 from hsdsl.system import Edge, Mode
@@ -24,6 +27,8 @@ def diagram(source: Source) -> str:
     """
     numbers = {mode.name: f"m{k}" for k, mode in enumerate(source.system.modes)}
     lines = [*(f"%% {_comment(line)}" for line in source.heading), "stateDiagram-v2"]
+    if source.system.parts:
+        return "\n".join([*lines, *_automata(automata_of(source))]) + "\n"
     for mode in source.system.modes:
         lines.append(f"    {numbers[mode.name]} : {_label(_mode_lines(mode))}")
     lines.append(f"    [*] --> {numbers[source.system.modes[source.problem.mode].name]}")
@@ -31,6 +36,40 @@ def diagram(source: Source) -> str:
         lines += [f"    {numbers[mode.name]} --> {numbers[e.target]} : {_label(_edge_lines(e))}" for e in mode.edges]
         lines += [f"    {numbers[mode.name]} --> [*]"] if mode.final else []
     return "\n".join(lines) + "\n"
+
+
+def _automata(found: Automata) -> Iterator[str]:
+    """Each automaton with its modes in it, then the instances with an arrow from each that others depend on."""
+    for a, automaton in enumerate(found.automata):
+        shared = [f"{name} = {text}" for name, text in (*automaton.parameters, *pairs(automaton.document.let))]
+        yield f"    a{a} : {_label([automaton.name, *shared])}"
+        yield f"    state a{a} {{"
+        names = {name: f"a{a}m{k}" for k, (name, _) in enumerate(automaton.modes)}
+        for name, mode in automaton.modes:
+            flow = [f"d{state}/dt = {text}" for state, text in pairs(mode.flow or {})]
+            own = [f"{key} = {text}" for key, text in pairs(mode.let)]
+            walls = [f"domain {scalar.value}" for scalar in mode.domain]
+            yield f"        {names[name]} : {_label([name, *flow, *own, *walls])}"
+        for name, mode in automaton.modes:
+            for made in mode.transitions:
+                target = made.to.value if made.to else name
+                yield f"        {names[name]} --> {names[target]} : {_label(_transition_lines(made))}"
+            if mode.final:
+                yield f"        {names[name]} --> [*]"
+        yield "    }"
+    for k, group in enumerate(found.groups):
+        settings = [f"{name} = {text}" for name, text in group.settings]
+        ends = [f"at the ends {name} = {text}" for name, text in group.ends]
+        yield f"    i{k} : {_label([f'{group.label}, {group.given.automaton.value}', *settings, *ends])}"
+    for one, other, label in found.links():
+        yield f"    i{one} --> i{other} : {_label([label])}"
+
+
+def _transition_lines(made: Any) -> list[str]:
+    name = [made.name.value] if made.name else []
+    fires = [f"when {made.when.value}"] if made.when else [f"with {made.on.value}"] if made.on else []
+    condition = [f"if {made.condition.value}"] if made.condition else []
+    return [*name, *fires, *condition, *(f"{state} := {text}" for state, text in pairs(made.reset))]
 
 
 def _mode_lines(mode: Mode) -> list[str]:
