@@ -5,6 +5,7 @@ One thread draws for all work of the process; work that is over sooner costs a f
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Generator
@@ -37,6 +38,18 @@ _works: list[_Work] = []
 _threads: list[Thread] = []
 
 
+def _begin_anew() -> None:
+    """Forget the works of the process that this one was forked from, and a lock that one of its threads held."""
+    global _lock, _some
+    _lock, _some = RLock(), Event()
+    _works.clear()
+    _threads.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_begin_anew)
+
+
 @contextmanager
 def ticking(draw: Draw) -> Generator[Show]:
     """Draw the latest text now and then while the block runs, and None at its end where any was drawn.
@@ -46,7 +59,7 @@ def ticking(draw: Draw) -> Generator[Show]:
     work = _Work(draw)
     with _lock:
         _works.append(work)
-        if not any(thread.is_alive() for thread in _threads):  # the first time, and in a process that was forked
+        if not any(thread.is_alive() for thread in _threads):
             _threads[:] = [Thread(target=_tick, daemon=True)]
             _threads[0].start()
     _some.set()

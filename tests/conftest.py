@@ -8,22 +8,20 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-ROOM = 4 << 30  # bytes of addresses for a process of tests, and for each that it starts; memory in use is far less
+ROOM = 4 << 30  # bytes of addresses that a test may take, and each process that it starts; memory in use is far less
 
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
 
-def pytest_sessionstart() -> None:
+def pytest_runtest_setup() -> None:
     """Let a test that would fill the memory fail, rather than the machine."""
     if sys.platform == "linux":
         import resource
 
-        np.linalg.inv(np.eye(2))  # with what the libraries take for each core
         taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         _, most = resource.getrlimit(resource.RLIMIT_AS)
         wanted = taken + ROOM
