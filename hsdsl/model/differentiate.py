@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import Number
@@ -13,7 +14,9 @@ from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.pipeline import Pipeline
 from hsdsl.model.settings import arithmetic_of
-from hsdsl.model.values import Values, initial_layout, with_parameters
+from hsdsl.model.values import Values, initial_layout, start_of_parts, with_parameters
+from hsdsl.model.visible import visible_run
+from hsdsl.parts import Part, present
 from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
@@ -76,15 +79,22 @@ class Differentiator:
 
         call = located_arguments(self.pipeline, arguments)
         plain = self.pipeline.prepare(call)
-        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        parameters = overrides_of(call, "parameters")
+        initial = start_of_parts(self.pipeline.program, overrides_of(call, "initial"))
         values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
-        by = targets(wrt, self.pipeline.program, initial_layout(values, initial)[1])
+        by = targets(wrt, self.pipeline.program, started_with(values, initial))
         given: dict[str, Any] = dict(call.get("settings") or {})
         experiment = {k: given.get(k) if call.get(k) is None else call[k] for k in ("until", "samples")}
         change = overridden(self.pipeline.system, parameters, initial, experiment)
         span, samples = moving_times(change, by, values)
         setting = Setting(
-            plain, plain, self.pipeline.program.outputs, span, samples, moving_parameters(change, by, values)
+            plain,
+            plain,
+            self.pipeline.program.outputs,
+            span,
+            samples,
+            moving_parameters(change, by, values),
+            partial(visible_run, prepared=plain),
         )
         return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
 
@@ -124,7 +134,7 @@ class Differentiator:
             "max_transitions": settings.max_transitions,
             "completion": "none",  # derivatives end where the run leaves the theorem
             "parameters": ready.change.parameters | numbers,
-            "initial": ready.change.initial,
+            "initial": with_mode_names(self.pipeline.program.parts, ready.change.initial),
             "engine": ready.call.get("engine") or "auto",
             "precision": ready.call.get("precision"),
         }
@@ -143,6 +153,20 @@ class _Ready:
     firsts: tuple[str, ...]
     exact: bool
     entries: bool = False
+
+
+def started_with(values: Values, initial: Mapping[str, Any]) -> list[str]:
+    """The states that the initial mode has, of a system of parts those of its product mode."""
+    states, parts = initial_layout(values, initial)[1], values.program.parts
+    own = present(parts, {part.name: part.start + 1 for part in parts} | dict(initial))
+    return [name for name in states if not parts or name in own]
+
+
+def with_mode_names(parts: Sequence[Part], initial: Mapping[str, Any]) -> dict[str, Any]:
+    """Overrides of the start with the modes of parts by name, as a call has them."""
+    modes = {part.name: part.modes for part in parts if part.name in initial}
+    given = {f"{name}.mode": own[int(initial[name]) - 1] for name, own in modes.items()}
+    return given | {name: value for name, value in initial.items() if name not in modes}
 
 
 def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -205,7 +205,6 @@ class Model:
 
     def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
         """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
-        self._flat("derivatives, fits, orbits and their stability")
         given = {"completion": arguments.get("completion")}
         options = self.resolve(arguments.get("settings"), given)
         return self.sliding if options.values["completion"].value == "auto" else self
@@ -322,6 +321,7 @@ class Model:
         """
         from hsdsl.model.nearby import orbital_stability
 
+        self._flat("orbital stability from runs nearby")
         with in_notebook() as show:
             progress = progress or counted(show, "runs")
             return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)

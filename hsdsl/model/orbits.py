@@ -22,11 +22,12 @@ from hsdsl.orbits.continuation import Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
 from hsdsl.orbits.section import NoReturn, Return, Section
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
+from hsdsl.parts import numbers_of
 from hsdsl.sensitivity.result import Sensitivity
 from hsdsl.simulate.surfaces import TIE
 
 if TYPE_CHECKING:
-    from hsdsl.execution import Array
+    from hsdsl.execution import Array, Transition
     from hsdsl.model.model import Model
 
 REFUSED = ("step", "scheme", "samples", "precision")
@@ -34,13 +35,20 @@ MOST_GUESSES = 6
 SHRUNK = 1e-6  # a period below this share of the guess is none
 
 
+Entered = tuple[str, tuple[str, ...]]
+
+
 @dataclass(frozen=True)
 class Guess:
-    """A state after a transition of the section, at a time, and how long it took to come back."""
+    """A state after a transition of the section, at a time, and how long it took to come back.
+
+    ``entered`` has its mode and the states of that.
+    """
 
     point: Array
     phase: float
     time: float
+    entered: Entered
 
 
 class Orbits:
@@ -60,6 +68,7 @@ class Orbits:
         self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
         self._parameters = overrides_of(arguments, "parameters")
         self._stiff = False
+        self._at: Entered | None = None  # the product mode of a system of parts
 
     def forcing(self, parameters: Mapping[str, Any]) -> float | None:
         """The period of the forcing with these parameters."""
@@ -90,10 +99,13 @@ class Orbits:
             initial = {"mode": mode, **start}
             return self._moving.sensitivity(wrt, until=until, initial=initial, parameters=given, **arguments)
 
-        return Section(self.edge, mode, states, self.laps, self._phase, run)
+        parts = self.model.program.parts
+        return Section(self.edge, mode, states, self.laps, self._phase, run, numbers_of(parts, mode) if parts else {})
 
-    def _entered(self) -> tuple[str, tuple[str, ...]]:
+    def _entered(self) -> Entered:
         """The mode and the states that a lap begins with; after a final mode without a flow, those of the start."""
+        if self._at is not None:
+            return self._at
         program = self.model.program
         edge = next(e for m in program.modes for e in m.edges if e.name == self.edge)
         target = program.modes[edge.target]
@@ -109,24 +121,34 @@ class Orbits:
 
     def guesses(self, run: Execution) -> list[Guess]:
         """States after the section's transitions in a run, those first that a lap changes least."""
-        mode, states = self._entered()
         passed = [made for made in run.transitions if made.edge == self.edge and made.after is not None]
-        points = [np.array([made.after[x] for x in states], float) for made in passed if made.after]
+        places = [self._entered_by(made) for made in passed]
+        points = [np.array([(made.after or {})[x] for x in states], float)
+                  for made, (_, states) in zip(passed, places, strict=True)]  # fmt: skip
         times = [float(made.time) for made in passed]
-        size = np.max(np.abs(points), axis=0) if points else np.zeros(0)
-        size = np.where(size > 0, size, 1.0)
         found: list[tuple[float, Guess]] = []
-        for k in range(len(points) - self.laps):
-            change = float(np.max(np.abs(points[k + self.laps] - points[k]) / size))
-            found.append((change, Guess(points[k], times[k], times[k + self.laps] - times[k])))
+        for k, place in enumerate(places[: -self.laps]):
+            if places[k + self.laps] == place:
+                alike = [point for other, point in zip(places, points, strict=True) if other == place]
+                size = np.max(np.abs(alike), axis=0)
+                moved = np.abs(points[k + self.laps] - points[k]) / np.where(size > 0, size, 1.0)
+                change = float(np.max(moved, initial=0.0))
+                found.append((change, Guess(points[k], times[k], times[k + self.laps] - times[k], place)))
         first = run.arcs[0]
-        if points and first.mode == mode:  # the run may begin on the orbit
-            found.append((np.inf, Guess(np.array(run.values[0][: len(states)], float), 0.0, times[0])))
+        for place in dict.fromkeys(places[:1]):
+            if first.mode == place[0]:  # the run may begin on the orbit
+                found.append((np.inf, Guess(np.array(run.values[0][: len(place[1])], float), 0.0, times[0], place)))
         if len(points) == 1:
-            found.append((np.inf, Guess(points[0], times[0], times[0])))
+            found.append((np.inf, Guess(points[0], times[0], times[0], places[0])))
         least = run.settings["until"] * TIE
         lasting = [(change, guess) for change, guess in found if guess.time > least]
         return [guess for _, guess in sorted(lasting, key=lambda each: each[0])][:MOST_GUESSES]
+
+    def _entered_by(self, made: Transition) -> Entered:
+        """The mode and the states that a transition of the section leads to."""
+        if not self.model.program.parts:
+            return self._entered()
+        return made.target, tuple(made.after or {})
 
     def find(self) -> Orbit:
         """Find the orbit that the model's own run comes closest to.
@@ -138,8 +160,9 @@ class Orbits:
         guesses = self.guesses(run)
         ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
         if not guesses:
-            made = sum(made.edge == self.edge for made in run.transitions)
-            how = "makes the transition {} at one instant only" if made else "does not make the transition {}"
+            targets = [made.target for made in run.transitions if made.edge == self.edge]
+            how = "makes the transition {} at one instant only" if targets else "does not make the transition {}"
+            how = "makes the transition {} into other modes of parts each time" if len(set(targets)) > 1 else how
             raise UsageError(
                 f"the run {how.format(self.edge)} up to t = {run.times[-1]:g}{ending or f' ({run.stop.reason})'}",
                 "choose another section, a later end, or other initial values",
@@ -165,6 +188,7 @@ class Orbits:
 
         Raises NotClosed: there is none.
         """
+        self._at = guess.entered
         forcing = self.forcing(parameters)
         multiple = None if forcing is None else forcing * max(1, round(guess.time / forcing))
         phase = guess.phase if forcing is None else guess.phase % forcing

@@ -44,6 +44,7 @@ class Section:
 
     ``edge`` is its transition, ``mode`` and ``states`` those it leads to, ``laps`` how many transitions of it close an
     orbit. ``phase`` is the name of the parameter of the phase, None where the system does not depend on time.
+    ``numbers`` has those of the modes of parts, which an orbit comes back to.
     """
 
     edge: str
@@ -52,6 +53,7 @@ class Section:
     laps: int
     phase: str | None
     run: Differentiate
+    numbers: Mapping[str, int]
 
     def follow(self, point: Array, phase: float, horizon: float, parameter: str | None = None) -> Return:
         """Make the map at a point.
@@ -78,6 +80,8 @@ class Section:
     def _return(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Return:
         made = found.execution.transitions[index]
         assert made.after is not None
+        if any(int(made.after[part]) != number for part, number in self.numbers.items()):
+            raise NoReturn(f"a run from there comes back to {self.edge} in other modes of parts: try more laps")
         point = np.array([made.after[x] for x in self.states], float)
         slopes = self.slopes(found.as_made(), index, wrt, parameter)
         if not np.isfinite(slopes).all():

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
+from hsdsl.parts import numbered
 from hsdsl.program import Program
 
 INITIAL = "initial."
@@ -27,6 +28,8 @@ def targets(wrt: str | Sequence[str], program: Program, states: Sequence[str]) -
     Raises UsageError: a name that is neither, or none at all.
     """
     given = [name.strip() for text in ([wrt] if isinstance(wrt, str) else wrt) for name in text.split(",")]
+    hidden = numbered(program.parts)
+    states = [name for name in states if name not in hidden]
     labels = list(dict.fromkeys(name for name in given if name))
     if not labels:
         raise UsageError("expected names to differentiate by, got none", "for example c or initial.v")

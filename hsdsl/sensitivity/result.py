@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
+from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import parted
 from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
 from hsdsl.sensitivity.ties import Tie, ties
@@ -60,7 +61,7 @@ class Setting:
     """What a sensitivity was computed of: the run without derivatives, ready to be made, and what moves with a target.
 
     ``span`` has the derivatives of ``until``, and ``samples`` those of each sample time; empty where none moves.
-    ``parameters`` has those of all parameters by each target.
+    ``parameters`` has those of all parameters by each target. ``shown`` is what readers see of the run.
     """
 
     plain: Prepared
@@ -69,6 +70,7 @@ class Setting:
     span: Slopes
     samples: Sequence[Slopes]
     parameters: Mapping[str, Sequence[Any]]
+    shown: Callable[[Execution], Execution]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +100,17 @@ class Sensitivity:
     @cached_property
     def run(self) -> Execution:
         """The execution itself."""
+        return self.setting.shown(self._whole)
+
+    @cached_property
+    def _whole(self) -> Execution:
+        """The execution, with the numbers of the modes of parts."""
         return self.setting.plain.simulate()
 
     @property
     def verdict(self) -> Verdict:
         """What can be said about the execution; where it is not ``holds`` a derivative may not exist."""
-        return self.run.verdict
+        return self._whole.verdict
 
     @cached_property
     def ties(self) -> tuple[Tie, ...]:
@@ -158,14 +165,14 @@ class Sensitivity:
     @cached_property
     def touches(self) -> tuple[str, ...]:
         """Guards that the run touches within its error, without a transition: no derivative exists from there on."""
-        return tuple(reason for _, reason in touched(RunView(self.setting.plain, self.run)))
+        return tuple(reason for _, reason in touched(RunView(self.setting.plain, self._whole)))
 
     @cached_property
     def _smooth(self) -> Verdict:
         """The verdict of the run where motion along surfaces counts as the flow of a mode of the system."""
-        if self.verdict.theorem == "holds" or self.run.assessment is None:
+        if self.verdict.theorem == "holds" or self._whole.assessment is None:
             return self.verdict
-        return self.run.assessment(self.run, None, True)
+        return self._whole.assessment(self._whole, None, True)
 
     @property
     def exists(self) -> bool | None:
@@ -195,10 +202,11 @@ class Sensitivity:
         exists = not self.breaks
         state = self._followed(end.mode, end.time, end.state, time, True)
         outputs = {y: self._output(y, end.outputs, time) for y in self.setting.output_names}
+        mode, own = self._shown(end.mode, end.state)
         return EndSlopes(
-            end.mode,
+            mode,
             self._known(time, exists),
-            {x: self._known(row, exists) for x, row in state.items()},
+            {x: self._known(row, exists) for x, row in state.items() if x in own},
             {y: self._known(row, exists) for y, row in outputs.items()},
         )
 
@@ -216,9 +224,16 @@ class Sensitivity:
             made.index,
             made.edge,
             self._known(time, exists),
-            {x: self._known(row, exists) for x, row in before.items()},
-            {x: self._known(row, exists) for x, row in reached.items()},
+            {x: self._known(row, exists) for x, row in before.items() if x in self._shown("", made.before)[1]},
+            {x: self._known(row, exists) for x, row in reached.items() if x in self._shown("", after)[1]},
         )
+
+    def _shown(self, mode: str, state: Mapping[str, Any]) -> tuple[str, Collection[str]]:
+        """The name of a mode and its states; of a system of parts those of the product mode at a state."""
+        parts = self.setting.plain.program.parts
+        if not parts or not state:
+            return mode, state
+        return product_name(parts, state), present(parts, state)
 
     def _known(self, row: Slopes, exists: bool) -> Slopes:
         return row if exists else dict.fromkeys(row, float("nan"))
@@ -269,6 +284,7 @@ class Sensitivity:
             listed = [end * k / (given - 1) for k in range(given)] if isinstance(given, int) else list(given or ())
             times = np.array([t for t in listed if t <= last])
         table = run.sample(times)
+        there = self._presence(table)
         names = [*self._all_states(), *self.setting.output_names]
         broken = min((when for when, _ in self.breaks), default=None)
         slopes: dict[str, Array] = {}
@@ -278,9 +294,22 @@ class Sensitivity:
                 rates = self._rates(name, table)
                 shift = np.array([[row[by] for by in self.wrt] for row in moving[: len(rates)]])
                 slopes[name] = slopes[name] + rates[:, None] * shift
+            if name in there:
+                slopes[name][~there[name]] = np.nan
             if broken is not None:
                 slopes[name][np.asarray(table.time) >= broken] = np.nan
-        return SampleSlopes(np.asarray(table.time), {name: table[name] for name in names}, slopes)
+        values = {n: np.where(there[n], table[n], np.nan) if n in there else table[n] for n in names}
+        return SampleSlopes(np.asarray(table.time), values, slopes)
+
+    def _presence(self, table: Samples) -> dict[str, Array]:
+        """Of a system of parts, at which samples the product mode has each state that some modes lack."""
+        found: dict[str, Array] = {}
+        for part in self.setting.plain.program.parts:
+            for name in {x for states in part.states for x in states} if part.is_numbered else ():
+                having = [k for k, states in enumerate(part.states, 1) if name in states]
+                if len(having) < len(part.modes):
+                    found[name] = np.isin(np.asarray(table[part.name], float), having)
+        return found
 
     def _column(self, table: Samples, name: str, by: str) -> Array:
         """A derivative at samples: zero in modes that leave it out, NaN in those without the state."""
@@ -306,4 +335,5 @@ class Sensitivity:
         return np.array(rates)
 
     def _all_states(self) -> Iterator[str]:
-        yield from dict.fromkeys(x for arc in self.execution.arcs for x in own(arc.states))
+        hidden = numbered(self.setting.plain.program.parts)
+        yield from dict.fromkeys(x for arc in self.execution.arcs for x in own(arc.states) if x not in hidden)

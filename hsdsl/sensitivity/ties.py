@@ -68,7 +68,6 @@ def _others(run: RunView, made: Transition) -> tuple[str, ...]:
     if not made.alternatives:
         return ()
     place, own = run.before(made)
-    names = run.edges(made.source)
     slopes = [gradient(place.t, *place.x) for gradient in place.kernel.gradients]
     least = run.arithmetic.sqrt(run.arithmetic.unit)
 
@@ -76,16 +75,16 @@ def _others(run: RunView, made: Transition) -> tuple[str, ...]:
         pairs = zip(slopes[own], slopes[k], strict=True)
         return all(abs(a - b) <= least * max(abs(a), abs(b)) for a, b in pairs)
 
-    return tuple(edge for edge in made.alternatives if not same(names.index(edge)))
+    return tuple(edge for edge in made.alternatives if not same(run.edge_at(place, edge)))
 
 
 def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[str]) -> Tie:
     place, _ = run.before(made)
-    since, names = 2 * run.tie(made.time), run.edges(made.source)
+    since = 2 * run.tie(made.time)
     orders: list[Order] = []
     for edge in (made.edge, *others):
         try:
-            landed = settle(run, place, names.index(edge), since)
+            landed = settle(run, place, run.edge_at(place, edge), since)
         except DOMAIN_ERRORS:
             landed = None
         if landed is not None:

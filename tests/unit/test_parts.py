@@ -11,6 +11,8 @@ import pytest
 from engines import COMPILER
 
 import hsdsl
+from hsdsl.elaborate.product import flat_part
+from hsdsl.simulate.verdict.run_view import RunView
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 ENGINES = ("python", *(["c"] if COMPILER else []))
@@ -351,8 +353,6 @@ def test_distances_are_those_of_the_flat_model():
 
 
 def test_the_flat_part_of_visited_modes_has_the_same_execution():
-    from hsdsl.elaborate.product import flat_part
-
     model = hsdsl.loads(WALKER)
     run = model.simulate(until=1.2)
     flat = hsdsl.Model(flat_part(model.system, [arc.mode for arc in run.arcs])).simulate(until=1.2)
@@ -362,14 +362,13 @@ def test_the_flat_part_of_visited_modes_has_the_same_execution():
     assert flat.final.state == pytest.approx(run.final.state, abs=1e-12)
 
 
-@pytest.mark.parametrize("what", ["orbit", "sensitivity", "stream", "point", "complete", "export"])
+@pytest.mark.parametrize("what", ["stability", "stream", "point", "complete", "export"])
 def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
     from hsdsl.export import files_of, source_of
 
     model = hsdsl.loads(ROOMS)
     calls = {
-        "orbit": lambda: model.orbit("a.too_warm"),
-        "sensitivity": lambda: model.sensitivity("a.power"),
+        "stability": lambda: model.orbital_stability(),
         "stream": lambda: model.stream(tmp_path / "rows.csv"),
         "point": lambda: model.distance("a=on b=on a.T=20 b.T=20", "a=on b=on a.T=20 b.T=20"),
         "complete": model.completed,
@@ -377,3 +376,78 @@ def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
     }
     with pytest.raises(hsdsl.UsageError, match=r"systems? of parts"):
         calls[what]()
+
+
+def test_derivatives_are_those_of_the_flat_model_and_of_differences():
+    model, by = hsdsl.loads(ROOMS), "a.power, wall, initial.b.T"
+    run = model.simulate(until=0.8)
+    flat = hsdsl.Model(flat_part(model.system, [arc.mode for arc in run.arcs]))
+    found, expected = (each.sensitivity(by, until=0.8) for each in (model, flat))
+    assert found.exists and found.final.mode == run.final.mode
+    for one, other in zip((*found.transitions, found.final), (*expected.transitions, expected.final), strict=True):
+        assert one.time == pytest.approx(other.time, rel=1e-9, abs=1e-12)
+    for state, row in expected.final.state.items():
+        assert found.final.state[state] == pytest.approx(row, rel=1e-9)
+
+    model, step = hsdsl.loads(WALKER), 1e-5
+    found = model.sensitivity("leg[1].speed", until=1, initial={"leg[3].mode": "lift", "leg[3].u": 0.05})
+    ends = [
+        model.simulate(until=1, initial={"leg[3].mode": "lift", "leg[3].u": 0.05}, parameters={"leg[1].speed": speed})
+        for speed in (1.1 + step, 1.1 - step)
+    ]
+    assert found.final.mode == ends[0].final.mode and found.final.state.keys() == ends[0].final.state.keys()
+    for state, row in found.final.state.items():
+        difference = (ends[0].final.state[state] - ends[1].final.state[state]) / (2 * step)
+        assert row["leg[1].speed"] == pytest.approx(difference, abs=1e-7)
+    samples = found.sample([0.1, 0.5, 0.9])
+    for name in ("leg[1].s", "leg[1].foot"):
+        assert samples.values[name] == pytest.approx(found.run.sample([0.1, 0.5, 0.9])[name], abs=1e-9, nan_ok=True)
+        assert np.array_equal(np.isnan(samples.values[name]), np.isnan(samples.slopes[name][:, 0]))
+
+
+@pytest.mark.parametrize("name", ["a", "leg[3].mode", "initial.a", "initial.leg[3].foot"])
+def test_numbers_of_modes_and_states_of_other_modes_have_no_derivatives(name):
+    model = hsdsl.loads(ROOMS if name.endswith("a") else WALKER)
+    with pytest.raises(hsdsl.UsageError, match="no parameter or initial state"):
+        model.sensitivity(name)
+
+
+SWITCHED = """
+hsdsl: 1
+automata:
+  room:
+    parameters: {low: 19, high: 21}
+    modes:
+      on: {flow: {T: 35 - T}, transitions: [{name: switch, when: T >= high, to: off}]}
+      off: {flow: {T: 5 - T}, transitions: [{name: switch, when: T <= low, to: on}]}
+  lag: {parameters: {rate: 1}, modes: {run: {flow: {y: rate*(a.T - y)}}}}
+system:
+  a: {automaton: room, initial: {mode: on, T: 20}}
+  b: {automaton: lag, initial: {y: 20}}
+experiment: {until: 3}
+"""
+
+
+def test_an_orbit_ends_in_the_modes_that_it_begins_with():
+    model = hsdsl.loads(SWITCHED)
+    orbit = model.orbit("a.switch", laps=2)
+    period = np.log((35 - 19) / (35 - 21)) + np.log((21 - 5) / (19 - 5))
+    assert orbit.period == pytest.approx(period, rel=1e-9)
+    assert orbit.mode in ("a=on b=run", "a=off b=run")
+    assert orbit.multipliers == pytest.approx([np.exp(-period)], rel=1e-7)
+    with pytest.raises(hsdsl.UsageError, match="into other modes of parts"):
+        model.orbit("a.switch")
+
+
+def test_a_fit_finds_a_parameter_of_a_part():
+    model = hsdsl.loads(SWITCHED)
+    times = np.linspace(0.1, 2.9, 15)
+    table = model.simulate(parameters={"b.rate": 1.7}).sample(times)
+    fit = model.fit({"time": times, "b.y": table["b.y"]}, "b.rate")
+    assert fit.values["b.rate"] == pytest.approx(1.7, rel=1e-6)
+
+
+def test_transitions_of_one_name_are_told_apart():
+    prepared = hsdsl.loads(SWITCHED).pipeline.prepare({"until": 1})
+    crossed = list(RunView(prepared, prepared.simulate()).crossed.values())
+    assert len(crossed) > 4 and crossed == [k % 2 for k in range(len(crossed))]

@@ -132,7 +132,7 @@ class RunView:
             if arc.jump < len(self.transitions):
                 made = self.transitions[arc.jump]
                 if not made.time > self.times[arc.last] + self.tie(made.time):  # else it ends at a jump of an input
-                    found[arc.last] = self.edges(arc.mode).index(made.edge)
+                    found[arc.last] = self.before(made)[1]
         return found
 
     def arc_of(self, row: int) -> Arc:
@@ -175,7 +175,12 @@ class RunView:
     def before(self, made: Transition) -> tuple[Place, int]:
         """Look at where a transition was made, and which surface it crossed."""
         place = self.place(made.source, made.time, tuple(made.before.values()))
-        return place, self.edges(made.source).index(made.edge)
+        return place, self.edge_at(place, made.edge)
+
+    def edge_at(self, place: Place, name: str) -> int:
+        """The edge of a name at a place; of several in a system of parts the one that is closest to its guard."""
+        found = [k for k, edge in enumerate(self.edges(place.mode.name)) if edge == name]
+        return found[0] if len(found) == 1 else min(found, key=lambda k: abs(place.value(k)))
 
     def state(self, arc: Arc, row: int) -> State:
         """The state at a row."""
