@@ -102,9 +102,9 @@ class _Event:
         """1 where the condition holds at new values of states; one that was ``reached``, and stays, holds."""
 
         def of(part: Reached) -> Any:
-            stays = reached is not None and part.residual == reached.residual
-            stays = stays and part.residual.xreplace(meaning) == part.residual
-            return ONE if stays else part.holds(meaning)
+            turns = None if reached is None else part.turns(reached)
+            moved = part.residual.xreplace(meaning) != part.residual
+            return part.holds(meaning) if moved or turns is None else number(turns, of)
 
         return number(self.event.trigger, of)
 
@@ -136,7 +136,7 @@ def _edges(event: _Event) -> Iterator[Draft]:
     fires = edge if event.delay is None else _staying(event, f"{edge.name} triggers", _waits(event))
     free = [] if event.delay is None else [at_least(HALF, event.symbol("waiting"))]
     for part in comparisons(trigger):
-        others = condition(trigger, partial(_with, part, True))
+        others = condition(trigger, partial(_with, event.mode, part, True))
         surface = Surface(part.left, part.right, part.residual, part.text)
         when = all_of(at_least(armed, HALF), others)
         yield replace(fires, surface=surface, condition=all_of(when, *free), condition_text=_text(event)), event, part
@@ -150,15 +150,22 @@ def _edges(event: _Event) -> Iterator[Draft]:
         yield _executes(event), None, None
     arms = _staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | _dropped(event))
     for part in comparisons(trigger):
-        holds = condition(trigger, partial(_with, part, False))
+        holds = condition(trigger, partial(_with, event.mode, part, False))
         surface = Surface(part.right, part.left, part.right - part.left, part.opposite)
         when = all_of(at_least(HALF, armed), ~holds)
         yield replace(arms, surface=surface, condition=when, condition_text=f"not ({_text(event)})"), None, None
 
 
-def _with(reached: Reached, value: bool, part: Reached) -> Any:
+def _with(mode: Mode, reached: Reached, value: bool, part: Reached) -> Any:
     """The Boolean of a comparison where another one turns to a value."""
-    return TRUTH[value] if part.residual == reached.residual else part.nearly(value)
+    turns = part.turns(reached)
+    return part.follows(_rate(part.residual, mode), TIME) if turns is None else TRUTH[value == turns]
+
+
+def _rate(expression: Any, mode: Mode) -> Any:
+    """How fast an expression changes along the flow of a mode."""
+    moving = {symbol(SINCE): ONE, **dict(zip(map(symbol, mode.states), mode.flow, strict=True)), TIME: ONE}
+    return sum((expression.diff(s) * flow for s, flow in moving.items() if s in expression.free_symbols), ZERO)
 
 
 def _text(event: _Event) -> str:
@@ -264,8 +271,9 @@ def _entered(event: _Event, meaning: Mapping[Any, Any]) -> Values:
 
 
 def _after_firing(event: _Event, meaning: Mapping[Any, Any], reached: Reached | None) -> Values:
-    touched = event.touched(meaning)
-    armed = ONE - event.after(meaning, reached) if touched else ZERO
+    """The memory after the event fired: at a surface it holds, unless it is changed; where it was due it need not."""
+    known = reached is not None and not event.touched(meaning)
+    armed = ZERO if known else ONE - event.after(meaning, reached)
     return {event.names["armed"]: armed} | ({event.names["due"]: ZERO} if event.jumps else {})
 
 

@@ -32,15 +32,27 @@ class Reached:
     text: str
     opposite: str
 
+    @property
+    def _margin(self) -> Any:
+        """The round-off of its surface function."""
+        return _NEAR * (absolute(self.left) + absolute(self.right))
+
     def holds(self, meaning: Mapping[Any, Any]) -> Any:
-        """1 where it holds at values of its symbols, 0 elsewhere."""
-        value = 2 * sign(self.residual.xreplace(meaning))
+        """1 where it holds at values of its symbols, 0 elsewhere; at round-off of its surface if it is not strict."""
+        margin = -2 * self._margin if self.strict else 2 * self._margin  # that of the crossing before, too
+        value = 2 * sign((self.residual + margin).xreplace(meaning))
         return (1 + sign(value - 1 if self.strict else value + 1)) / 2
 
-    def nearly(self, favoured: bool) -> Any:
-        """The Boolean that it holds; at round-off of its surface it does so if that is favoured."""
-        margin = _NEAR * (absolute(self.left) + absolute(self.right))
-        return sp.Ge(self.residual + margin if favoured else self.residual - margin, 0)
+    def follows(self, rate: Any, time: Any) -> Any:
+        """The Boolean that it holds next along the flow, which changes its surface function at a rate, at a time."""
+        rises = sp.Gt(rate, 0) if self.strict else sp.Ge(rate, 0)
+        margin = self._margin + _NEAR * absolute(rate * time)  # the time has round-off, too
+        return sp.Or(sp.Gt(self.residual, margin), sp.And(sp.Ge(self.residual, -margin), rises))
+
+    def turns(self, other: Reached) -> bool | None:
+        """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
+        same = self.residual == other.residual
+        return same if same or self.residual == -other.residual else None
 
 
 @dataclass(frozen=True)

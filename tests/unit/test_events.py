@@ -113,3 +113,52 @@ def test_exports_that_cannot_keep_events_refuse(tmp_path, target):
     made = model(tmp_path, "x: 1", "{name: e, event: x >= 1, reset: {x: 0}}", "x: 0")
     with pytest.raises(UsageError, match="events"):
         files_of(source_of(made, {}), target)
+
+
+MADE = {  # flow, transitions, initial values, and the transitions that are made until t = 2
+    # one of two opposite comparisons holds everywhere, and both nowhere
+    "always": ("x: 1", "{name: e, event: x <= 1/2 or x > 1/2, reset: {x: 0}}", "x: 0", []),
+    "never": ("x: 1", "{name: e, event: x < 1/2 and not (x < 1/2), delay: 1/4, reset: {x: 0}}", "x: 0", []),
+    "branches": (
+        "x: 1, n: 0",
+        "{name: e, event: (x < 1 and n > 0) or (x >= 1 and n < 0), reset: {n: -n}}",
+        "x: 0, n: -1",
+        [("e", 1.0)],
+    ),
+    # on its surface a comparison holds if the flow makes it hold, or if it is not strict and rests there
+    "rests": ("x: 1, n: 0", "{name: e, event: x >= 1 and n > 0, reset: {n: 1}}", "x: 0, n: 0", []),
+    "rests on": ("x: 1, n: 0", "{name: e, event: x >= 1 and n <= 0, reset: {x: x}}", "x: 0, n: 0", [("e", 1.0)]),
+    "ends": ("x: 1, n: -1", "{name: e, event: x >= 1 and n >= 0, reset: {x: x}}", "x: 0, n: 1", []),
+    "changes over": (
+        "x: 1, n: -1, k: 0",
+        "{name: e, event: x < 1 or n < 0, reset: {k: 1}}",
+        "x: 0, n: 1, k: 0",
+        [],
+    ),
+    # what makes an event due may be gone when it goes: then it is armed
+    "due": (
+        "x: 1, n: 0",
+        "{name: low, event: x >= 0, initially: false, priority: 1, reset: {x: -1}},"
+        "{name: e, event: x >= 0, initially: false, reset: {n: n + 1}}",
+        "x: 1, n: 0",
+        [("low", 0.0), ("e", 0.0), ("low", 1.0), ("low", 2.0)],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", MADE)
+def test_which_events_are_made(tmp_path, what):
+    flow, transitions, initial, expected = MADE[what]
+    run = model(tmp_path, flow, transitions, initial, "2").simulate(engine="python")
+    made = [(m.edge, m.time) for m in run.transitions if "re-arms" not in m.edge]
+    assert [name for name, _ in made] == [name for name, _ in expected]
+    assert [time for _, time in made] == pytest.approx([time for _, time in expected], abs=1e-12)
+
+
+def test_a_strict_condition_does_not_hold_where_its_surface_is_entered(tmp_path):
+    """The mode is entered on the surface of its event, which turns true there."""
+    text = "hsdsl: 1\nmodes:\n  m: {flow: {x: 1}, transitions: [{name: go, event: t >= 9/50, to: n}]}\n"
+    text += "  n: {flow: {x: 1}, transitions: [{name: e, event: t > 9/50, delay: 1/2, reset: {x: 0}}]}\n"
+    run = hsdsl.loads(text + "initial: {mode: m, x: 0}\nexperiment: {until: 2}\n").simulate(engine="python")
+    assert [m.edge for m in run.transitions] == ["go", "e triggers", "e"]
+    assert run.transitions[-1].time == pytest.approx(0.68, abs=1e-12)
