@@ -451,3 +451,53 @@ def test_transitions_of_one_name_are_told_apart():
     prepared = hsdsl.loads(SWITCHED).pipeline.prepare({"until": 1})
     crossed = list(RunView(prepared, prepared.simulate()).crossed.values())
     assert len(crossed) > 4 and crossed == [k % 2 for k in range(len(crossed))]
+
+
+STARTS = """
+hsdsl: 1
+parameters: {q: 3}
+automata:
+  mass:
+    parameters: {k: 4}
+    modes: {move: {flow: {x: v, v: -k*x}}, stop: {flow: {x: 0}}}
+  body: {modes: {run: {flow: {y: 1, z: 0}}}}
+system:
+  body: {automaton: body, initial: {z: 2*y + q, y: sum(chain.x) + count(chain.move)}}
+  chain:
+    automaton: mass
+    count: 3
+    initial: {mode: move, x: "chain[index - 1].x + 1/k", v: x/2}
+    at_ends: {x: q/3}
+experiment: {until: 0}
+"""
+
+
+def test_initial_values_use_those_of_other_instances():
+    model = hsdsl.loads(STARTS)
+    assert model.simulate().final.state == {
+        "body.y": 7.5, "body.z": 18.0, "chain[1].x": 1.25, "chain[1].v": 0.625,
+        "chain[2].x": 1.5, "chain[2].v": 0.75, "chain[3].x": 1.75, "chain[3].v": 0.875,
+    }  # fmt: skip
+    changed = model.simulate(initial={"chain[2].x": 10}, parameters={"q": 4}).final.state
+    assert (changed["chain[3].x"], changed["chain[2].v"]) == (10.25, 5.0)
+    assert changed["body.y"] == 4 / 3 + 0.25 + 10 + 10.25 + 3
+    found = model.sensitivity("q, initial.chain[2].x", initial={"chain[2].x": 10}, until=0)
+    assert found.final.state["body.z"] == pytest.approx({"q": 2 / 3 + 1, "initial.chain[2].x": 4.0})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("v: x/2", 'v: "chain[index].v"', "HS302"),
+        ("z: 2*y", "z: body.z", "HS302"),
+        ("z: 2*y", "z: t*y", "HS117"),
+        ("z: 2*y + q", 'z: "chain[2].w"', "HS111"),
+        ("z: 2*y", "z: yy", "HS111"),
+        ("at_ends: {x: q/3}", "at_ends: {v: 1}", "HS111"),
+        ('mode: move, x: "chain[index - 1].x + 1/k", v: x/2', "mode: stop, x: v", "HS308"),
+    ],
+)
+def test_initial_values_that_have_none_are_reported(old, new, code):
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(STARTS.replace(old, new))
+    assert {diagnostic.code for diagnostic in error.value.diagnostics} == {code}

@@ -11,6 +11,7 @@ from hsdsl.elaborate.definitions import define_parameter
 from hsdsl.elaborate.parts.composition import FINAL, MODE, Composition
 from hsdsl.elaborate.parts.instances import Instance, roster_of
 from hsdsl.elaborate.parts.names import Board, Names
+from hsdsl.elaborate.parts.starts import Starts
 from hsdsl.elaborate.scene import elaborate_scene
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Refusal, Scope, Value, state
@@ -19,7 +20,7 @@ from hsdsl.names import SINCE
 from hsdsl.parts import Part, numbered
 from hsdsl.schema import SystemDocument
 from hsdsl.source import Key
-from hsdsl.system import Initial, Mode, Parameter, Shape
+from hsdsl.system import Initial, Mode, Parameter, Shape, started
 
 __all__ = ["FINAL", "MODE", "Parts"]
 
@@ -147,18 +148,10 @@ class Parts:
 
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""
-        values: list[tuple[str, Any]] = []
-        sentence = "an initial value is an expression of parameters"
-        outer = self.symbols.parameter_scope(sentence).values
-        for one in self.roster.instances.values():
-            own: Meanings = {str(name): self.board.parameters.get(one.full(name)) for name in one.kind.parameters}
-            own |= {} if one.index is None else {"index": Names(self.board, index=one.index)["index"]}
-            scope = Scope(ChainMap(own, outer))  # pyright: ignore[reportArgumentType]
-            extra = one.given.initial.__pydantic_extra__ if one.given.initial else {}
-            given = {str(key): scalar for key, scalar in extra.items()}
-            for name in one.states:
-                value = self.symbols.number(given[name], scope, finite_now=True) if name in given else None
-                values.append((one.full(name), ZERO if value is None else value.expr))
+        written = Starts(self.board).written
+        values = [
+            (n, written.get(n, ZERO)) for one in self.roster.instances.values() for n in map(one.full, one.states)
+        ]
         starts = {
             part.name: whole((one.start or 0) + 1)
             for part, one in zip(self.parts, self.roster.instances.values(), strict=True)
@@ -166,4 +159,5 @@ class Parts:
         ends = any(one.part.final[one.start or 0] for one in self.roster.instances.values())
         values += [(one.full(SINCE), ZERO) for one in self.roster.instances.values() if one.name in self.board.timed]
         values += [(name, starts[name]) for name in numbered(self.parts)]
-        return Initial(FINAL if ends else MODE, tuple(values))
+        order = {name: value for name, value in values if name not in written} | written
+        return started(FINAL if ends else MODE, [name for name, _ in values], tuple(order.items()))

@@ -24,7 +24,7 @@ from hsdsl.names import SINCE, did_you_mean
 from hsdsl.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
-_IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
+IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
 
 
 @dataclass
@@ -131,7 +131,7 @@ class Board:
 
     def _index(self, text: str, names: Names) -> int | Refusal:
         """The whole number that an index is."""
-        known: dict[str, Meaning] = {} if names.index is None else {"index": _whole(names.index)}
+        known: dict[str, Meaning] = {} if names.index is None else {"index": whole_value(names.index)}
         try:
             value = resolved_expression(text, Scope(known))
         except ExpressionError as error:
@@ -154,9 +154,9 @@ class Board:
         """What a name of an instance is to the others: a choice among what it is in each mode."""
         if attribute in one.kind.parameters:
             return self.parameters.get(one.full(attribute))
-        if attribute.startswith(_IN_MODE):
-            mode = attribute.removeprefix(_IN_MODE)
-            return self.picked(one, [_whole(int(name == mode)) for name, _ in one.modes])
+        if attribute.startswith(IN_MODE):
+            mode = attribute.removeprefix(IN_MODE)
+            return self.picked(one, [whole_value(int(name == mode)) for name, _ in one.modes])
         key = ("of", one.name, attribute, lenient)
         if key not in self._known:
             self._known[key] = self._of(one, attribute, lenient)
@@ -201,7 +201,7 @@ class Board:
 
     def picked(self, one: Instance, given: Sequence[Value | None]) -> Value:
         """One value of several, by the mode of an instance; in modes without one it is that of another."""
-        known = [value for value in given if value is not None] or [_whole(0)]
+        known = [value for value in given if value is not None] or [whole_value(0)]
         values = [value or known[0] for value in given]
         expr = selection.pick(symbol(one.name), [value.expr for value in values], self.constants)
         size, depth = sum(value.size for value in values), max(value.depth for value in values)
@@ -213,7 +213,7 @@ def _lacking(label: str, names: Names) -> Refusal:
     return Refusal("HS354", message, "define that name in this mode, too, under `let`")
 
 
-def _whole(number: int) -> Value:
+def whole_value(number: int) -> Value:
     """The value of a whole number."""
     return resolved_expression(str(number), Scope({}))
 
@@ -257,7 +257,7 @@ class Names(Mapping[str, Meaning]):
             if meaning is not KeyError:
                 return meaning  # pyright: ignore[reportReturnType]
         if name == "index" and self.index is not None:
-            return _whole(self.index)
+            return whole_value(self.index)
         if name == SINCE and self.board.symbols.timed:
             return Refusal("HS117", f"'{SINCE}' is the time since a part entered its mode", "use it in an automaton")
         if name in self.board.lets:
@@ -292,7 +292,7 @@ class Names(Mapping[str, Meaning]):
         if name == SINCE and self.board.symbols.timed:
             self.board.timed[one.name] = None
             return Value(symbol(one.full(SINCE)))
-        return _whole(one.index) if name == "index" and one.index is not None else KeyError
+        return whole_value(one.index) if name == "index" and one.index is not None else KeyError
 
     def __iter__(self) -> Iterator[str]:
         one = self.instance
@@ -344,7 +344,7 @@ class Names(Mapping[str, Meaning]):
         if mode not in several[0].part.modes:
             message = f"the automaton '{several[0].automaton}' has no mode '{mode}'"
             raise ExpressionError.at(inner, "HS303", message, did_you_mean(mode, several[0].part.modes))
-        terms = [syntax.Name(f"{one.name}.{_IN_MODE}{mode}", inner.start, inner.end) for one in several]
+        terms = [syntax.Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
         return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
 
 
