@@ -104,3 +104,53 @@ def layout_of(parts: Sequence[Part], states: Sequence[str]) -> Layout:
             for name, k in zip(states, owners, strict=True)
         ),
     )
+
+
+def change(source: str, target: str, edge: str) -> str:
+    """What an edge does to the names of modes: of a product only the parts that change, or the one that the edge is of.
+
+    Names of parts and of their modes have no `=`, nor have modes of other models.
+    """
+    pairs = list(zip(_items(source), _items(target), strict=False))
+    if "=" not in source or "=" not in target or [a[0] for a, _ in pairs] != [b[0] for _, b in pairs]:
+        return f"{source} -> {target}"
+    own = edge.rpartition(".")[0]
+    moved = [(name, old, new) for (name, old), (_, new) in pairs if old != new]
+    moved = moved or [(name, old, new) for (name, old), (_, new) in pairs if name == own]
+    return ", ".join(f"{name}: {old} -> {new}" for name, old, new in moved) or "unchanged"
+
+
+def compact(name: str) -> str:
+    """The name of a mode; of a product with neighbours that are alike taken together, as `leg[1..4]=air`."""
+    return _joined(_items(name)) if "=" in name else name
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Product modes in a legend: without the parts that are in one mode in all, those alike as `leg[1..4]=air`."""
+    products = {name: _items(name) for name in names if "=" in name}
+    differ = {part for items in zip(*products.values(), strict=False) if len(set(items)) > 1 for part, _ in items}
+    short = {name: _joined([item for item in items if item[0] in differ]) for name, items in products.items()}
+    return {name: short.get(name) or compact(name) for name in names}
+
+
+def _items(product: str) -> list[tuple[str, str]]:
+    """The parts and their modes in the name of a product mode."""
+    return [(part, mode) for part, _, mode in (item.partition("=") for item in product.split())]
+
+
+def _joined(items: Sequence[tuple[str, str]]) -> str:
+    """The name of some parts and their modes, with neighbours in a row that are alike taken together."""
+    rows: list[tuple[str, str, list[str]]] = []
+    for part, mode in items:
+        base, _, index = part.partition("[")
+        if rows and index and rows[-1][2] and rows[-1][:2] == (base, mode):
+            rows[-1][2].append(index[:-1])
+        else:
+            rows.append((base, mode, [index[:-1]] if index else []))
+    return " ".join(f"{base}{_range(indices)}={mode}" for base, mode, indices in rows)
+
+
+def _range(indices: Sequence[str]) -> str:
+    if not indices:
+        return ""
+    return f"[{indices[0]}]" if len(indices) == 1 else f"[{indices[0]}..{indices[-1]}]"

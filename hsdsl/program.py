@@ -108,7 +108,7 @@ class EdgeProgram:
     ``changes`` are the states of the target that the reset gives a value, by number, and ``change_texts`` how that is
     written; the others keep theirs, which is so only where the mode has the same states as the target.
     ``contact`` is the number, among `Program.flows`, of the motion along its guard; None where there is none.
-    ``releases`` says that the edge ends such a motion.
+    ``releases`` says that the edge ends such a motion, ``of_event`` that it is part of an event.
     """
 
     name: str
@@ -123,6 +123,7 @@ class EdgeProgram:
     condition_text: str = ""
     contact: int | None = None
     releases: bool = False
+    of_event: bool = False
 
     @property
     def reset_texts(self) -> tuple[str, ...]:

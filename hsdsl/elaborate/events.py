@@ -99,12 +99,16 @@ class _Event:
         return any(c.residual.xreplace(meaning) != c.residual for c in comparisons(self.event.trigger))
 
     def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None) -> Any:
-        """1 where the condition holds at new values of states; one that was ``reached``, and stays, holds."""
+        """1 where the condition holds at new values of states.
+
+        Of the comparisons that stay the one that was ``reached`` holds, and those that counted as reached with it.
+        """
 
         def of(part: Reached) -> Any:
-            turns = None if reached is None else part.turns(reached)
-            moved = part.residual.xreplace(meaning) != part.residual
-            return part.holds(meaning) if moved or turns is None else number(turns, of)
+            if reached is None or part.residual.xreplace(meaning) != part.residual:
+                return part.holds(meaning)
+            turns = part.turns(reached)
+            return part.nearly_holds(_rate(part.residual, self.mode), TIME) if turns is None else number(turns, of)
 
         return number(self.event.trigger, of)
 

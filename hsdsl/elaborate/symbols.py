@@ -71,6 +71,8 @@ class SymbolTable:
         if not self.document.modes:
             return []
         start = self.document.initial
+        if start is None:  # reported with the system, which has no `modes`
+            return []
         mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
         if mode is None or mode.flow is None:
             return []

@@ -158,16 +158,15 @@ def power_of(function: str) -> str:
 
 
 def timed(function: str, time: str | None) -> str | None:
-    """The hint for ``after(2, sec)`` and the like: the time since a mode was entered is a state here."""
-    state = "a state with the flow 1 that the resets to this mode set to 0"
+    """The hint for ``after(2, sec)`` and the like: the time since a mode was entered is `since` here."""
     if function in _COUNTED:
-        return f"write clock, {state}"
+        return "write since, the time since the mode was entered"
     if function in _REPEATED:
-        return f"write clock >= {time or 'T'}, where clock is a state with the flow 1 that the reset sets to 0"
+        return f"write since >= {time or 'T'}, in a transition that enters its mode again"
     if function not in _TIMED:
         return None
     limit = f"{_TIMED[function]} {time or 'T'}"
-    return f"write clock {limit}, where clock is {state}; from the start of the run, t {limit}"
+    return f"write since {limit}, the time since the mode was entered; from the start of the run, t {limit}"
 
 
 def unit(name: str) -> str | None:

@@ -43,10 +43,18 @@ class Reached:
         value = 2 * sign((self.residual + margin).xreplace(meaning))
         return (1 + sign(value - 1 if self.strict else value + 1)) / 2
 
+    def nearly_holds(self, rate: Any, time: Any) -> Any:
+        """1 where it holds, or counts as reached; 0 elsewhere."""
+        return (1 + sign(2 * sign(self.residual + 2 * self._reach(rate, time)) + 1)) / 2
+
+    def _reach(self, rate: Any, time: Any) -> Any:
+        """The round-off of its surface function where a surface is crossed: the time has some, too."""
+        return self._margin + _NEAR * absolute(rate * time)
+
     def follows(self, rate: Any, time: Any) -> Any:
         """The Boolean that it holds next along the flow, which changes its surface function at a rate, at a time."""
         rises = sp.Gt(rate, 0) if self.strict else sp.Ge(rate, 0)
-        margin = self._margin + _NEAR * absolute(rate * time)  # the time has round-off, too
+        margin = self._reach(rate, time)
         return sp.Or(sp.Gt(self.residual, margin), sp.And(sp.Ge(self.residual, -margin), rises))
 
     def turns(self, other: Reached) -> bool | None:

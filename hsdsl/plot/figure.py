@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 
 from hsdsl.execution import Execution
 from hsdsl.names import shown
+from hsdsl.parts import short_names
 from hsdsl.plot.curves import Curves, GuardLine, curves, modes_of
 from hsdsl.plot.panel import draw_panel, draw_ribbons, name_bands, raise_of
 from hsdsl.plot.phase import draw_phase
@@ -173,15 +174,18 @@ def _facts_of_several(runs: Sequence[Execution]) -> str:
 def _legend(figure: FigureBase, top: Axes, data: Sequence[Curves], labels: Sequence[str], plan: Plan) -> None:
     """Write names of modes above their bands, or in a legend below everything, where it covers nothing."""
     modes = modes_of(data)
+    names = short_names(modes)
     handles: list[Any] = []
     if len(data) > 1:
         handles = [
             Line2D([], [], linewidth=1.6, label=shown(label, LONGEST), **look)
             for label, look in zip(labels, looks(len(data)), strict=True)
         ]
-        handles += [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes, light=False).items()]
+        handles += [
+            Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes, light=False).items()
+        ]
     elif modes and not name_bands(top, data[0], plan.room):
-        handles = [Patch(label=shown(mode, LONGEST), **fill) for mode, fill in fills(modes).items()]
+        handles = [Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes).items()]
     rows = legend_below(figure, handles, plan.size[0])
     if isinstance(figure, Figure):
         figure.set_figheight(figure.get_figheight() + rows * LINE)

@@ -11,6 +11,7 @@ import numpy as np
 
 from hsdsl.execution import Execution
 from hsdsl.names import visible
+from hsdsl.parts import short_names
 from hsdsl.plot.curves import Array, Curves, curves
 from hsdsl.plot.parts import filled, inert, scripts, shared
 from hsdsl.plot.style import colours
@@ -67,12 +68,12 @@ def _summaries(runs: Sequence[Execution], labels: Sequence[str], view: View) -> 
 
 
 def _model(view: View, columns: list[str], shown: list[str], pairs: Sequence[Pair], modes: list[str]) -> dict[str, Any]:
-    colour = colours(modes)
+    colour, names = colours(modes), short_names(modes)
     guards = {(guard.state, guard.value): guard.label for guard in view.guards if guard.mode in modes}
     return {
         "columns": list(map(visible, columns)),
         "units": {visible(name): visible(unit) for name, unit in view.units.items()},
-        "modes": [{"name": visible(mode), "colour": colour[mode]} for mode in modes],
+        "modes": [{"name": visible(names[mode]), "colour": colour[mode]} for mode in modes],
         "guards": [
             {"state": visible(state), "value": value, "label": label} for (state, value), label in guards.items()
         ],

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.names import shown
+from hsdsl.parts import short_names
 from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, modes_of
 from hsdsl.plot.style import ALARM, FAINT, LETTER, Look, fills, looks
 from hsdsl.plot.view import View
@@ -92,18 +93,18 @@ def raise_of(axis: Axes) -> float:
 
 def name_bands(axis: Axes, data: Curves, width: float) -> bool:
     """Write each mode's name above its first wide band, if every name fits somewhere; return whether it did."""
-    raised = raise_of(axis)
+    raised, names = raise_of(axis), short_names(data.modes)
     start, end = data.span
     places: dict[str, tuple[float, float]] = {}
     for mode, begin, stop in data.bands:
-        if (stop - begin) / (end - start) * width > LETTER * (len(mode) + 2):
+        if (stop - begin) / (end - start) * width > LETTER * (len(names[mode]) + 2):
             places.setdefault(mode, (begin, stop))
     if len(places) < len(data.modes) or len(data.bands) > 3 * len(data.modes) + 6:
         return False
     for mode, (begin, _) in places.items():
         axis.annotate(
-            mode, (begin, 1), xycoords=axis.get_xaxis_transform(), xytext=(2, 2 + raised), textcoords="offset points",
-            va="bottom", ha="left", fontsize=8, color="#444444", parse_math=False,
+            names[mode], (begin, 1), xycoords=axis.get_xaxis_transform(), xytext=(2, 2 + raised),
+            textcoords="offset points", va="bottom", ha="left", fontsize=8, color="#444444", parse_math=False,
         )  # fmt: skip
     return True
 

@@ -10,6 +10,7 @@ from typing import Any
 from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
+from hsdsl.parts import change, compact
 
 MOST_ALIKE = 3  # of reasons that differ in numbers only
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -65,7 +66,7 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     count = f"{final.jump} transition{'' if final.jump == 1 else 's'}"
     waiting = ", waiting in a strip" if final.kind == "strip" else ""
     yield "stop", stop(execution)
-    yield "final", f"mode {final.mode} after {count}{waiting}"
+    yield "final", f"mode {compact(final.mode)} after {count}{waiting}"
     yield "state", values(final.state)
     yield "outputs", values({name: value for name, value in final.outputs.items() if value == value})
     if left_out is not None:
@@ -115,7 +116,7 @@ class Table:
         chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
         instants = times([t.time for t in chosen])
         rows = [
-            (str(t.index), instant, _delay(t), t.edge, f"{t.source} -> {t.target}", _changes(t))
+            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t))
             for t, instant in zip(chosen, instants, strict=True)
         ]
         return Table(rows, cut, count - len(chosen))

@@ -162,3 +162,23 @@ def test_a_strict_condition_does_not_hold_where_its_surface_is_entered(tmp_path)
     run = hsdsl.loads(text + "initial: {mode: m, x: 0}\nexperiment: {until: 2}\n").simulate(engine="python")
     assert [m.edge for m in run.transitions] == ["go", "e triggers", "e"]
     assert run.transitions[-1].time == pytest.approx(0.68, abs=1e-12)
+
+
+def test_the_memory_of_events_leaves_the_verdict_alone(tmp_path):
+    transitions = (
+        "{name: dose, event: t >= 3, delay: 2, reset: {x: x + 1}}, "
+        "{name: stress, event: x > 2 and y < 1, delay: 1, persistent: false, reset: {x: x - 1, y: y + 1}}"
+    )
+    run = model(tmp_path, "x: 0.3 - 0.1*x, y: 1 - y", transitions, "x: 0, y: 1/2", "20").simulate()
+    assert run.verdict.theorem == "holds", run.verdict
+    assert not any("was passed" in reason for reason in run.verdict.reasons), run.verdict
+
+
+@pytest.mark.parametrize(
+    ("start", "flow", "when"), [("x: 0, y: 0", "x: 1, y: 1", 0.0), ("x: -1, y: -0.1", "x: 1, y: 0.1", 1.0)]
+)
+def test_comparisons_that_are_reached_together_turn_true_once(tmp_path, start, flow, when):
+    """The reset of x leaves y on its surface, where it counted as reached."""
+    event = "{name: e, event: x > 0 and y > 0, reset: {x: x + 1}}"
+    run = model(tmp_path, flow, event, start, "3").simulate()
+    assert times(run, "e") == pytest.approx([when])

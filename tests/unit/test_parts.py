@@ -247,6 +247,30 @@ REFUSED = {
     ),
     "HS308 initial value": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a}}",
     "HS303 no mode": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {mode: k}}}",
+    "HS353 `modes` besides": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}\n"
+        "modes: {m: {flow: {y: 1}}}"
+    ),
+    "HS350 no automaton 'b'": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: b, count: 2, initial: {x: 0}}}\n"
+        "outputs: {total: sum(p.x), all: sum(a.x), how_many: count(a.m), whole: count(p), one: 'p[1].x'}"
+    ),
+    "HS321 `count`": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 0, initial: {x: 0}}}\n"
+        "outputs: {total: sum(p.x), how_many: count(a.m)}"
+    ),
+    "HS111 no automaton or instance 'b'": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}\n"
+        "outputs: {total: sum(b.x**2)}"
+    ),
+    "HS111 no instance is of": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}, b: {modes: {m: {flow: {x: 1}}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}}\noutputs: {total: sum(b.x)}"
+    ),
+    "HS113 ranges over the instances of one automaton, each": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 2, initial: {x: 0}}}\n"
+        "outputs: {total: sum(p)}"
+    ),
     "HS111 has 2 instances": (
         "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 2, initial: {x: 0}}}\n"
         'let: {y: "p[3].x"}'

@@ -205,3 +205,15 @@ def test_html_escapes_and_lists():
     assert "<on>" not in page
     assert page.count("<tr><td>") == 10
     assert "90 more" in page
+
+
+NAMES = ["body=move leg[1]=air leg[2]=air a=on", "body=move leg[1]=down leg[2]=air a=on"]
+
+
+def test_product_modes_in_tables_and_legends():
+    assert parts.change(*NAMES, "leg[1].touchdown") == "leg[1]: air -> down"
+    assert parts.change(NAMES[0], NAMES[0], "body.kick") == "body: move -> move"
+    assert parts.change("free", "fall", "go") == "free -> fall"
+    assert parts.compact(NAMES[0]) == "body=move leg[1..2]=air a=on"
+    assert parts.short_names(NAMES) == dict(zip(NAMES, ["leg[1]=air", "leg[1]=down"], strict=True))
+    assert parts.short_names(["free", NAMES[0]]) == {"free": "free", NAMES[0]: parts.compact(NAMES[0])}

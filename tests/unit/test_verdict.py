@@ -141,7 +141,7 @@ NOT_TO_RELY_ON = {
         "x: 0, y: 1", 2, "the reset of m->n lands",
     ),
     "a start on a guard with a condition": (
-        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 0, if: y >= 1, to: n}]}, n: {flow: {x: 1, y: 1}}",
+        "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 0, if: y > 0, to: n}]}, n: {flow: {x: 1, y: 1}}",
         "x: 0, y: 0", 3, "the run starts on the surface of m->n",
     ),
     "a start at a tangency": (

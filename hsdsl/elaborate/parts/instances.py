@@ -14,6 +14,7 @@ from hsdsl.schema import AutomatonDocument, InstanceDocument, PartModeDocument, 
 from hsdsl.source import ABSENT, Key
 
 MOST = 10_000  # of one name
+ANY = "*"  # among names that are at fault: an instance of which automaton is not known
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +70,25 @@ class Instance:
 
 @dataclass
 class Roster:
-    """All instances by name; ``groups`` has those of an automaton, and those of a name that stands for several."""
+    """All instances by name; those of an automaton, and those of a name that stands for several.
+
+    ``broken`` has the names of instances that are at fault, and reported.
+    """
 
     instances: dict[str, Instance] = field(default_factory=dict)
     counted: dict[str, list[Instance]] = field(default_factory=dict)
     automata: dict[str, list[Instance]] = field(default_factory=dict)
+
+    broken: set[str] = field(default_factory=set)
+
+    @property
+    def names(self) -> list[str]:
+        """What a sum may range over."""
+        return list(dict.fromkeys((*self.counted, *self.automata)))
+
+    def is_broken(self, name: str) -> bool:
+        """Whether what a name stands for is at fault, and reported."""
+        return name in self.broken or (name in self.automata and not self.group(name) and ANY in self.broken)
 
     def group(self, name: str) -> list[Instance] | None:
         """The instances that a name stands for in a sum."""
@@ -92,6 +107,7 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
         label = given.automaton.value
         kind = document.automata.get(label)  # pyright: ignore[reportArgumentType]
         if not isinstance(kind, AutomatonDocument):
+            roster.broken |= {str(key), ANY}
             if kind is None and label != ABSENT:
                 message = f"there is no automaton '{shown(label)}'"
                 symbols.report(given.automaton.place, "HS350", message, did_you_mean(label, document.automata))
@@ -101,11 +117,14 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
             message = f"'{key}' is an instance here, and also {KINDS[taken]}"
             symbols.report(key.place, "HS301", message, "give one of them another name")
         if not kind.modes:
+            roster.broken |= {str(key), ANY}
             continue
         made = _made(symbols, key, label, kind, given)
         roster.instances |= {one.name: one for one in made}
         roster.automata[label] += made
-        if given.count is not None:
+        if not made:
+            roster.broken |= {str(key), ANY}
+        elif given.count is not None:
             roster.counted[str(key)] = made
         if made:
             _check(symbols, made[0])

@@ -25,6 +25,7 @@ from hsdsl.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
 IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
+_SUMS = ("sum", "count")  # functions of ranges alone
 
 
 @dataclass
@@ -105,15 +106,20 @@ class Board:
             raise KeyError(name)
         base, index, attribute = found.groups()
         one = self.instance(base, index, names)
-        if isinstance(one, Refusal):
+        if one is None or isinstance(one, Refusal):
             return one
         if isinstance(one, int):
             return self._beyond(base, one, attribute)
         return self.of(one, attribute, names.lenient)
 
-    def instance(self, base: str, index: str | None, names: Names) -> Instance | int | Refusal:
-        """The instance of a name; its number where that is beyond the ends. KeyError where there is none."""
+    def instance(self, base: str, index: str | None, names: Names) -> Instance | int | Refusal | None:
+        """The instance of a name; its number where that is beyond the ends. KeyError where there is none.
+
+        None where it is at fault, and reported.
+        """
         roster = self.roster
+        if roster.is_broken(base):
+            return None
         if index is None:
             if base in roster.instances:
                 return roster.instances[base]
@@ -324,7 +330,7 @@ class Names(Mapping[str, Meaning]):
         if tree.function == "count" and isinstance(inner, Name) and bases:
             return self._count(tree, inner)
         if not bases or not all(dotted for base, dotted in named if base in bases):
-            return None
+            return self._no_range(tree, inner) if tree.function in _SUMS else None
         if len(bases) > 1:
             message = f"`{tree.function}` ranges over the instances of one automaton, not of {', '.join(sorted(bases))}"
             raise ExpressionError.at(tree, "HS113", message)
@@ -334,6 +340,23 @@ class Names(Mapping[str, Meaning]):
         if tree.function == "sum":
             return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
         return replace(tree, arguments=tuple(terms)) if len(terms) > 1 else terms[0]
+
+    def _no_range(self, tree: Call, inner: Tree) -> Tree:
+        """A value that is not known where an instance is at fault, and reported; else say what the sum lacks."""
+        roster, given = self.board.roster, [node for node in walk(inner) if isinstance(node, Name)]
+        for node in given:
+            base = node.name.partition(".")[0].partition("[")[0]
+            if roster.is_broken(base):
+                return Name(f"{base}.{IN_MODE}", node.start, node.end)
+            if base in roster.automata and not roster.group(base):
+                message = f"no instance is of the automaton '{base}'"
+                raise ExpressionError.at(node, "HS111", message, "give one under `system`")
+            if "." in node.name and not roster.group(base):
+                message = f"there is no automaton or instance '{base}'"
+                raise ExpressionError.at(node, "HS111", message, did_you_mean(base, roster.names))
+        example = f"{tree.function}({next(iter(roster.names), 'leg')}.NAME)"
+        message = f"`{tree.function}` ranges over the instances of one automaton, each by its name and a point"
+        raise ExpressionError.at(tree, "HS113", message, f"write {example}")
 
     def _count(self, tree: Call, inner: Name) -> Tree:
         """How many instances there are, or are in a mode."""

@@ -178,6 +178,8 @@ def _foreign(board: Board, names: Names, key: Key) -> str | None:
         other = board.instance(found[1], found[2], names) if found else None
     if isinstance(other, int):
         return ""
+    if found is not None and board.roster.is_broken(found[1]):
+        return None  # reported with the instance
     if isinstance(other, Refusal):
         board.report_once(key, other.code, other.message, other.hint)
     elif other is None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Transition
+from hsdsl.integrators.stepper import State
 from hsdsl.program import JUMPS
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
@@ -20,6 +21,7 @@ from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import LOOK_AT_RESET
 from hsdsl.simulate.verdict.tangent import leaves_along
 
+UNITS = 64  # of round-off, and less, are no jump
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
@@ -50,6 +52,8 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
     if arc.first == 0:
+        if conditional and place.conditions(k, _soon(run, place, arc.first)) == {False}:
+            return
         if abs(value) <= noise and (conditional or abs(rate) <= place.rate_roundoff(k)):
             how = "which has an `if`" if conditional else "to which the flow is tangent"
             yield Finding("start", "unknown", f"the run starts on {where}, {how}")
@@ -65,6 +69,13 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
         return
     margin = abs(value) / shift if shift > 0 else 0.0
     yield Finding("landing", "unknown", f"the reset of {made.edge} lands {times(margin)} the error away from {where}")
+
+
+def _soon(run: RunView, place: Place, row: int) -> State:
+    """How far the state may be from a place within the tie tolerance, with its error and round-off."""
+    slope, tie = place.kernel.flow(place.t, *place.x), run.tie(place.t)
+    moved = zip(run.around(place, row), place.x, slope, strict=True)
+    return tuple(e + run.arithmetic.unit * abs(x) + abs(f) * tie for e, x, f in moved)
 
 
 def _tied(run: RunView, made: Transition) -> bool:
@@ -110,9 +121,21 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
         return
     error = run.around(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
-    least = [64 * float(run.arithmetic.unit) * abs(float(v)) for v in made.after.values()]
+    noise = _noise(run, place, k)
+    least = [
+        max(UNITS * float(run.arithmetic.unit) * abs(float(v)), n)
+        for v, n in zip(made.after.values(), noise, strict=True)
+    ]
     if any(a > b and c < a * WIDER / 2 for a, b, c in zip(narrow, least, wide, strict=True)):
         yield Finding("reset", "unknown", f"the reset of {where} jumps within the error")
+
+
+def _noise(run: RunView, place: Place, k: int) -> list[float]:
+    """What the enclosure of each result of a reset is wide at a point; 0 where it jumps within round-off of that."""
+    wide = _spread(run, place, k, [0.0] * len(place.x), 0.0)
+    moved = place.moved_by(tuple(UNITS * run.arithmetic.unit * abs(x) for x in place.x))
+    results = zip(*(place.kernel.resets[k](place.t, *x) for x in moved), strict=True)
+    return [2 * w if float(max(r) - min(r)) <= w else 0.0 for w, r in zip(wide, results, strict=True)]
 
 
 def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:

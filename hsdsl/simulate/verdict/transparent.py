@@ -45,7 +45,8 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
 def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
     """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
     if place.conditions(k, run.around(place, row)) == {False}:
-        passed.setdefault(place.name(k), []).append(place.t)
+        if not place.mode.edges[k].of_event:  # an event fires when it turns true on any of its surfaces
+            passed.setdefault(place.name(k), []).append(place.t)
         return None
     where = f"{place.name(k)} at t = {show(place.t)}"
     return Finding("condition", "unknown", f"whether the condition of {where} holds is within the error")
