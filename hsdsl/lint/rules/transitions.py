@@ -174,7 +174,8 @@ def _repeats(edge: Edge, mode: Mode) -> bool:
     flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
     changed = {symbol(s) for s, value in zip(mode.states, edge.reset, strict=True) if value != symbol(s)}
     surfaces = {x for surface in mode.surfaces for x in surface.residual.free_symbols}
-    rates = {x for own in edge.surface.residual.free_symbols & flow.keys() for x in flow[own].free_symbols}
+    moving = [row for x, row in flow.items() if x in edge.surface.residual.free_symbols]
+    rates = {x for row in moving for x in row.free_symbols}
     conditions = {x for e in mode.edges if e.condition is not None for x in e.condition.free_symbols}
     return bool(changed) and not changed & (surfaces | rates | conditions)
 
