@@ -252,8 +252,9 @@ REFUSED = {
         "modes: {m: {flow: {y: 1}}}"
     ),
     "HS350 no automaton 'b'": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: b, count: 2, initial: {x: 0}}}\n"
-        "outputs: {total: sum(p.x), all: sum(a.x), how_many: count(a.m), whole: count(p), one: 'p[1].x'}"
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem:\n"
+        "  p: {automaton: b, count: 2, initial: {x: 0}}\n  r: {automaton: a, initial: {x: 'p[1].x'}}\n"
+        "outputs: {total: sum(p.x), how_many: count(a.m), whole: count(p), one: 'p[1].x'}"
     ),
     "HS321 `count`": (
         "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 0, initial: {x: 0}}}\n"

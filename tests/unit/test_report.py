@@ -12,7 +12,7 @@ import hand_made
 import numpy as np
 import pytest
 
-from hsdsl import decimals, report
+from hsdsl import decimals, parts, report
 from hsdsl.execution import Verdict
 from hsdsl.report.html import html
 from hsdsl.report.words import condensed

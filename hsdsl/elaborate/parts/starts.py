@@ -106,7 +106,7 @@ class StartNames(Mapping[str, Meaning]):
             raise KeyError(name)
         base, index, attribute = found.groups()
         other: Any = board.instance(base, index, Names(board, self.one, None, self.index))
-        if isinstance(other, Refusal):
+        if other is None or isinstance(other, Refusal):
             return other
         if isinstance(other, int):
             return self.starts.beyond(base, other, attribute, self.symbolic)
