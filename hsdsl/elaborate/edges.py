@@ -106,13 +106,19 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
     )
 
 
+def of_events(transition: TransitionDocument) -> list[str]:
+    """The keys of a transition that only events have."""
+    return [key for key in ("delay", "persistent", "initially") if key in transition.model_fields_set]
+
+
 def _event(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -> Event | None:
     """What a transition has that fires where a condition turns true; None for another one, and where it has faults."""
     given = transition.event
     if given is None:
-        if transition.delay is not None:
-            message = "only a transition with `event` has a `delay`"
-            symbols.report(transition.delay.place, "HS323", message, "use `since`, or `event` instead of `when`")
+        for key in of_events(transition):
+            message = f"only a transition with `event` has `{key}`"
+            place = transition.delay if key == "delay" and transition.delay else transition.when
+            symbols.report(place.place, "HS323", message, "use `since`, or `event` instead of `when`")
         return None
     for key, other in (("when", transition.when), ("if", transition.condition)):
         if other is not None and other.value != ABSENT:

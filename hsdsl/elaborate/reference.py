@@ -27,7 +27,8 @@ class _Checker:
         self.symbols = symbols
         self.scope: Scope = symbols.parameter_scope("a reference has numbers or expressions of parameters")
         self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
-        self.complete = len(modes) == len(symbols.document.modes)
+        self.complete = bool(modes) if symbols.parts else len(modes) == len(symbols.document.modes)
+        self.parameters = [name for name, kind in symbols.names.items() if kind == "parameters"]
 
     def reference(self, document: ReferenceDocument) -> Reference:
         """One reference."""
@@ -47,8 +48,8 @@ class _Checker:
                 known_mode(self.symbols, scalar)
             elif key not in _WORDS:
                 self.number(scalar)
-            if not dot:
-                self.known(group, key.place, "parameter", [*self.symbols.document.parameters])
+            if not dot or key in self.parameters:
+                self.known(str(key), key.place, "parameter", self.parameters)
             elif group == "initial":
                 self.known(rest, key.place, "state", ["mode", *self.symbols.all_states()])
             elif group == "experiment" and rest.startswith("scale."):

@@ -93,7 +93,9 @@ def _flag(value: Any) -> bool:
 def _whole(value: Any) -> int:
     scalar = _single(value, "a whole number")
     digits = scalar.value[1:] if scalar.value[:1] in "+-" else scalar.value
-    if not (scalar.kind == "number" and digits.isdigit() and len(digits) <= 9):
+    if scalar.kind == "number" and digits.isdigit() and len(digits) > 9:
+        raise _unexpected("a whole number of at most 9 digits", scalar, code="HS204")
+    if not (scalar.kind == "number" and digits.isdigit()):
         raise _unexpected("a whole number", scalar, "such as 1 or -2", "HS204")
     return int(scalar.value)
 

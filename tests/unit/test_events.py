@@ -155,6 +155,13 @@ def test_which_events_are_made(tmp_path, what):
     assert [time for _, time in made] == pytest.approx([time for _, time in expected], abs=1e-12)
 
 
+@pytest.mark.parametrize("key", ["delay: 1", "persistent: false", "initially: false"])
+def test_keys_of_events_are_refused_elsewhere(key):
+    text = f"{HEAD}    flow: {{x: 1}}\n    transitions: [{{when: x >= 1, to: m, reset: {{x: 0}}, {key}}}]\n"
+    with pytest.raises(hsdsl.ModelError, match=f"has `{key.partition(':')[0]}`"):
+        hsdsl.loads(text + "initial: {mode: m, x: 0}\nexperiment: {until: 1}\n")
+
+
 def test_a_strict_condition_does_not_hold_where_its_surface_is_entered(tmp_path):
     """The mode is entered on the surface of its event, which turns true there."""
     text = "hsdsl: 1\nmodes:\n  m: {flow: {x: 1}, transitions: [{name: go, event: t >= 9/50, to: n}]}\n"

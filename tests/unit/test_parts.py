@@ -245,6 +245,46 @@ REFUSED = {
         "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: q.nothing, reset: {x: 2}}]}}}}\n"
         "system: {p: {automaton: a, initial: {x: 0}}, q: {automaton: a, initial: {x: 0}}}"
     ),
+    "HS353 twice": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, reset: {x: 0, p.x: 1}}]}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS353 itself": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: p.go, reset: {x: 1}}, "
+        "{name: go, when: x >= 1, reset: {x: 0}}]}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS323 persistent": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, persistent: false, reset: {x: 0}}]}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS301 also a parameter": (
+        "automata: {a: {parameters: {x: 2}, modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS301 also an input": (
+        "automata: {a: {inputs: [u, u], modes: {m: {flow: {x: u}}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}, inputs: {u: 1}}}"
+    ),
+    "HS301 is a `let` name": (
+        "automata: {a: {let: {x: 2}, modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS301 a state of this mode": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, let: {x: 2}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS202 no modes": "automata: {a: {modes: {}}}\nsystem: {p: {automaton: a}}",
+    "HS353 either `modes`": (
+        "modes: {m: {flow: {y: 1}}}\nautomata: {a: {modes: {m: {flow: {x: 1}}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS111 no automaton or instance": (
+        "automata: {a: {modes: {m: {flow: {x: sum(b.x)}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    ),
+    "HS314 p.stop": (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{name: go, when: x >= 1, reset: {x: 0}}]}}}}\n"
+        "system: {p: {automaton: a, initial: {x: 0}}}\nreference: {transitions: [{time: 1, edge: p.stop}]}"
+    ),
+    "HS204 at most 9 digits": (
+        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 10000000000, initial: {x: 0}}}"
+    ),
     "HS308 initial value": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a}}",
     "HS303 no mode": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {mode: k}}}",
     "HS353 `modes` besides": (

@@ -103,6 +103,9 @@ class Roster:
 def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
     """Every instance of a system."""
     roster = Roster(automata={str(name): [] for name in document.automata})
+    for name, kind in document.automata.items():
+        if isinstance(kind, AutomatonDocument):
+            _check_names(symbols, name, kind)
     for key, given in document.system.items():
         label = given.automaton.value
         kind = document.automata.get(label)  # pyright: ignore[reportArgumentType]
@@ -129,6 +132,30 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
         if made:
             _check(symbols, made[0])
     return roster
+
+
+def _check_names(symbols: SymbolTable, automaton: Key, kind: AutomatonDocument) -> None:
+    """Report an automaton without modes, and a name that it gives to two things."""
+    if not kind.modes:
+        symbols.report(automaton.place, "HS202", f"the automaton '{automaton}' has no modes", "give it a mode")
+    states = dict.fromkeys(key for mode in kind.modes.values() for key in mode.flow or ())
+    taken: dict[str, str] = {}
+    for what, names in (
+        ("parameters", kind.parameters),
+        ("inputs", kind.inputs),
+        ("states", states),
+        ("let", kind.let),
+    ):
+        for key in names:
+            if str(key) in taken:
+                message = f"'{key}' is {KINDS[what]} of '{automaton}' here, and also {taken[str(key)]}"
+                symbols.report(key.place, "HS301", message, "give one of them another name")
+            taken[str(key)] = KINDS[what] if what != "inputs" else "an input above"
+    for mode in kind.modes.values():
+        for key in mode.let:
+            if key in (mode.flow or ()):
+                message = f"'{key}' is a state of this mode of '{automaton}', and also a `let` name"
+                symbols.report(key.place, "HS301", message, "give one of them another name")
 
 
 def _made(

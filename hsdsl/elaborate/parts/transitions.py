@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.elaborate.edges import surface, unnamed
+from hsdsl.elaborate.edges import of_events, surface, unnamed
 from hsdsl.elaborate.parts.instances import Instance
 from hsdsl.elaborate.parts.names import MEMBER, Board, Names
 from hsdsl.expression.scope import Refusal
@@ -88,6 +88,9 @@ def _transition(
         board.report_once(document.when or document.to or document.name or one.key, "HS353",
                           f"the transition '{name}' of '{one.automaton}' needs {which}", None)  # fmt: skip
         return None
+    for key in of_events(document):
+        message = f"only a transition with `event` has `{key}`, and a part has no events"
+        board.report_once(document.when or document.on or one.key, "HS323", message, "use `since` in `when`")
     target = _target(board, one, source, document)
     crossed, after = None, ()
     if document.when is not None and not board.is_broken(document.when, names):
@@ -129,7 +132,9 @@ def _events(board: Board, names: Names, label: Scalar) -> tuple[Event, ...] | No
                           "write on: INSTANCE.TRANSITION")  # fmt: skip
         return None
     base, index, name = found.groups()
-    several = board.roster.group(base) if index is None else None
+    one, several = names.instance, board.roster.group(base) if index is None else None
+    if one is not None and several == [one] and len(board.roster.automata[one.automaton]) == 1:
+        several = None  # no other instance could listen
     try:
         sender = None if several else board.instance(base, index, names)
     except KeyError:
@@ -164,6 +169,9 @@ def _resets(board: Board, names: Names, document: PartTransitionDocument):
         value = board.value(scalar, names)
         full = one.full(key) if key in one.states else _foreign(board, names, key)
         whole = whole and value is not None and full is not None
+        if full and full in resets:
+            message = f"'{one.name}' sets '{full}' twice in one transition"
+            board.report_once(key, "HS353", message, "keep one of the two")
         if full and value is not None:
             resets[full], keys[full], texts[full] = value.expr, key, scalar.value
     return {k: v for k, v in resets.items() if k}, keys, texts, whole
