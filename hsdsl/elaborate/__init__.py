@@ -30,7 +30,7 @@ from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
 from hsdsl.names import SINCE
 from hsdsl.parts import Part
-from hsdsl.schema import ModelDocument, SystemDocument, read
+from hsdsl.schema import AutomatonDocument, ModelDocument, SystemDocument, read
 from hsdsl.source import Node, Text, compose, decode
 from hsdsl.system import HybridSystem, switch_parameter
 
@@ -164,7 +164,9 @@ def _system(symbols: SymbolTable) -> HybridSystem:
 
 
 def _unknowns(document: ModelDocument) -> tuple[str, ...]:
-    given = [document.solve, *(mode.solve for mode in document.modes.values())]
+    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
+    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
+    given = [document.solve, *(mode.solve for modes in tables for mode in modes.values())]
     return tuple(str(name) for solve in given if solve is not None for name in solve.unknowns)
 
 

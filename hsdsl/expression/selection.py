@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.functions import below, rebuilt
+from hsdsl.functions import below, rebuilt, solution
 
 _HALF = sp.Rational(1, 2)
 _SAFE: dict[str, Any] = {
@@ -95,6 +95,10 @@ def total(expr: Any, guard: Guard, constants: frozenset[Any], done: dict[Any, An
         if expr.is_Pow and not (expr.exp.is_Integer and expr.exp > 0):
             args[0] = _guarded(args[0], sp.S.One, guard, constants)
             args[1] = args[1] if expr.exp.is_Number else _guarded(args[1], sp.S.One, guard, constants)
+        elif isinstance(expr, solution) and any(a.free_symbols - constants for a in args):
+            n = int(args[1])  # elsewhere the matrix is the unit matrix
+            units = [sp.Integer(int(k % (n + 1) == 0)) for k in range(n * n)]
+            args[2 : 2 + n * n] = [guard(a, unit) for a, unit in zip(args[2 : 2 + n * n], units, strict=True)]
         elif type(expr).__name__ in _SAFE:
             args = [_guarded(a, _SAFE[type(expr).__name__], guard, constants) for a in args]
         done[expr] = expr if tuple(args) == expr.args else rebuilt(expr, args)

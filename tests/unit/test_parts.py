@@ -566,3 +566,76 @@ def test_initial_values_that_have_none_are_reported(old, new, code):
     with pytest.raises(hsdsl.ModelError) as error:
         hsdsl.loads(STARTS.replace(old, new))
     assert {diagnostic.code for diagnostic in error.value.diagnostics} == {code}
+
+
+SOLVED = """
+hsdsl: 1
+parameters: {l: 1/2, g: 9.81}
+automata:
+  cart:
+    parameters: {M: 2, m: 1}
+    inputs: [push]
+    modes:
+      still:
+        flow: {x: 0, q: 0}
+        let: {a: 0}
+        transitions: [{name: go, when: t >= 0.25, to: swing, reset: {v: 0, w: 0, p: 1}}]
+      swing:
+        flow: {x: v, v: a, q: w, w: b, p: 0}
+        let: {f: m*l*w**2*sin(q) + push, twice: 2*b}
+        solve:
+          unknowns: [a, b]
+          equations: [p*(M + m)*a + p*m*l*cos(q)*b == p*f, m*l*cos(q)*a + m*l**2*twice/2 == -m*g*l*sin(q)]
+        transitions: [{name: stop, when: x >= 1/100, to: still}]
+  mass: {modes: {move: {flow: {y: u, u: 0.1*cart.a - y}}}}
+system:
+  cart: {automaton: cart, initial: {mode: still, x: 0, q: 2}, inputs: {push: mass.y}}
+  mass: {automaton: mass, initial: {y: 1/10, u: 0}}
+experiment: {until: 2}
+"""
+SOLVED_FLAT = """
+hsdsl: 1
+parameters: {l: 1/2, g: 9.81, M: 2, m: 1}
+modes:
+  still:
+    flow: {x: 0, q: 0, y: u, u: -y}
+    transitions: [{name: go, when: t >= 0.25, to: swing, reset: {v: 0, w: 0}}]
+  swing:
+    flow: {x: v, v: a, q: w, w: b, y: u, u: 0.1*a - y}
+    solve:
+      unknowns: [a, b]
+      equations:
+        - (M + m)*a + m*l*cos(q)*b == m*l*w**2*sin(q) + y
+        - m*l*cos(q)*a + m*l**2*b == -m*g*l*sin(q)
+    transitions: [{name: stop, when: x >= 1/100, to: still}]
+initial: {mode: still, x: 0, q: 2, y: 1/10, u: 0}
+experiment: {until: 2}
+"""
+
+
+@pytest.mark.parametrize("way", [{}, {"method": "radau", "tolerance": 1e-9}])
+def test_equations_of_a_part_are_solved_in_their_mode(way):
+    """In the other mode the matrix of the equations is singular."""
+    found, expected = (hsdsl.loads(text).simulate(**way) for text in (SOLVED, SOLVED_FLAT))
+    assert len(expected.transitions) > 1
+    assert [made.edge for made in found.transitions] == [f"cart.{made.edge}" for made in expected.transitions]
+    assert [t.time for t in found.transitions] == pytest.approx([t.time for t in expected.transitions], abs=1e-8)
+    for name, value in expected.final.state.items():
+        assert found.final.state[f"mass.{name}" if name in "yu" else f"cart.{name}"] == pytest.approx(value, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("twice: 2*b", "twice: 2*b, b: 1", "HS301"),
+        ("twice: 2*b", "twice: b**2", "HS325"),
+        ("{push: mass.y}", "{push: cart.a}", "HS352"),
+        ("let: {a: 0}", "let: {}", "HS354"),
+        ("automata:\n", "solve: {unknowns: [c], equations: [2*c == 1]}\nautomata:\n", "HS353"),
+    ],
+)
+def test_equations_of_parts_that_have_no_solution_are_reported(old, new, code):
+    assert old in SOLVED
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(SOLVED.replace(old, new, 1))
+    assert code in {diagnostic.code for diagnostic in error.value.diagnostics}

@@ -10,7 +10,7 @@ from typing import Any
 from hsdsl.elaborate.definitions import define_parameter
 from hsdsl.elaborate.parts.composition import FINAL, MODE, Composition
 from hsdsl.elaborate.parts.instances import Instance, roster_of
-from hsdsl.elaborate.parts.names import Board, Names
+from hsdsl.elaborate.parts.names import Board, Names, unknowns_of
 from hsdsl.elaborate.parts.starts import Starts
 from hsdsl.elaborate.scene import elaborate_scene
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
@@ -18,7 +18,7 @@ from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.expression.selection import NO_VALUE, ZERO, whole
 from hsdsl.names import SINCE
 from hsdsl.parts import Part, numbered
-from hsdsl.schema import SystemDocument
+from hsdsl.schema import PartModeDocument, SystemDocument
 from hsdsl.source import Key
 from hsdsl.system import Initial, Mode, Parameter, Shape, started
 
@@ -63,11 +63,11 @@ class Parts:
         self.initial = self._initial()
 
     def _refuse_equations(self, document: SystemDocument) -> None:
-        inner = [mode.solve for kind in document.automata.values() for mode in getattr(kind, "modes", {}).values()]
-        for solve in (document.solve, *inner):
-            if solve is not None:
-                place = (solve.equations or solve.unknowns)[0].place
-                self.symbols.report(place, "HS353", "a system of parts has no `solve`", "write solutions under `let`")
+        solve = document.solve
+        if solve is not None:
+            place = (solve.equations or solve.unknowns)[0].place
+            message = "the file of a system of parts has no `solve`"
+            self.symbols.report(place, "HS353", message, "write it in a mode of an automaton")
 
     def _refuse_modes(self, document: SystemDocument) -> None:
         """Report `modes` or `initial` next to a system."""
@@ -133,13 +133,24 @@ class Parts:
             Names(self.board)[name]
         for one in self.roster.instances.values():
             for mode, inner in one.modes:
-                for name in (*one.kind.inputs, *inner.let):
-                    Names(self.board, one, mode, one.index)[name]
+                self._check_unknowns(one, mode, inner)
+                for name in (*one.kind.inputs, *inner.let, *unknowns_of(inner)):
+                    Names(self.board, one, mode, one.index)[str(name)]
             for name, scalar in one.kind.let.items():
                 places = [Names(self.board, one, mode, one.index) for mode, _ in one.modes]
                 found = [names[name] for names in places]
                 if found and all(isinstance(meaning, Refusal) for meaning in found):
                     self.board.value(scalar, places[0])
+
+    def _check_unknowns(self, one: Instance, mode: str, document: PartModeDocument) -> None:
+        """Report unknowns whose names mean something else."""
+        taken = dict.fromkeys(map(str, (*one.kind.let, *document.let)), "a `let` name")
+        taken |= dict.fromkeys(one.states, "a state") | dict.fromkeys(map(str, one.kind.inputs), "an input")
+        taken |= dict.fromkeys(map(str, one.kind.parameters), "a parameter")
+        for name in document.solve.unknowns if document.solve else ():
+            if str(name) in taken:
+                message = f"'{name}' is an unknown of `solve` in the mode '{mode}', and also {taken[str(name)]}"
+                self.board.report_once(name, "HS301", message, "give one of them another name")
 
     def _with_timer(self, part: Part) -> Part:
         """A part with the state `since` in all of its modes, where it uses that."""

@@ -15,12 +15,14 @@ from typing import Any
 
 from hsdsl.elaborate.parts.instances import Instance, Roster
 from hsdsl.elaborate.resolver import resolved_expression
-from hsdsl.elaborate.symbols import SymbolTable
+from hsdsl.elaborate.solve import placeholders, solutions, with_solutions
+from hsdsl.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.expression import ExpressionError, parse, selection, syntax
 from hsdsl.expression.plain import RANGES
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
 from hsdsl.names import SINCE, did_you_mean
+from hsdsl.schema import PartModeDocument
 from hsdsl.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
@@ -41,6 +43,8 @@ class Board:
     parameters: dict[str, Meaning] = field(default_factory=dict)
     timed: dict[str, None] = field(default_factory=dict)
     _known: dict[tuple[Any, ...], Meaning] = field(default_factory=dict)
+    _solved: dict[tuple[str, str], Meanings] = field(default_factory=dict)
+    _solving: list[tuple[str, str]] = field(default_factory=list)
     _active: list[tuple[str, str]] = field(default_factory=list)
     _broken: set[tuple[str, Any, str]] = field(default_factory=set)
 
@@ -74,6 +78,24 @@ class Board:
         finally:
             self._active.pop()
         return self._known.setdefault(key, value)
+
+    def solution(self, one: Instance, mode: str, name: str) -> Meaning:
+        """What an unknown of the equations of a mode is."""
+        key, document = (one.name, mode), one.kind.modes[mode].solve  # pyright: ignore[reportArgumentType]
+        assert document is not None
+        if key in self._solving:
+            message = f"the equations for '{one.full(name)}' need its own value, by way of other parts"
+            self.report_once(document.equations[0], "HS352", message, "make one of them a state")
+            return None
+        if key not in self._solved:
+            self._solving.append(key)
+            try:
+                names, label = Names(self, one, mode, one.index, solving=True), f"{mode} of {one.name}"
+                found = solutions(self.symbols, document, names.scope, label)
+            finally:
+                self._solving.pop()
+            self._solved[key] = {} if found is None else with_solutions(placeholders(document, label), found)
+        return self._solved[key].get(name)
 
     def value(self, scalar: Scalar, names: Names) -> Value | None:
         """The value of an expression; what another instance of the same automaton reports already is not repeated."""
@@ -170,7 +192,7 @@ class Board:
 
     def _of(self, one: Instance, attribute: str, lenient: bool) -> Meaning:
         known = {*one.states, *map(str, one.kind.let), *map(str, one.kind.inputs)}
-        known |= {str(key) for _, mode in one.modes for key in mode.let}
+        known |= {name for _, mode in one.modes for name in (*map(str, mode.let), *unknowns_of(mode))}
         if attribute not in known:
             message = f"the automaton '{one.automaton}' has no '{attribute}'"
             return Refusal("HS111", message, did_you_mean(attribute, sorted(known)))
@@ -214,6 +236,11 @@ class Board:
         return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
 
 
+def unknowns_of(mode: PartModeDocument) -> list[str]:
+    """The names that the equations of a mode solve for."""
+    return [] if mode.solve is None else list(map(str, mode.solve.unknowns))
+
+
 def _lacking(label: str, names: Names) -> Refusal:
     message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': it uses a name that others define"
     return Refusal("HS354", message, "define that name in this mode, too, under `let`")
@@ -229,7 +256,7 @@ class Names(Mapping[str, Meaning]):
     """The names that can be used in one place: of an instance in a mode, of its connections, or of the file.
 
     ``index`` is the number of an instance, or one beyond the ends. Where ``lenient`` a name that a mode does not define
-    has no value there.
+    has no value there. Where ``solving`` an unknown of the mode is a symbol of its own.
     """
 
     board: Board
@@ -237,6 +264,7 @@ class Names(Mapping[str, Meaning]):
     mode: str | None = None
     index: int | None = None
     lenient: bool = False
+    solving: bool = False
 
     @property
     def states(self) -> frozenset[str]:
@@ -276,11 +304,16 @@ class Names(Mapping[str, Meaning]):
 
     def _own(self, one: Instance, mode: str, name: str) -> Meaning | type[KeyError]:
         """What a name means to an instance itself; the type KeyError where it means nothing."""
+        if name in unknowns_of(one.kind.modes[mode]):  # pyright: ignore[reportArgumentType]
+            if self.solving:
+                return placeholders(one.kind.modes[mode].solve, f"{mode} of {one.name}")[name]  # pyright: ignore[reportArgumentType]
+            return self.board.solution(one, mode, name)
         lets = {str(key): scalar for key, scalar in one.kind.modes[mode].let.items()}  # pyright: ignore[reportArgumentType]
         shared = {str(key): scalar for key, scalar in one.kind.let.items()}
         if name in lets or name in shared:
             scalar = lets.get(name) or shared[name]
-            return self.board.evaluated((one.name, mode, name), scalar, self, one.full(name), name not in lets)
+            key = (one.name, mode, name, self.solving)
+            return self.board.evaluated(key, scalar, self, one.full(name), name not in lets)
         if name in one.states:
             full = one.full(name)
             return Value(symbol(full), uses=frozenset((full,)))
@@ -292,7 +325,7 @@ class Names(Mapping[str, Meaning]):
             return self.board.evaluated((one.name, None, name), given[name], names, one.full(name))
         if name in one.kind.parameters:
             return self.board.parameters.get(one.full(name))
-        if any(name in other.let for _, other in one.modes):
+        if any(name in other.let or name in unknowns_of(other) for _, other in one.modes):
             hint = "give it to this mode too, or define it once in the `let` of the automaton"
             return Refusal("HS354", f"'{name}' is a `let` name of other modes", hint)
         if name == SINCE and self.board.symbols.timed:

@@ -48,6 +48,7 @@ def _automata(found: Automata) -> Iterator[str]:
         for name, mode in automaton.modes:
             flow = [f"d{state}/dt = {text}" for state, text in pairs(mode.flow or {})]
             own = [f"{key} = {text}" for key, text in pairs(mode.let)]
+            own += [f"solve {scalar.value}" for scalar in (mode.solve.equations if mode.solve else ())]
             walls = [f"domain {scalar.value}" for scalar in mode.domain]
             yield f"        {names[name]} : {_label([name, *flow, *own, *walls])}"
         for name, mode in automaton.modes:
