@@ -38,7 +38,8 @@ Values = dict[str, Any]
 
 def with_events(system: HybridSystem) -> HybridSystem:
     """The system with the memory of its events, and edges that fire, wait and arm again."""
-    events = {mode.name: _events(mode) for mode in system.modes}
+    timed = SINCE not in (*system.states, *(parameter.name for parameter in system.parameters))
+    events = {mode.name: _events(mode, timed) for mode in system.modes}
     if not any(events.values()):
         return system
     final = tuple(_overflow(e, system) for own in events.values() for e in own if e.delay is not None)
@@ -48,16 +49,20 @@ def with_events(system: HybridSystem) -> HybridSystem:
     return replace(system, modes=modes + final, initial=_start(system, events))
 
 
-def _events(mode: Mode) -> tuple[_Event, ...]:
-    return tuple(_Event(edge, mode) for edge in mode.edges if edge.event is not None)
+def _events(mode: Mode, timed: bool) -> tuple[_Event, ...]:
+    return tuple(_Event(edge, mode, timed) for edge in mode.edges if edge.event is not None)
 
 
 @dataclass(frozen=True)
 class _Event:
-    """An event as it was written, ``edge``, and the names of the states that remember what it did."""
+    """An event as it was written, ``edge``, and the names of the states that remember what it did.
+
+    ``timed`` says that `since` is the time since the mode was entered.
+    """
 
     edge: Edge
     mode: Mode
+    timed: bool
 
     @cached_property
     def names(self) -> dict[str, str]:
@@ -68,7 +73,19 @@ class _Event:
     def jumps(self) -> bool:
         """Whether the condition may turn true by a reset, or holds where the mode is entered."""
         loops = (edge for edge in self.mode.edges if edge.target == self.mode.name)
-        return not self.event.initially or any(self.touched(_meaning(edge)) for edge in loops)
+        return not self.event.initially or any(self.touched(self.meaning(edge)) for edge in loops)
+
+    def meaning(self, edge: Edge) -> dict[Any, Any]:
+        """The new value of each symbol that an edge changes."""
+        pairs = zip(edge.target_states, edge.reset, strict=True)
+        meaning: dict[Any, Any] = {symbol(name): value for name, value in pairs if value != symbol(name)}
+        return meaning if edge.stays or not self.timed else meaning | {symbol(SINCE): ZERO}
+
+    def rate(self, expression: Any) -> Any:
+        """How fast an expression changes along the flow of the mode."""
+        clocks = {TIME: ONE} | ({symbol(SINCE): ONE} if self.timed else {})
+        moving = clocks | dict(zip(map(symbol, self.mode.states), self.mode.flow, strict=True))
+        return sum((expression.diff(s) * flow for s, flow in moving.items() if s in expression.free_symbols), ZERO)
 
     @property
     def delay(self) -> Any | None:
@@ -108,7 +125,7 @@ class _Event:
             if reached is None or part.residual.xreplace(meaning) != part.residual:
                 return part.holds(meaning)
             turns = part.turns(reached)
-            return part.nearly_holds(_rate(part.residual, self.mode), TIME) if turns is None else number(turns, of)
+            return part.nearly_holds(self.rate(part.residual), TIME) if turns is None else number(turns, of)
 
         return number(self.event.trigger, of)
 
@@ -140,7 +157,7 @@ def _edges(event: _Event) -> Iterator[Draft]:
     fires = edge if event.delay is None else _staying(event, f"{edge.name} triggers", _waits(event))
     free = [] if event.delay is None else [at_least(HALF, event.symbol("waiting"))]
     for part in comparisons(trigger):
-        others = condition(trigger, partial(_with, event.mode, part, True))
+        others = condition(trigger, partial(_with, event, part, True))
         surface = Surface(part.left, part.right, part.residual, part.text)
         when = all_of(at_least(armed, HALF), others)
         yield replace(fires, surface=surface, condition=all_of(when, *free), condition_text=_text(event)), event, part
@@ -154,22 +171,16 @@ def _edges(event: _Event) -> Iterator[Draft]:
         yield _executes(event), None, None
     arms = _staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | _dropped(event))
     for part in comparisons(trigger):
-        holds = condition(trigger, partial(_with, event.mode, part, False))
+        holds = condition(trigger, partial(_with, event, part, False))
         surface = Surface(part.right, part.left, part.right - part.left, part.opposite)
         when = all_of(at_least(HALF, armed), ~holds)
         yield replace(arms, surface=surface, condition=when, condition_text=f"not ({_text(event)})"), None, None
 
 
-def _with(mode: Mode, reached: Reached, value: bool, part: Reached) -> Any:
+def _with(event: _Event, reached: Reached, value: bool, part: Reached) -> Any:
     """The Boolean of a comparison where another one turns to a value."""
     turns = part.turns(reached)
-    return part.follows(_rate(part.residual, mode), TIME) if turns is None else TRUTH[value == turns]
-
-
-def _rate(expression: Any, mode: Mode) -> Any:
-    """How fast an expression changes along the flow of a mode."""
-    moving = {symbol(SINCE): ONE, **dict(zip(map(symbol, mode.states), mode.flow, strict=True)), TIME: ONE}
-    return sum((expression.diff(s) * flow for s, flow in moving.items() if s in expression.free_symbols), ZERO)
+    return part.follows(event.rate(part.residual), TIME) if turns is None else TRUTH[value == turns]
 
 
 def _text(event: _Event) -> str:
@@ -234,17 +245,16 @@ def _remembered(draft: Draft, events: Mapping[str, tuple[_Event, ...]], order: M
     """An edge with what the events of its target remember after it."""
     edge, fired, reached = draft
     given = dict(zip(edge.target_states, edge.reset, strict=True))
-    meaning = _meaning(edge)
     inside = edge.source == edge.target
     values: Values = {}
     for event in events[edge.target]:
         own = fired is not None and event.edge is fired.edge
         if not inside:
-            values |= _entered(event, meaning)
+            values |= _entered(event, event.meaning(edge))
         elif own:
-            values |= _after_firing(event, meaning, reached)
-        elif event.touched(meaning):
-            values |= _changed(event, meaning)
+            values |= _after_firing(event, event.meaning(edge), reached)
+        elif event.touched(event.meaning(edge)):
+            values |= _changed(event, event.meaning(edge))
     kept = inside or not order[edge.target]  # a final mode without a flow has the states of the mode before it
     for name in _memory(events[edge.target if order[edge.target] else edge.source]):
         values.setdefault(name, symbol(name) if kept else ZERO)
@@ -257,13 +267,6 @@ def _remembered(draft: Draft, events: Mapping[str, tuple[_Event, ...]], order: M
         reset=tuple(ordered.values()),
         reset_texts=tuple(texts.get(name, str(value)) for name, value in ordered.items()),
     )
-
-
-def _meaning(edge: Edge) -> dict[Any, Any]:
-    """The new value of each symbol that an edge changes."""
-    pairs = zip(edge.target_states, edge.reset, strict=True)
-    meaning: dict[Any, Any] = {symbol(name): value for name, value in pairs if value != symbol(name)}
-    return meaning if edge.stays else meaning | {symbol(SINCE): ZERO}
 
 
 def _entered(event: _Event, meaning: Mapping[Any, Any]) -> Values:
@@ -298,7 +301,7 @@ def _start(system: HybridSystem, events: Mapping[str, tuple[_Event, ...]]) -> In
     """The initial values with the memory of every event whose condition they decide."""
     values, initial = dict(system.initial.in_order), system.initial
     known = {symbol(name) for name in values} | set(system.parameter_symbols)
-    meaning = {TIME: ZERO} | ({} if SINCE in values else {symbol(SINCE): ZERO})
+    meaning = {TIME: ZERO} | ({} if symbol(SINCE) in known else {symbol(SINCE): ZERO})
     for event in (event for own in events.values() for event in own):
         memory = _entered(event, meaning)
         if all(value.free_symbols <= known for value in memory.values()):

@@ -155,6 +155,16 @@ def test_which_events_are_made(tmp_path, what):
     assert [time for _, time in made] == pytest.approx([time for _, time in expected], abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["since", "other"])
+def test_a_parameter_may_be_called_since(name):
+    """No transition sets it to 0, so the condition turns true once."""
+    text = f"parameters: {{{name}: 3}}\n{HEAD}    flow: {{x: 1, y: 1}}\n    transitions:\n"
+    text += f"      - {{name: e, event: y + {name} >= 4, reset: {{x: x}}}}\n"
+    text += "      - {name: f, when: x >= 3/2, to: m, reset: {x: 0}}\n"
+    run = hsdsl.loads(text + "initial: {mode: m, x: 0, y: 0}\nexperiment: {until: 5}\n").simulate(engine="python")
+    assert [(m.edge, m.time) for m in run.transitions] == [("e", 1.0), ("f", 1.5), ("f", 3.0), ("f", 4.5)]
+
+
 @pytest.mark.parametrize("key", ["delay: 1", "persistent: false", "initially: false"])
 def test_keys_of_events_are_refused_elsewhere(key):
     text = f"{HEAD}    flow: {{x: 1}}\n    transitions: [{{when: x >= 1, to: m, reset: {{x: 0}}, {key}}}]\n"
