@@ -165,7 +165,9 @@ class Orbits:
             how = "makes the transition {} into other modes of parts each time" if len(set(targets)) > 1 else how
             raise UsageError(
                 f"the run {how.format(self.edge)} up to t = {run.times[-1]:g}{ending or f' ({run.stop.reason})'}",
-                "choose another section, a later end, or other initial values",
+                "try more laps"
+                if len(set(targets)) > 1
+                else "choose another section, a later end, or other initial values",
             )
         problem = ""
         for guess in guesses:

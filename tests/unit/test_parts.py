@@ -500,8 +500,9 @@ def test_an_orbit_ends_in_the_modes_that_it_begins_with():
     assert orbit.period == pytest.approx(period, rel=1e-9)
     assert orbit.mode in ("a=on b=run", "a=off b=run")
     assert orbit.multipliers == pytest.approx([np.exp(-period)], rel=1e-7)
-    with pytest.raises(hsdsl.UsageError, match="into other modes of parts"):
+    with pytest.raises(hsdsl.UsageError, match="into other modes of parts") as error:
         model.orbit("a.switch")
+    assert error.value.hint == "try more laps"
 
 
 def test_a_fit_finds_a_parameter_of_a_part():
