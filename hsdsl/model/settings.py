@@ -8,6 +8,8 @@ from fractions import Fraction
 from operator import index
 from typing import Any, SupportsIndex
 
+import numpy as np
+
 from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
@@ -113,7 +115,8 @@ def _samples(options: Options, values: Values) -> int | tuple[Number, ...] | Non
     option = options.values.get("samples")
     if option is None:
         return None
-    given = option.value
+    value: Any = option.value
+    given: Any = value.tolist() if type(value) is np.ndarray else value  # pyright: ignore[reportUnknownMemberType]
     if option.origin == FILE and values.has("sample_times"):
         return values.constant("sample_times")
     if isinstance(given, Sequence) and not isinstance(given, str):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS = 2000
+LETTERS = 90  # of a line of the title
 
 
 def plot_orbit(
@@ -32,7 +34,9 @@ def plot_orbit(
         left, right = figure.subplots(1, 2)
         _draw_run(left, run, states, period)
         draw_circle(right, multipliers)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
+        figure.suptitle(
+            textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False
+        )
         return figure
 
     save(draw, path)

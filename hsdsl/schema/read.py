@@ -38,6 +38,7 @@ def read(root: Node, findings: Findings) -> ModelDocument:
     translate_idioms(root, findings)
     correct_spelling(root, findings)
     whole = SystemDocument if {"system", "automata"} & set(map(str, keys(root))) else ModelDocument
+    faulty: set[NodePath] = set()  # values that are reported, and left out since
     for _ in range(_MOST_READINGS):
         try:
             return whole.model_validate(_plain(root))
@@ -46,8 +47,14 @@ def read(root: Node, findings: Findings) -> ModelDocument:
         meant = [_key_meant(root, fault) for fault in faults]
         targets = [_target(root, fault, key) for fault, key in zip(faults, meant, strict=True)]
         for fault in faults:
-            if fault["type"] != "missing" or not (fault["loc"] in targets or _is_part(root, fault["loc"])):
+            if fault["type"] != "missing" or not (
+                fault["loc"] in targets
+                or _untagged(fault["loc"][:-1]) in faulty
+                or _is_part(root, fault["loc"])
+                or _is_of_event(root, fault["loc"])
+            ):
                 findings.add(_diagnostic(root, fault))
+        faulty |= {_untagged(fault["loc"]) for fault in faults if fault["type"] == "HS203"}
         recovered = [
             recover(root, _untagged(fault["loc"]), fault["type"], key, target if key is None else ())
             for fault, key, target in reversed(list(zip(faults, meant, targets, strict=True)))
@@ -99,6 +106,16 @@ def _is_part(root: Node, path: NodePath) -> bool:
             return part == 0 or (part > 0 and key == "to" and "when" not in own)
         case _:
             return False
+
+
+def _is_of_event(root: Node, path: NodePath) -> bool:
+    """Whether a missing key is not needed, by a key that is `event` or was meant to be."""
+    parent, fields = descend(root, _untagged(path[:-1])), keys_of(*_pattern(path[:-1]))
+    if path[-1] not in ("when", "to") or "event" not in fields:
+        return False
+    return any(
+        key == "event" or (key not in fields and key_meant(key, fields, parent) == "event") for key in keys(parent)
+    )
 
 
 def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:

@@ -9,7 +9,8 @@ from hsdsl.schema.documents import keys_of
 from hsdsl.source import Key, Mapping, Node, NodePath, Sequence, child, is_empty, keys
 
 _OF_OTHERS = {
-    "when": "guard trigger event on condition",
+    "when": "guard on condition",
+    "event": "trigger",
     "if": "condition guard only_if provided",
     "to": "target goto next into destination dest",
     "reset": "jump assign update action actions effect set jumps",

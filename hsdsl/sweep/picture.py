@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
+from hsdsl.names import SINCE, did_you_mean
 from hsdsl.sweep.manifest import Manifest
 from hsdsl.sweep.rows import LISTS, column_of
 
@@ -61,18 +61,20 @@ def telling(sweep: Sweep) -> str:
     """The column that is drawn where none is named.
 
     Where transitions were recorded over one name, it is the state before them that they change most, relative to its
-    size; else the number of transitions.
+    size, but no time in a mode, and none of whole numbers, as of modes and counters; else the number of transitions.
     """
-    states = sweep.manifest.states
+    states = [name for name in sweep.manifest.states if name.rpartition(".")[2] != SINCE]
     if not (sweep.manifest.recording.transitions and len(sweep.manifest.variation.names) == 1 and states):
         return "transitions"
-    changes = np.zeros(len(states))
+    changes, whole = np.zeros(len(states)), np.ones(len(states), dtype=bool)
     for table in sweep.batches([f"{side}.{state}" for state in states for side in ("before", "after")]):
         for k, state in enumerate(states):
             before, after = (_flat(table, f"{side}.{state}") for side in ("before", "after"))
             known = np.isfinite(before) & np.isfinite(after) & (before != after)
+            whole[k] &= bool((before[known] % 1 == 0).all() and (after[known] % 1 == 0).all())
             before, after = before[known], after[known]
             changes[k] += (np.abs(after - before) / np.maximum(np.abs(before), np.abs(after))).sum()
+    changes[whole] = 0.0
     return f"before.{states[int(np.argmax(changes))]}" if changes.any() else "transitions"
 
 

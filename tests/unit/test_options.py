@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import hsdsl
@@ -97,3 +98,10 @@ def test_a_method_known_as_decimals_serves_no_more_digits_than_it_has():
     check_method(INTEGRATORS["dopri5"], smooth, multiprecision(1000))
     with pytest.raises(UsageError, match="25 digits, too few for a precision of 26"):
         check_method(INTEGRATORS["dop853"], smooth, multiprecision(26))
+
+
+def test_samples_may_be_an_array(tmp_path):
+    text = "hsdsl: 1\nmodes: {m: {flow: {x: 2}}}\ninitial: {mode: m, x: 0}\nexperiment: {until: 1}\n"
+    times = np.linspace(0.25, 1, 4)
+    arrays, lists = (hsdsl.loads(text).simulate(samples=given) for given in (times, times.tolist()))
+    assert arrays.settings["samples"] == lists.settings["samples"]

@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 import yaml
 
+import hsdsl
 from hsdsl.elaborate import elaborate
 from hsdsl.errors import ModelError
 from hsdsl.schema import json_schema
@@ -132,3 +133,29 @@ def test_schema_and_reader_agree(change, fits):
     except ModelError:
         read = False
     assert read is fits
+
+
+ONE_FAULT = {
+    "events: x > 3": "HS201",
+    "trigger: x > 3": "HS201",
+    "event: {x: 3}": "HS203",
+}
+
+
+@pytest.mark.parametrize("event", ONE_FAULT)
+def test_a_faulty_event_lacks_no_other_key(event):
+    edge = f"{{name: e, {event}, delay: 1, reset: {{x: 0}}}}"
+    text = f"hsdsl: 1\nmodes: {{m: {{flow: {{x: 1}}, transitions: [{edge}]}}}}\n"
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(text + "initial: {mode: m, x: 0}\nexperiment: {until: 1}\n")
+    assert [d.code for d in error.value.diagnostics] == [ONE_FAULT[event]]
+
+
+@pytest.mark.parametrize("entry", ["solve: [a == 2]", "functions: {f: 2*x}"])
+def test_a_value_of_the_wrong_kind_lacks_no_keys(entry):
+    text = (
+        f"hsdsl: 1\nmodes: {{m: {{flow: {{x: 1}}}}}}\n{entry}\ninitial: {{mode: m, x: 0}}\nexperiment: {{until: 1}}\n"
+    )
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(text)
+    assert [d.code for d in error.value.diagnostics] == ["HS203"]
