@@ -329,6 +329,14 @@ def test_what_is_refused(what):
     assert len(error.value.diagnostics) == 1
 
 
+def test_an_automaton_of_one_instance_may_listen_to_its_other_instances():
+    text = (
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: a.go, reset: {x: -1}}, "
+        "{name: go, when: x >= 1/2, reset: {x: 0}}]}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+    )
+    assert [m.edge for m in hsdsl.loads(HEAD + text).simulate(engine="python").transitions] == ["p.go", "p.go"]
+
+
 def test_a_broadcast_with_conditions_and_listeners_of_listeners():
     text = """
     hsdsl: 1

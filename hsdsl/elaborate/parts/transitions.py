@@ -133,7 +133,7 @@ def _events(board: Board, names: Names, label: Scalar) -> tuple[Event, ...] | No
         return None
     base, index, name = found.groups()
     one, several = names.instance, board.roster.group(base) if index is None else None
-    if one is not None and several == [one] and len(board.roster.automata[one.automaton]) == 1:
+    if one is not None and base == one.name and len(board.roster.automata[one.automaton]) == 1:
         several = None  # no other instance could listen
     try:
         sender = None if several else board.instance(base, index, names)
