@@ -38,8 +38,12 @@ experiment: {until: 2}
 # the run ends in the strip of a transition that is not made
 STRIP = {"scheme": "relaxed", "method": "rk4", "step": 1e-2, "relaxation": 0.1}
 RUNS = [
-    ("centipede", {"until": 0.5}),
-    ("runner", {"until": 1, "scheme": "relaxed", "method": "rk4", "step": 1e-3, "relaxation": 1e-3}),
+    pytest.param("centipede", {"until": 0.5}, marks=pytest.mark.slow),
+    pytest.param(
+        "runner",
+        {"until": 1, "scheme": "relaxed", "method": "rk4", "step": 1e-3, "relaxation": 1e-3},
+        marks=pytest.mark.slow,
+    ),
     ("ENDING", {}),
     ("ENDING", {"until": 0.2, **STRIP}),
 ]
@@ -73,6 +77,7 @@ def test_a_page_shows_product_modes(tmp_path):
     assert final.keys() == run.final.state.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_unit_has_a_mode_for_each_part(version, tmp_path):
     fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
