@@ -135,7 +135,7 @@ def _noise(run: RunView, place: Place, k: int) -> list[float]:
     wide = _spread(run, place, k, [0.0] * len(place.x), 0.0)
     moved = place.moved_by(tuple(UNITS * run.arithmetic.unit * abs(x) for x in place.x))
     results = zip(*(place.kernel.resets[k](place.t, *x) for x in moved), strict=True)
-    return [2 * w if float(max(r) - min(r)) <= w else 0.0 for w, r in zip(wide, results, strict=True)]
+    return [2 * w if max(r) == min(r) else 0.0 for w, r in zip(wide, results, strict=True)]
 
 
 def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
