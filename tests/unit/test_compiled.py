@@ -43,7 +43,8 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
         lines += [f"HS_{word.upper().replace(' ', '_')}" for word in words]
     source, library = tmp_path / "layout.c", tmp_path / "layout.so"
     numbers = ", ".join(f"(long long)({line})" for line in lines)
-    source.write_text(f'#include <stddef.h>\n#include "hs_simulate.h"\nHS_EXPORT long long layout[] = {{{numbers}}};\n')
+    headers = "".join(f"#include {name}\n" for name in ("<stddef.h>", '"hs_simulate.h"', '"hs_screen.h"'))
+    source.write_text(f"{headers}HS_EXPORT long long layout[] = {{{numbers}}};\n")
     find_compiler().build([source], [structures.FOLDER], library, "-O1", FLAGS)
     theirs = (ctypes.c_longlong * len(ours)).in_dll(ctypes.CDLL(str(library)), "layout")
     assert list(theirs) == ours

@@ -331,7 +331,7 @@ def test_bytes_that_move_from_one_data_file_to_the_other_are_another_model(tmp_p
     (tmp_path / "u.csv").write_text(rows[0])
     (tmp_path / "v.csv").write_text(rows[1] + rows[2])
     assert first == 21
-    with pytest.raises(ModelError, match="header"):
+    with pytest.raises(ModelError, match="expected the columns `time` and `v`"):
         hsdsl.load(path)
 
 

@@ -44,12 +44,6 @@
 #include "pack.c"
 #endif
 
-/* What is left of the caller's memory. Counted without memory first, then given out. */
-typedef struct {
-  double *numbers;
-  int64_t used;
-} hs_store;
-
 static void *take(hs_store *store, int64_t count, size_t size) {
   double *start = store->numbers ? store->numbers + store->used : 0;
   store->used += (count * (int64_t)size + (int64_t)sizeof(double) - 1) / (int64_t)sizeof(double);

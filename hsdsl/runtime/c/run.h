@@ -266,4 +266,10 @@ static inline void copy(hs_real *to, const hs_real *from, int n) {
   for (int i = 0; i < n; i++) to[i] = from[i];
 }
 
+/* What is left of the caller's memory. Counted without memory first, then given out. */
+typedef struct {
+  double *numbers;
+  int64_t used;
+} hs_store;
+
 #endif

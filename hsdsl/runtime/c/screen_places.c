@@ -3,10 +3,6 @@
 
 #include "screen_view.h"
 
-typedef struct {
-  double value, rate, noise, shift;
-} hs_judged;
-
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
 static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
   double *const g = v->gradient;

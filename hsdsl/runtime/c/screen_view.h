@@ -44,6 +44,10 @@ typedef struct {
   int looks;
 } hs_view;
 
+typedef struct {
+  double value, rate, noise, shift;
+} hs_judged;
+
 static const double *recorded_piece(const hs_record *run, int64_t row) {
   return run->pieces + row * run->degree * run->width;
 }
