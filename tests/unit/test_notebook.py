@@ -266,7 +266,7 @@ def test_a_model_of_parts_shows_its_parts():
     tree = Tree(model._repr_html_())
     assert "2 parts" in tree.text and "aon, offon" in tree.text and "a.warm" in tree.text and "svg" not in tree.seen
     run = model.simulate(engine="python")
-    assert "a=on b=off" in Tree(run._repr_html_()).text
+    assert "b: on -> off" in Tree(run._repr_html_()).text
     assert [axis.get_ylabel() for axis in run.plot(_figure())][:2] == ["a.T", "b.T"]
 
 
