@@ -2,8 +2,8 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false
 """Linear equations solved by statements: orthogonal columns, which need no choice of pivots.
 
-The modified Gram-Schmidt process on the matrix with the right side as a further column is backward stable, whatever
-the order of the equations, and the same for any unit of an unknown (A. Bjorck, *Solving linear least squares problems
+The modified Gram-Schmidt process on the matrix with the right side as a further column is backward stable in
+any order of the equations, and the same for any unit of an unknown (A. Bjorck, *Solving linear least squares problems
 by Gram-Schmidt orthogonalization*, BIT 7, 1967, doi:10.1007/BF01934122). Rows are divided by their norms before.
 """
 

@@ -110,8 +110,8 @@ def animate(
                     if drawn.reach(middle) <= FAR * view:
                         draw_shape(scene, drawn)
                 cursor.set_xdata([time, time])
-                said = f"t = {words.number(time, 4)}{f' {unit}' if unit else ''}, {shown(str(samples.mode[row]), 40)}"
-                scene.set_xlabel(visible(said), loc="left", parse_math=False)
+                label = f"t = {words.number(time, 4)}{f' {unit}' if unit else ''}, {shown(str(samples.mode[row]), 40)}"
+                scene.set_xlabel(visible(label), loc="left", parse_math=False)
                 writer.grab_frame()
                 if progress is not None:
                     progress(row + 1, len(times))

@@ -47,7 +47,7 @@ INK, FAINT, ALARM = "#16324f", "#8a8a8a", "#d55e00"
 # Okabe and Ito 2008: people with any colour vision tell them apart
 PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
 RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222", "#e69f00", "#56b4e9")  # lines of runs, by Okabe and Ito
-DASHES = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)))  # told apart without any colour
+DASHES = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)))  # distinct without any colour
 PLAIN, HATCHES = 5, ("////", "\\\\\\\\", "xxxx", "....")  # of the bands of modes: so many without, then these
 _drawing = RLock()  # matplotlib's settings are the whole process's
 

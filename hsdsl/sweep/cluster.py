@@ -61,8 +61,8 @@ def connected(address: str) -> Iterator[Run]:
     try:
         yield partial(_run, client)
     except (OSError, TimeoutError, asyncio.CancelledError, futures.CancelledError) as error:
-        said = f"the cluster at {address} is lost ({type(error).__name__}); what was done is kept"
-        raise UsageError(said, "the same command goes on") from None
+        reason = f"the cluster at {address} is lost ({type(error).__name__}); what was done is kept"
+        raise UsageError(reason, "the same command goes on") from None
     finally:
         client.close()
 

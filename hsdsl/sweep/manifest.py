@@ -126,8 +126,8 @@ def read(folder: Path) -> Manifest:
         if content["format"] != FORMAT or type(content["version"]) is not int or content["version"] < 1:
             raise ValueError("another format")
         if content["version"] > VERSION:
-            said = f"a later version of hsdsl wrote it, in format {content['version']}; this one reads {VERSION}"
-            raise UsageError(f"cannot read {path}: {said}", "update hsdsl")
+            reason = f"a later version of hsdsl wrote it, in format {content['version']}; this one reads {VERSION}"
+            raise UsageError(f"cannot read {path}: {reason}", "update hsdsl")
         return _parsed(content)
     except FileNotFoundError:
         raise UsageError(f"{folder} is not a sweep: it has no {FILE}") from None

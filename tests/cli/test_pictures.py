@@ -41,7 +41,7 @@ def test_outputs_and_phases_choose_what_is_drawn(command, model, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (("--phase", "h"), "expected two names with a comma between them, got 'h'"),
         (("--phase", "h,v,w"), "expected two names"),
@@ -49,9 +49,9 @@ def test_outputs_and_phases_choose_what_is_drawn(command, model, tmp_path):
         (("--outputs", "hh"), "no state or output 'hh'"),
     ],
 )
-def test_names_are_refused_before_the_run(command, model, tmp_path, words, said):
+def test_names_are_refused_before_the_run(command, model, tmp_path, words, sentence):
     answer = command("run", model(BALL), *ENGINE, *words, "--plot", tmp_path / "run.png")
-    assert answer.code == 2 and said in answer.err and not (tmp_path / "run.png").exists()
+    assert answer.code == 2 and sentence in answer.err and not (tmp_path / "run.png").exists()
 
 
 def test_options_of_pictures_need_a_picture(command, model, tmp_path):
@@ -83,7 +83,7 @@ def test_guards_that_differ_are_not_drawn(command, model, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (("--label", "one", "--out", "a.png"), "--label: expected 2, one for each run, got 1"),
         (("--out", "a.pdf"), "the name must end in .png, .svg or .html"),
@@ -92,11 +92,11 @@ def test_guards_that_differ_are_not_drawn(command, model, tmp_path):
         (("--out", "missing/a.png"), "there is no folder"),
     ],
 )
-def test_plots_that_cannot_be_are_refused(command, model, tmp_path, monkeypatch, words, said):
+def test_plots_that_cannot_be_are_refused(command, model, tmp_path, monkeypatch, words, sentence):
     monkeypatch.chdir(tmp_path)
     file = model(BALL)
     answer = command("plot", file, file, *words)
-    assert answer.code == 2 and said in answer.err
+    assert answer.code == 2 and sentence in answer.err
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
 
 

@@ -31,9 +31,9 @@ STEPS: list[dict[str, Any]] = [{"step": 0.017, "relaxation": 3e-4}, {"step": "1/
 
 
 def arguments(run: Run, setting: dict[str, str], scheme: str) -> dict[str, Any]:
-    asked = {**setting, **run.arguments, "scheme": scheme}
-    most = int(asked.get("max_transitions", MOST))
-    return asked | {"max_transitions": min(most, MOST)}
+    given = {**setting, **run.arguments, "scheme": scheme}
+    most = int(given.get("max_transitions", MOST))
+    return given | {"max_transitions": min(most, MOST)}
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

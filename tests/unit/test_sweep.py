@@ -165,12 +165,12 @@ def test_an_interrupted_sweep_opens_and_goes_on(model, tmp_path, processes):
         model.sweep(out=tmp_path / "s", chunk=2, progress=stop_after(4), **arguments)
     found = load(tmp_path / "s")
     assert 4 <= found.done < 12 and found.table().num_rows == found.done and "goes on" in found.summary
-    told: list[tuple[int, int]] = []
-    found = model.sweep(out=tmp_path / "s", progress=lambda *t: told.append(t), **arguments)
-    assert told[0][0] >= 4 and told[-1] == (12, 12) and found.table().equals(whole)
-    told.clear()
-    assert model.sweep(out=tmp_path / "s", progress=lambda *t: told.append(t), **arguments).complete
-    assert told == [(12, 12)]  # nothing is run again
+    shown: list[tuple[int, int]] = []
+    found = model.sweep(out=tmp_path / "s", progress=lambda *t: shown.append(t), **arguments)
+    assert shown[0][0] >= 4 and shown[-1] == (12, 12) and found.table().equals(whole)
+    shown.clear()
+    assert model.sweep(out=tmp_path / "s", progress=lambda *t: shown.append(t), **arguments).complete
+    assert shown == [(12, 12)]  # nothing is run again
 
 
 def test_damaged_files_are_made_again(model, tmp_path):

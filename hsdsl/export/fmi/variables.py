@@ -20,6 +20,7 @@ from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
 from hsdsl.parts import numbered
 from hsdsl.simulate import Problem
+from hsdsl.simulate.verdict import RunView
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
 _FIRST = re.compile(r"\ba(\d+)\b")
@@ -144,21 +145,21 @@ def _listed(modes: Sequence[str], first: int) -> str:
 def nominals(source: Source) -> list[float]:
     """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
     run, given = source.model.simulate(**source.arguments), source.problem.settings.scale
-    return [float(given.get(name) or _power(_size(run, name))) for name in continuous(source)]
+    sizes = RunView(source.problem, run).sizes
+    own = {name: size for name, size in sizes.items() if not _is_roundoff(run, name)}
+    return [float(given.get(name) or _power(own.get(name, 0.0))) for name in continuous(source)]
 
 
-def _size(run: Execution, name: str) -> float:
-    """How large a state gets in a run; 0 where it is round-off, of which the finer run has other digits."""
-    rows = [np.abs(run.values[a.first : a.last + 1, a.states.index(name)]) for a in run.arcs if name in a.states]
-    size = float(np.concatenate(rows).max()) if rows else 0.0
+def _is_roundoff(run: Execution, name: str) -> bool:
+    """Whether the finer run has other digits of a state throughout."""
     finer = run.finer
-    if finer is None or size == 0:
-        return size
+    if finer is None:
+        return False
     end = min(float(run.time_span[1]), float(finer.time_span[1]))
     both = [np.asarray(each.sample(_SHARES * end)[name], dtype=float) for each in (run, finer)]
     sizes = np.fmax(*np.abs(both))
     changes = np.abs(both[0] - both[1])[sizes > 0] / sizes[sizes > 0]
-    return 0.0 if len(changes) and not np.nanmedian(changes) < 1 / 2 else size
+    return len(changes) > 0 and not np.nanmedian(changes) < 1 / 2
 
 
 def _power(size: float) -> float:

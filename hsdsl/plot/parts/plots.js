@@ -173,7 +173,7 @@ function drawPhases() {
 
 // The cursor at a time; `at` is the point of each run, -1 where it has ended. Values of several runs are in the table.
 function drawCursor(t, at) {
-  const said = (...numbers) => runs.length > 1 ? "" : numbers.map((x) => format(x, 5)).join(", ");
+  const label = (...numbers) => runs.length > 1 ? "" : numbers.map((x) => format(x, 5)).join(", ");
   const line = ({context, box, x}) => {
     if (x(t) < box.left - 1 || x(t) > box.right + 1) return;
     context.strokeStyle = palette.focus;
@@ -186,12 +186,12 @@ function drawCursor(t, at) {
     runs.forEach((run, k) => {
       if (at[k] < 0) return;
       const value = valueAt(run, column(run, name), t, at[k]);
-      dot(made, made.x(t), made.y(value), said(value));
+      dot(made, made.x(t), made.y(value), label(value));
     });
   });
   for (const {canvas} of phases) over(canvas, (made) => made.points.forEach(([xs, ys], k) => {
     const [a, b] = [xs, ys].map((each) => valueAt(runs[k], each, t, at[k]));
-    dot(made, made.x(a), made.y(b), said(a, b));
+    dot(made, made.x(a), made.y(b), label(a, b));
   }));
 }
 

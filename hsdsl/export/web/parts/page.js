@@ -1,7 +1,7 @@
 // The page: settings go to the worker, a run comes back, pictures follow.
 
 const MOST_PANELS = 4;
-let worker, run, waiting = false, wanted = false;
+let worker, run, waiting = false, outdated = false;
 
 function startWorker() {
   const text = document.getElementById("worker").textContent;
@@ -13,17 +13,17 @@ function startWorker() {
   waiting = true;
 }
 
-// One run at a time: what changes meanwhile is asked for when it is back.
+// One run at a time: what changes meanwhile follows when it is back.
 function request() {
   waiting = true;
-  wanted = false;
+  outdated = false;
   worker.postMessage({given: given(), number: performance.now()});
 }
 
 function settingsChanged() {
   try { history.replaceState(null, "", values.size ? `#${link()}` : location.pathname + location.search); } catch { /* a page without an address */ }
   model.controls.forEach((control) => showControl(control));
-  if (waiting) wanted = true; else request();
+  if (waiting) outdated = true; else request();
 }
 
 function received(result) {
@@ -45,7 +45,7 @@ function received(result) {
   document.body.dataset.runs = Number(document.body.dataset.runs ?? 0) + 1;
   document.body.dataset.latency = performance.now() - result.number; // milliseconds
   document.body.dataset.first ??= performance.now();
-  if (wanted) request();
+  if (outdated) request();
 }
 
 // `t` is between the point of the run and the next one, which is of the same arc or not.
