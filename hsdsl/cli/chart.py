@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
-from hsdsl.cli.console import print_json, progress, say
-from hsdsl.cli.options import AllowPath, Json, Limit, Quiet, answering, check_target, names_of, option
+from hsdsl.cli.console import progress, say
+from hsdsl.cli.options import Answer, check_target, known_names, names_of, option
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
 
 if TYPE_CHECKING:
     from hsdsl.chart import Row
@@ -23,6 +22,7 @@ PEERS_HELP = "Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."
 
 def chart(
     models: Annotated[list[str], Argument(metavar="MODEL...", help=MODELS, autocompletion=model_files)],
+    *,
     schemes: Annotated[str | None, option("A,B", "Our schemes; all unless given.")] = None,
     methods: Annotated[str | None, option("A,B", "Our methods; all unless given.")] = None,
     engines: Annotated[str | None, option("A,B", "Our engines; all unless given.")] = None,
@@ -38,31 +38,28 @@ def chart(
     rho: Annotated[bool, Option(help="Also compute rho of our runs.")] = True,
     out: Annotated[Path | None, option("FILE", "Write the table: .csv.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the chart: .png or .svg.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         from hsdsl.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
         from hsdsl.integrators import METHODS
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot", (".png", ".svg"))
         options: dict[str, Any] = {
-            "schemes": _names(schemes, SCHEMES, "--schemes") or SCHEMES,
-            "methods": _names(methods, tuple(METHODS), "--methods"),
-            "engines": _names(engines, ENGINES, "--engines") or ENGINES,
+            "schemes": known_names(schemes, SCHEMES, "--schemes") or SCHEMES,
+            "methods": known_names(methods, tuple(METHODS), "--methods"),
+            "engines": known_names(engines, ENGINES, "--engines") or ENGINES,
             "tolerances": _numbers(tolerances, "--tolerances") or TOLERANCES,
             "steps": _numbers(steps, "--steps"),
-            "against": _names(",".join(PEERS) if against == "all" else against, tuple(PEERS), "--against"),
+            "against": known_names(",".join(PEERS) if against == "all" else against, tuple(PEERS), "--against"),
             "rounds": rounds,
             "patience": patience,
             "with_rho": rho,
         }
         charted: list[tuple[str, list[Row]]] = []
-        with progress(quiet or json) as show:
+        with progress(answer.hidden) as show:
 
             def watch(text: str) -> None:
                 if show:
@@ -74,9 +71,9 @@ def chart(
                     scene, **options, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
                 )
                 charted.append((scene.name, rows))
-                for remark in remarks if not quiet else ():
+                for remark in remarks if not answer.quiet else ():
                     say(f"left out: {remark}")
-        _report(charted, out, plot, json, quiet)
+        _report(charted, out, plot, answer)
 
 
 def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) -> Any:
@@ -90,7 +87,7 @@ def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) ->
     return Scene.of(load(path), block=int(block), **sampling)
 
 
-def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
+def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:
     from hsdsl.chart.rows import as_csv, as_text, panels, record
     from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
@@ -106,18 +103,10 @@ def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path |
 
         plot_work_precision(plot, [panels(name, group) for name, group in charted])
         say(f"wrote {plot}")
-    if json:
-        print_json({"rows": [record(row) for row in rows]})
-    elif not quiet:
-        print("\n\n".join(f"{name}\n{as_text(group)}" for name, group in charted))
-
-
-def _names(text: str | None, known: tuple[str, ...], name: str) -> tuple[str, ...]:
-    names = names_of(text)
-    for each in names:
-        if each not in known:
-            raise UsageError(f"{name}: there is no '{each}'", did_you_mean(each, known))
-    return tuple(names)
+    answer.give(
+        lambda: {"rows": [record(row) for row in rows]},
+        lambda: "\n\n".join(f"{name}\n{as_text(group)}" for name, group in charted),
+    )
 
 
 def _numbers(text: str | None, name: str) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from typer import Argument
 
-from hsdsl.cli.completion import model_files, override_names
+from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import Text, print_json, progress, say
 from hsdsl.cli.options import (
     AllowPath,
@@ -20,6 +20,7 @@ from hsdsl.cli.options import (
     check_target,
     names_of,
     option,
+    overriding,
     split,
 )
 from hsdsl.cli.saved import run_of
@@ -42,7 +43,7 @@ def distance(
     end: Annotated[str | None, option("STATE", "The other state.", "--to")] = None,
     metric: Annotated[Metric | None, option("NAME", METRIC)] = None,
     relaxation: Annotated[str | None, option("EPS", DEPTH)] = None,
-    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    overrides: Annotated[list[str] | None, overriding(SET)] = None,
     coordinates: Annotated[str | None, option("A,B", "For rho-hat: the states that count as the position.")] = None,
     plot: Annotated[Path | None, option("FILE", PLOT)] = None,
     hops: Annotated[int | None, option("N", HOPS)] = None,

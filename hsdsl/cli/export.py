@@ -8,25 +8,7 @@ from typing import Annotated
 from typer import Option
 
 from hsdsl.cli.console import print_json, say
-from hsdsl.cli.options import (
-    AllowPath,
-    CompletionName,
-    Json,
-    Limit,
-    MethodName,
-    Model,
-    Overrides,
-    Quiet,
-    Relaxation,
-    SchemeName,
-    StepSize,
-    Tolerance,
-    Until,
-    answering,
-    names_of,
-    option,
-    settings_of,
-)
+from hsdsl.cli.options import Answer, Experiment, Model, names_of, option
 from hsdsl.errors import UsageError
 from hsdsl.export import TARGETS, check_folder, check_scheme, files_of, source_of, write
 
@@ -37,33 +19,21 @@ KEEP = "Only these states and outputs, with what they depend on."
 
 def export(
     model: Model,
+    *,
     to: Annotated[str, option("TARGET", TO, "--to", complete=lambda: list(TARGETS.items()))],
     out: Annotated[Path | None, option("DIR", OUT)] = None,
     force: Annotated[bool, Option("--force", help="Write into a folder that is not empty.")] = False,
-    overrides: Overrides = None,
-    until: Until = None,
-    scheme: SchemeName = None,
-    method: MethodName = None,
-    step: StepSize = None,
-    tolerance: Tolerance = None,
-    relaxation: Relaxation = None,
-    completion: CompletionName = None,
+    experiment: Experiment,
     outputs: Annotated[str | None, option("A,B", KEEP)] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Export a model with its settings: code for other tools, or a document."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         from hsdsl.model import load
 
         if out is not None:
             check_folder(out, force)
-        settings = settings_of(
-            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance, relaxation=relaxation,
-            completion=completion,
-        )  # fmt: skip
+        settings = experiment.settings()
         loaded = load(model)
         check_scheme(loaded, to, settings)
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
@@ -74,7 +44,7 @@ def export(
             print(next(iter(files.values())).decode(), end="")
             return
         written = write(files, out, force)
-        if json:
+        if answer.json:
             print_json({"target": to, "files": [str(path) for path in written]})
-        elif not quiet:
+        elif not answer.quiet:
             say(f"wrote {written[0] if len(written) == 1 else f'{len(written)} files below {out}'}")

@@ -9,21 +9,8 @@ from typing import Annotated, Any
 
 from typer import Argument, Exit
 
-from hsdsl.cli.completion import override_names
-from hsdsl.cli.console import print_json, progress, say
-from hsdsl.cli.options import (
-    AllowPath,
-    Engine,
-    Json,
-    Limit,
-    Method,
-    Model,
-    Quiet,
-    answering,
-    check_target,
-    option,
-    split,
-)
+from hsdsl.cli.console import progress, say
+from hsdsl.cli.options import Answer, Located, Model, check_target, option, overriding
 from hsdsl.errors import UsageError
 
 SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
@@ -36,39 +23,29 @@ Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file: t or time, and
 def fit(
     model: Model,
     data: Data,
+    *,
     wrt: Annotated[str, option("A,B", WRT)],
     sigma: Annotated[list[str] | None, option("NAME=S", SIGMA, "--sigma")] = None,
     weight: Annotated[list[str] | None, option("NAME=W", WEIGHT, "--weight")] = None,
-    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
-    method: Annotated[Method | None, option("M", "An adaptive method, or auto.")] = None,
-    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the scales.")] = None,
-    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    overrides: Annotated[list[str] | None, overriding(SET)] = None,
+    located: Located,
     plot: Annotated[Path | None, option("FILE", "Draw measurements and run: .png or .svg.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Fit parameters and initial states to measurements."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         check_target(plot, "--plot", (".png", ".svg"))
         from hsdsl.fitting.words import as_json, summary
         from hsdsl.model import load
 
-        parameters, initial, settings = split(overrides)
-        call: dict[str, Any] = {"method": method and str(method), "tolerance": tolerance, "engine": engine}
-        call |= {"parameters": parameters, "initial": initial, "settings": settings}
-        with progress(quiet or json) as show:
+        with progress(answer.hidden) as show:
             watch = show and partial(_watch, show)
             columns = {"sigma": _numbers("--sigma", sigma), "weights": _numbers("--weight", weight)}
-            found = load(model).fit(data, wrt, progress=watch, **columns, **call)
+            found = load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
         if plot is not None:
             found.plot(plot)
             say(f"wrote {plot}")
-        if json:
-            print_json(as_json(found))
-        elif not quiet:
-            print(summary(found))
+        answer.give(lambda: as_json(found), lambda: summary(found))
     if not found.success:
         raise Exit(3)
 

@@ -10,7 +10,7 @@ from typer import Option
 from hsdsl.cli.completion import rule_codes
 from hsdsl.cli.console import counted
 from hsdsl.cli.diagnostic_report import DiagnosticReport
-from hsdsl.cli.options import AllowPath, Formatted, Json, Limit, Models, Quiet, answering, option
+from hsdsl.cli.options import Answer, Formatted, Models, option
 
 SELECT = "Use these rules alone: codes, beginnings of codes, families or names."
 IGNORE = "Do not use these rules."
@@ -18,22 +18,22 @@ IGNORE = "Do not use these rules."
 
 def lint(
     models: Models,
+    *,
     format: Formatted = "text",
-    json: Json = False,
     select: Annotated[str | None, option("RULE,...", SELECT, complete=rule_codes)] = None,
     ignore: Annotated[str | None, option("RULE,...", IGNORE, complete=rule_codes)] = None,
     notes: Annotated[bool, Option("--notes", help="Show notes in full; with --select they always are.")] = False,
     fix: Annotated[bool, Option("--fix", help="Remedy in the files what can be remedied safely.")] = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Look for what is legal in a model but suspicious."""
     from hsdsl.lint import Selection, configured
     from hsdsl.lint import lint as findings_of
     from hsdsl.lint.fix import fix as remedy
 
-    report = DiagnosticReport("json" if json else format, quiet, "clean", notes=notes or select is not None)
+    report = DiagnosticReport(
+        "json" if answer.json else format, answer.quiet, "clean", notes=notes or select is not None
+    )
     options = {key: text.split(",") for key, text in (("select", select), ("ignore", ignore)) if text is not None}
 
     def look(path: Path) -> tuple[dict[str, Any], str]:
@@ -45,6 +45,6 @@ def lint(
         line = ", ".join([verdict, *parts]) if parts or not shown else ""
         return {"clean": not result.findings, "fixed": remedied}, line
 
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         report.examine(models, look)
     report.finish()

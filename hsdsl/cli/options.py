@@ -1,17 +1,17 @@
-"""Types of arguments and options that several commands share, with their completions."""
+"""Arguments and options that several commands share, alone and in groups, with their completions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files, override_names
-from hsdsl.cli.console import errors_reported
+from hsdsl.cli.console import errors_reported, print_json
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.limits import DEFAULT, NUMBERS, Limits, applied
@@ -44,18 +44,73 @@ SET = (
     "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
     " (experiment.step=1e-3). May be repeated; values are expressions of parameters."
 )
-Overrides = Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)]
-Until = Annotated[str | None, option("T", "End of the run.")]
-SchemeName = Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")]
-MethodName = Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")]
-StepSize = Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")]
-Tolerance = Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")]
-CompletionName = Annotated[Completion | None, option("C", "Where transitions accumulate: contact, auto or none.")]
-Relaxation = Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")]
+AS_RUN = "Override a parameter, an initial value or a setting, as `hsdsl run` does. May be repeated."
 PAIR = "Draw one state or output against another, in one of the pictures. May be repeated."
+Until = Annotated[str | None, option("T", "End of the run.")]
+EngineName = Annotated[Engine, option("ENGINE", "auto, c or python.")]
 Phases = Annotated[list[str] | None, option("X,Y", PAIR, "--phase")]
 AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
 Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]
+
+
+def overriding(help: str) -> Any:
+    """The option ``--set``."""
+    return option("NAME=VALUE", help, "--set", complete=override_names)
+
+
+class Experiment(NamedTuple):
+    """Options that override a model's experiment and its values."""
+
+    overrides: Annotated[list[str] | None, overriding(SET)] = None
+    until: Until = None
+    scheme: Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")] = None
+    method: Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")] = None
+    step: Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")] = None
+    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")] = None
+    relaxation: Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")] = None
+    completion: Annotated[Completion | None, option("C", "Where transitions accumulate: contact, auto or none.")] = None
+
+    def settings(self, **more: Any) -> dict[str, Any]:
+        """Arguments of `Model.simulate`."""
+        given = self._asdict()
+        return values_of(given.pop("overrides")) | with_method(given) | more
+
+
+class Located(NamedTuple):
+    """Options of runs whose derivatives are taken: an adaptive method by scheme `located`."""
+
+    method: Annotated[Method | None, option("M", "An adaptive method, or auto.")] = None
+    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the scales.")] = None
+    engine: EngineName = "auto"
+
+    def settings(self, overrides: list[str] | None, **more: Any) -> dict[str, Any]:
+        """Arguments of the model's method."""
+        return values_of(overrides) | with_method(self._asdict()) | more
+
+
+class Answer(NamedTuple):
+    """Options of how a command answers, and of what a model file may read and need."""
+
+    json: Json = False
+    quiet: Quiet = False
+    allow_path: AllowPath = None
+    limit: Limit = None
+
+    @property
+    def hidden(self) -> bool:
+        """Whether progress is not shown."""
+        return self.quiet or self.json
+
+    def reporting(self) -> AbstractContextManager[None]:
+        """Report errors, and apply the limits while the command runs."""
+        return answering(self.json, self.allow_path, self.limit)
+
+    def give(self, record: Callable[[], Any], text: Callable[[], str]) -> None:
+        """Print a result as JSON or for a person."""
+        if self.json:
+            print_json(record())
+        elif not self.quiet:
+            print(text())
 
 
 @contextmanager
@@ -95,16 +150,34 @@ def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], 
     return split_overrides(overrides or ())
 
 
-def settings_of(overrides: list[str] | None, **settings: Any) -> dict[str, Any]:
-    """Arguments of `Model.simulate` from ``--set`` and options."""
-    parameters, initial, below = split(overrides)
-    settings["method"] = settings["method"] and str(settings["method"])
-    return settings | {"parameters": parameters, "initial": initial, "settings": below}
+def values_of(overrides: list[str] | None) -> dict[str, Any]:
+    """Parameters, initial values and settings of ``--set``, as arguments of `Model.simulate`."""
+    return dict(zip(("parameters", "initial", "settings"), split(overrides), strict=True))
+
+
+def with_method(settings: dict[str, Any]) -> dict[str, Any]:
+    """Write the method as its name."""
+    return settings | {"method": settings["method"] and str(settings["method"])}
 
 
 def names_of(text: str | None) -> list[str]:
     """The names in a text with commas between them."""
     return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def known_names(text: str | None, known: Sequence[str], name: str) -> tuple[str, ...]:
+    """The names in a text with commas between them.
+
+    Raises
+    ------
+    UsageError
+        One of them is not known.
+    """
+    names = names_of(text)
+    for each in names:
+        if each not in known:
+            raise UsageError(f"{name}: there is no '{each}'", did_you_mean(each, known))
+    return tuple(names)
 
 
 def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:

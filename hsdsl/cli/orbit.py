@@ -3,26 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from hsdsl.cli.completion import override_names
-from hsdsl.cli.console import print_json, say
-from hsdsl.cli.options import (
-    AllowPath,
-    Engine,
-    Json,
-    Limit,
-    Method,
-    Model,
-    Quiet,
-    answering,
-    check_target,
-    option,
-    split,
-)
+from hsdsl.cli.console import say
+from hsdsl.cli.options import AS_RUN, Answer, Located, Model, check_target, option, overriding
 from hsdsl.errors import UsageError
 
-SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does. May be repeated."
 SECTION = "The transition that the orbit is cut at, by its name."
 LAPS = "How many transitions of the section close the orbit."
 FOLLOW = "Follow the orbit in a parameter from A to B, and mark folds, flips and grazing."
@@ -31,30 +17,23 @@ PERIOD = "The period of the forcing, an expression of parameters; left out, that
 
 def orbit(
     model: Model,
+    *,
     section: Annotated[str, option("EDGE", SECTION)],
     laps: Annotated[int, option("N", LAPS)] = 1,
     period: Annotated[str | None, option("T", PERIOD)] = None,
     follow: Annotated[str | None, option("PARAM=A:B", FOLLOW, "--continue")] = None,
-    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
     until: Annotated[str | None, option("T", "End of the run that the first guess is from.")] = None,
-    method: Annotated[Method | None, option("M", "An adaptive method, or auto.")] = None,
-    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the scales.")] = None,
-    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    located: Located,
     plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         check_target(plot, "--plot", (".png", ".svg"))
         from hsdsl.model import load
 
-        parameters, initial, settings = split(overrides)
-        call: dict[str, Any] = {"until": until, "method": method and str(method), "tolerance": tolerance}
-        call |= {"engine": engine, "parameters": parameters, "initial": initial, "settings": settings}
-        call |= {"laps": laps, "period": period}
+        call = located.settings(overrides, until=until, laps=laps, period=period)
         loaded = load(model)
         if follow is None:
             found = loaded.orbit(section, **call)
@@ -63,10 +42,7 @@ def orbit(
         if plot is not None:
             found.plot(plot)
             say(f"wrote {plot}")
-        if json:
-            print_json(found.as_json())
-        elif not quiet:
-            print(found.summary)
+        answer.give(found.as_json, lambda: found.summary)
 
 
 def _range(text: str) -> tuple[str, str, str]:

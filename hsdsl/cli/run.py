@@ -8,30 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Exit, Option
 
-from hsdsl.cli.console import print_json, progress, say
-from hsdsl.cli.options import (
-    AllowPath,
-    CompletionName,
-    Engine,
-    Json,
-    Limit,
-    MethodName,
-    Model,
-    Overrides,
-    Phases,
-    Quiet,
-    Relaxation,
-    SchemeName,
-    StepSize,
-    Tolerance,
-    Until,
-    answering,
-    check_target,
-    names_of,
-    option,
-    pairs_of,
-    settings_of,
-)
+from hsdsl.cli.console import progress, say
+from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, check_target, names_of, option, pairs_of
 from hsdsl.cli.shown import needed, shown_of, write_film
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
@@ -55,15 +33,9 @@ OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".h
 
 def run(
     model: Model,
-    overrides: Overrides = None,
-    until: Until = None,
-    scheme: SchemeName = None,
-    method: MethodName = None,
-    step: StepSize = None,
-    tolerance: Tolerance = None,
-    relaxation: Relaxation = None,
-    completion: CompletionName = None,
-    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    *,
+    experiment: Experiment,
+    engine: EngineName = "auto",
     precision: Annotated[int | None, option("DIGITS", PRECISION)] = None,
     outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
     estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
@@ -73,27 +45,21 @@ def run(
     phase: Phases = None,
     animate: Annotated[Path | None, option("FILE", FILM)] = None,
     speed: Annotated[float | None, option("X", SPEED)] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Simulate a model and summarise what happened."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         check_target(out, "--out", OUT_SUFFIXES)
         if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
             raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
         check_target(plot, "--plot", PLOT_SUFFIXES)
         check_target(animate, "--animate", (".gif", ".mp4"))
-        loaded = _load(model, engine, precision, scheme)
-        settings = settings_of(
-            overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
-            relaxation=relaxation, completion=completion, engine=engine, precision=precision,
-        )  # fmt: skip
+        loaded = _load(model, engine, precision, experiment.scheme)
+        settings = experiment.settings(engine=engine, precision=precision)
         names = chosen_names(outputs, loaded.columns)
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
         result: Any
-        with progress(quiet or json) as show:
+        with progress(answer.hidden) as show:
             settings["watch"] = show and partial(running, show)
             if every is None:
                 result = loaded.simulate(**settings, outputs=needed(shown))
@@ -105,15 +71,15 @@ def run(
                 settings = {name: value for name, value in settings.items() if value is not None}
                 result = loaded.stream(out, every=every, columns=names, **settings)
         if every is None:
-            _answer(loaded, result, shown, estimate, out, plot, settings["parameters"], json, quiet)
+            _answer(loaded, result, shown, estimate, out, plot, settings["parameters"], answer)
             if animate is not None:
-                write_film(loaded, animate, speed, settings, quiet or json)
+                write_film(loaded, animate, speed, settings, answer.hidden)
         else:
-            _answer_streamed(result, model, json, quiet)
+            _answer_streamed(result, model, answer)
     stop = result.stop
     if not stop.complete:
-        if not json:
-            say(f"hsdsl: stopped ({stop.reason})" + (f": {stop.message}" if quiet else ""))
+        if not answer.json:
+            say(f"hsdsl: stopped ({stop.reason})" + (f": {stop.message}" if answer.quiet else ""))
         raise Exit(INTERRUPTED if stop.reason == "interrupted" else STOPPED)
 
 
@@ -135,8 +101,7 @@ def _answer(
     out: Path | None,
     plot: Path | None,
     parameters: dict[str, str],
-    json: bool,
-    quiet: bool,
+    answer: Answer,
 ) -> None:
     """Save, draw and print a run."""
     names = shown["columns"]
@@ -149,22 +114,23 @@ def _answer(
     if plot is not None:
         model.plot(execution, plot, parameters, **shown)
         say(f"wrote {plot}")
-    if json:
-        _print_json(execution, names, estimated)
-    elif not quiet:
-        from hsdsl.report import summary
-
-        print(summary(execution) + ("" if estimated is None else f"\n{estimated.sentence}"))
+    answer.give(lambda: _record(execution, names, estimated), lambda: _text(execution, estimated))
 
 
-def _print_json(execution: Execution, names: list[str] | None, estimated: Any) -> None:
+def _text(execution: Execution, estimated: Any) -> str:
+    from hsdsl.report import summary
+
+    return summary(execution) + ("" if estimated is None else f"\n{estimated.sentence}")
+
+
+def _record(execution: Execution, names: list[str] | None, estimated: Any) -> dict[str, Any]:
     from hsdsl.report import as_json
 
     result = as_json(execution)
     if names is not None:
         chosen = result["final"]["outputs"]
         result["final"]["outputs"] = {name: value for name, value in chosen.items() if name in names}
-    print_json(result | ({} if estimated is None else {"estimate": estimated.as_json()}))
+    return result | ({} if estimated is None else {"estimate": estimated.as_json()})
 
 
 def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
@@ -180,31 +146,34 @@ def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
     return names
 
 
-def _answer_streamed(run: Streamed, model: Path, json: bool, quiet: bool) -> None:
+def _answer_streamed(run: Streamed, model: Path, answer: Answer) -> None:
     """Print a streamed run; its transitions are in the file, so they are only counted."""
-    if not json:
-        if not quiet:
-            print(f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}")
-            print(f"stop      {run.stop.reason}: {run.stop.message}\ntransitions {run.transitions}")
-        return
+    answer.give(
+        lambda: _streamed(run, model),
+        lambda: (
+            f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}\n"
+            f"stop      {run.stop.reason}: {run.stop.message}\ntransitions {run.transitions}"
+        ),
+    )
+
+
+def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
     final = run.final
     states = [name for name, present in zip(final.states, final.present[0], strict=True) if present]
-    print_json(
-        {
-            "model": str(model),
-            "engine": run.engine,
-            "scheme": run.scheme,
-            "method": run.method,
-            "overrides": run.overrides,
-            "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
-            "transition_count": run.transitions,
-            "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
-            "final": {
-                "time": float(final.time[0]),
-                "mode": str(final.mode[0]),
-                "state": {name: float(final[name][0]) for name in states},
-                "outputs": {name: float(final[name][0]) for name in final.outputs},
-            },
-            "seconds": {"simulate": run.seconds},
-        }
-    )
+    return {
+        "model": str(model),
+        "engine": run.engine,
+        "scheme": run.scheme,
+        "method": run.method,
+        "overrides": run.overrides,
+        "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
+        "transition_count": run.transitions,
+        "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
+        "final": {
+            "time": float(final.time[0]),
+            "mode": str(final.mode[0]),
+            "state": {name: float(final[name][0]) for name in states},
+            "outputs": {name: float(final[name][0]) for name in final.outputs},
+        },
+        "seconds": {"simulate": run.seconds},
+    }

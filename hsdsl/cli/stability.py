@@ -7,11 +7,9 @@ from typing import Annotated, Any
 
 from typer import Option
 
-from hsdsl.cli.completion import override_names
-from hsdsl.cli.console import print_json, progress, say
-from hsdsl.cli.options import AllowPath, Json, Limit, Model, Quiet, answering, check_target, names_of, option, split
+from hsdsl.cli.console import progress, say
+from hsdsl.cli.options import Answer, Model, check_target, known_names, option, overriding, values_of
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
 
 MAP = (
     "Two of h, tolerance, relaxation, parameters and initial.NAME, each with its range if not the default:"
@@ -23,23 +21,21 @@ AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi
 
 def stability(
     model: Model,
+    *,
     map: Annotated[str, option("X,Y", MAP, "--map")],
     scheme: Annotated[str | None, option("A,B", "Our schemes; else the file's.")] = None,
     method: Annotated[str | None, option("A,B", "Our methods; else rk4 on maps of h, and auto.")] = None,
     against: Annotated[str | None, option("A,B", AGAINST)] = None,
-    overrides: Annotated[list[str] | None, option("NAME=VALUE", SET, "--set", complete=override_names)] = None,
+    overrides: Annotated[list[str] | None, overriding(SET)] = None,
     patience: Annotated[float, option("S", "Processor seconds of a run; a longer one is stuck.")] = 10.0,
     processes: Annotated[int | None, option("N", "How many at a time; else as many as there are cores.")] = None,
     rho: Annotated[bool, Option(help="Compute rho of runs that get to the end.")] = True,
     out: Annotated[Path | None, option("FILE", "Write a line for each run: .csv.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the map: .png or .svg.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Map where methods converge, miss transitions, blow up or get stuck, against an exact or precise run."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         from hsdsl.chart import PEERS
         from hsdsl.chart.stability import stability_map
         from hsdsl.integrators import METHODS
@@ -50,14 +46,13 @@ def stability(
         check_target(plot, "--plot", (".png", ".svg"))
         if not 0 < patience < 1e6 or (processes is not None and processes < 1):
             raise UsageError("--patience and --processes: expected positive numbers")
-        parameters, initial, settings = split(overrides)
         options: dict[str, Any] = {
-            "schemes": _known(scheme, (*SCHEMES,), "--scheme"),
-            "methods": _known(method, ("auto", *METHODS), "--method"),
-            "against": _known(",".join(PEERS) if against == "all" else against, (*PEERS,), "--against"),
+            "schemes": known_names(scheme, (*SCHEMES,), "--scheme"),
+            "methods": known_names(method, ("auto", *METHODS), "--method"),
+            "against": known_names(",".join(PEERS) if against == "all" else against, (*PEERS,), "--against"),
         }
-        options |= {"parameters": parameters, "initial": initial, "settings": settings}
-        with progress(quiet or json) as show:
+        options |= values_of(overrides)
+        with progress(answer.hidden) as show:
 
             def watch(done: int, count: int) -> None:
                 if show:
@@ -65,10 +60,10 @@ def stability(
 
             given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
             found = stability_map(load(model), map, **options, **given)
-        _report(found, out, plot, json, quiet)
+        _report(found, out, plot, answer)
 
 
-def _report(found: Any, out: Path | None, plot: Path | None, json: bool, quiet: bool) -> None:
+def _report(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
     from hsdsl.chart.stability.table import as_csv, as_plain, as_text, axis, panels, shaded
     from hsdsl.store import forget_sidecar
     from hsdsl.store.atomic import replacing
@@ -83,15 +78,4 @@ def _report(found: Any, out: Path | None, plot: Path | None, json: bool, quiet: 
 
         plot_stability(plot, found.name, axis(found.x), axis(found.y), panels(found), shaded(found))
         say(f"wrote {plot}")
-    if json:
-        print_json(as_plain(found))
-    elif not quiet:
-        print(as_text(found))
-
-
-def _known(text: str | None, known: tuple[str, ...], name: str) -> list[str]:
-    names = names_of(text)
-    for each in names:
-        if each not in known:
-            raise UsageError(f"{name}: there is no '{each}'", did_you_mean(each, known))
-    return names
+    answer.give(lambda: as_plain(found), lambda: as_text(found))

@@ -9,27 +9,8 @@ from typing import Annotated, Any
 from typer import Argument, Exit
 
 from hsdsl.cli.completion import model_files
-from hsdsl.cli.console import print_json, progress, say
-from hsdsl.cli.options import (
-    AllowPath,
-    CompletionName,
-    Engine,
-    Json,
-    Limit,
-    MethodName,
-    Overrides,
-    Quiet,
-    Relaxation,
-    SchemeName,
-    StepSize,
-    Tolerance,
-    Until,
-    answering,
-    check_target,
-    names_of,
-    option,
-    settings_of,
-)
+from hsdsl.cli.console import progress, say
+from hsdsl.cli.options import Answer, EngineName, Experiment, check_target, names_of, option
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
 
@@ -48,21 +29,15 @@ TAIL = "The share of each run, at its end, whose transitions and samples are in 
 
 def sweep(
     model: Model = None,
+    *,
     vary: Annotated[list[str] | None, option("NAME=VALUES", VARY)] = None,
     out: Annotated[Path | None, option("DIR", "The folder of the dataset; the same command goes on with it.")] = None,
     random: Annotated[int | None, option("N", "Rows at each point, where something is drawn.")] = None,
     seed: Annotated[int, option("S", "Of the draws.")] = 0,
     record: Annotated[str, option("A,B", RECORD)] = "final",
     outputs: Annotated[str | None, option("A,B", "Only these states and outputs.")] = None,
-    overrides: Overrides = None,
-    until: Until = None,
-    scheme: SchemeName = None,
-    method: MethodName = None,
-    step: StepSize = None,
-    tolerance: Tolerance = None,
-    relaxation: Relaxation = None,
-    completion: CompletionName = None,
-    engine: Annotated[Engine, option("ENGINE", "auto, c or python.")] = "auto",
+    experiment: Experiment,
+    engine: EngineName = "auto",
     cluster: Annotated[str | None, option("ADDRESS", "The scheduler of a Dask cluster.")] = None,
     processes: Annotated[int | None, option("N", "How many here; else as many as there are cores.")] = None,
     chunk: Annotated[int | None, option("ROWS", CHUNK)] = None,
@@ -70,13 +45,10 @@ def sweep(
     plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg; --show draws to DIR/_picture.png.")] = None,
     of: Annotated[str | None, option("COLUMN", OF)] = None,
     tail: Annotated[float, option("SHARE", TAIL)] = 0.5,
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Run a model over many values, into a dataset of Parquet files."""
-    with answering(json, allow_path, limit):
+    with answer.reporting():
         check_target(plot, "--plot", (".png", ".svg"))
         _check(model, vary, out, show)
         if show is not None:
@@ -84,17 +56,16 @@ def sweep(
 
             found = load(show)
         else:
-            settings = settings_of(
-                overrides, until=until, scheme=scheme, method=method, step=step, tolerance=tolerance,
-                relaxation=relaxation, completion=completion, engine=engine,
+            settings = experiment.settings(
+                engine=engine, random=random, seed=seed, record=record, cluster=cluster, processes=processes,
+                chunk=chunk, outputs=names_of(outputs) or None,
             )  # fmt: skip
-            settings |= {"random": random, "seed": seed, "record": record, "cluster": cluster}
-            settings |= {"processes": processes, "chunk": chunk, "outputs": names_of(outputs) or None}
             assert model is not None and vary is not None and out is not None
-            found = _run(model, vary, out, settings, quiet or json)
-        _report(
-            found, plot or (show and show / "_picture.png"), of, tail, plot is not None or of is not None, json, quiet
-        )
+            found = _run(model, vary, out, settings, answer.hidden)
+        target = plot or (show and show / "_picture.png")
+        if target is not None:
+            _draw(found, target, of, tail, plot is not None or of is not None)
+        answer.give(found.as_json, lambda: found.summary)
 
 
 def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: Path | None) -> None:
@@ -167,12 +138,3 @@ def _draw(found: Any, plot: Path, of: str | None, tail: float, needed: bool) -> 
         if needed:
             raise
         say(f"no picture: {error}")
-
-
-def _report(found: Any, plot: Path | None, of: str | None, tail: float, needed: bool, json: bool, quiet: bool) -> None:
-    if plot is not None:
-        _draw(found, plot, of, tail, needed)
-    if json:
-        print_json(found.as_json())
-    elif not quiet:
-        print(found.summary)

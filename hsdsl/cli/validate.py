@@ -7,20 +7,18 @@ from typing import Any
 
 from hsdsl.cli.console import counted
 from hsdsl.cli.diagnostic_report import DiagnosticReport
-from hsdsl.cli.options import AllowPath, Formatted, Json, Limit, Models, Quiet, answering
+from hsdsl.cli.options import Answer, Formatted, Models
 
 
 def validate(
     models: Models,
+    *,
     format: Formatted = "text",
-    json: Json = False,
-    quiet: Quiet = False,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Check model files and report every error in them."""
-    report = DiagnosticReport("json" if json else format, quiet, "valid")
-    with answering(json, allow_path, limit):
+    report = DiagnosticReport("json" if answer.json else format, answer.quiet, "valid")
+    with answer.reporting():
         report.examine(models, _look)
     report.finish()
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
+from inspect import Parameter, Signature, signature
 from keyword import iskeyword
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, cast, get_type_hints
 
 from typer import Abort, Context, Exit, Option, Typer, TyperException
 from typer.core import TyperGroup
@@ -29,8 +30,37 @@ def command(verb: str) -> Any:
     """Import a command."""
     single = Typer(add_completion=False, rich_markup_mode=None)
     name = f"{verb}_" if iskeyword(verb) else verb
-    single.command(verb, context_settings=SETTINGS)(getattr(import_module(f"hsdsl.cli.{verb}"), name))
+    single.command(verb, context_settings=SETTINGS)(flat(getattr(import_module(f"hsdsl.cli.{verb}"), name)))
     return get_command(single)
+
+
+def flat(command: Callable[..., None]) -> Callable[..., None]:
+    """A command in which each group of options, a named tuple, is replaced by its options."""
+    groups: dict[str, type[Any]] = {}
+    parameters: list[Parameter] = []
+    for parameter in signature(command, eval_str=True).parameters.values():
+        group = parameter.annotation
+        if hasattr(group, "_fields"):
+            groups[parameter.name] = group
+            kinds = get_type_hints(group, include_extras=True)
+            defaults = group._field_defaults
+            parameters += [_option(name, kinds[name], default=defaults[name]) for name in kinds]
+        else:
+            parameters.append(_option(parameter.name, group, default=parameter.default))
+
+    def run(**values: Any) -> None:
+        for name, group in groups.items():
+            values[name] = group(**{field: values.pop(field) for field in group._fields})
+        command(**values)
+
+    run.__doc__ = command.__doc__
+    run.__signature__ = Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
+
+
+def _option(name: str, kind: Any, default: Any) -> Parameter:
+    return Parameter(name, Parameter.KEYWORD_ONLY, annotation=kind, default=default)
 
 
 class _Verbs(TyperGroup):
