@@ -319,6 +319,12 @@ class HybridSystem:
         return tuple(dict.fromkeys(name for mode in self.modes for name in mode.states))
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The names of states, parameters, inputs, definitions and outputs."""
+        given = (*self.parameters, *self.inputs, *self.definitions)
+        return (*self.states, *(each.name for each in given), *self.outputs)
+
+    @property
     def parameter_symbols(self) -> tuple[sp.Symbol, ...]:
         """The symbol of each parameter, in file order."""
         return tuple(symbol(parameter.name) for parameter in self.parameters)

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import copysign
 
 from hsdsl.arithmetic import FLOAT64
 
@@ -35,6 +36,14 @@ C_OPERATORS: Mapping[type[ast.AST], str] = {
     ast.USub: "-",
     ast.Not: "!",
 }
+
+
+def number_text(value: float, nan: str, infinity: str, finite: Callable[[float], str] = repr) -> str:
+    """Write a number without loss, in parentheses where it is negative."""
+    if value != value:
+        return nan
+    text = infinity if abs(value) == float("inf") else finite(abs(value))
+    return f"(-{text})" if copysign(1, value) < 0 else text
 
 
 @dataclass(frozen=True)

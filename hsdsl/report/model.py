@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from html import escape
 
 from hsdsl.elaborate.functions import named_functions
@@ -22,7 +22,7 @@ CSS = ".hsdsl summary { cursor: pointer } .hsdsl ul { margin: .2rem 0 } .hsdsl .
 def model_html(system: HybridSystem, program: Program) -> str:
     """Return the model in a ``div``; every text of the model is escaped, and nothing is fetched."""
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
-    math = Mathematics(_names(system), named_functions(system.functions, parameters))
+    math = Mathematics(system.names, named_functions(system.functions, parameters))
     kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(system.modes))
     count = f"{number} {kind}{'s' * (number != 1)}"
     heading = f"<p><strong>{_said(system.title or system.path)}</strong><br>{count}, {_start(system, math)}</p>"
@@ -43,14 +43,6 @@ def model_html(system: HybridSystem, program: Program) -> str:
 
 def _said(text: str) -> str:
     return escape(visible_lines(text))
-
-
-def _names(system: HybridSystem) -> Iterable[str]:
-    yield from system.states
-    yield from (parameter.name for parameter in system.parameters)
-    yield from (given.name for given in system.inputs)
-    yield from (definition.name for definition in system.definitions)
-    yield from system.outputs
 
 
 def _start(system: HybridSystem, math: Mathematics) -> str:

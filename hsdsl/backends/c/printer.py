@@ -5,16 +5,12 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text
 
 
 def literal(value: float) -> str:
     """Write a number without loss."""
-    if value != value:
-        return "NAN"
-    if value in (float("inf"), float("-inf")):
-        return "INFINITY" if value > 0 else "(-INFINITY)"
-    return f"({value.hex()})" if value < 0 else value.hex()
+    return number_text(value, "NAN", "INFINITY", float.hex)
 
 
 def constant(value: float) -> str:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text
 
 
 def literal(value: float) -> str:
     """Write a number without loss."""
-    if value != value:
-        return "NAN"
-    if value in (float("inf"), float("-inf")):
-        return "INF" if value > 0 else "(-INF)"
-    return f"({value!r})" if value < 0 else repr(value)
+    return number_text(value, "NAN", "INF")
 
 
 def _results(values: Sequence[str]) -> list[str]:

@@ -40,7 +40,7 @@ def document(source: Source) -> str:
     if system.unknowns:
         raise UsageError("a model with `solve` cannot be written as LaTeX", "write its solutions under `let`")
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
-    math = Mathematics(_names(system), named_functions(system.functions, parameters))
+    math = Mathematics(system.names, named_functions(system.functions, parameters))
     lines = [*(f"% {line}" for line in source.heading), _HEAD, rf"\section*{{{escaped(system.title or source.name)}}}"]
     lines += [escaped(system.source), ""] if system.source else []
     lines += _parameters(source, math)
@@ -53,14 +53,6 @@ def document(source: Source) -> str:
         lines += _mode(system, mode, math)
     lines += _run(source, math)
     return "\n".join([*lines, r"\end{document}", ""])
-
-
-def _names(system: HybridSystem) -> Iterable[str]:
-    yield from system.states
-    yield from (parameter.name for parameter in system.parameters)
-    yield from (given.name for given in system.inputs)
-    yield from (definition.name for definition in system.definitions)
-    yield from system.outputs
 
 
 def _parameters(source: Source, math: Mathematics) -> list[str]:

@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text
 
 _WORDS = """
 break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction endif
@@ -36,13 +36,7 @@ HELPERS = {
 
 def literal(value: float) -> str:
     """Write a number without loss."""
-    if value != value:
-        return "NaN"
-    if value in (float("inf"), float("-inf")):
-        return "Inf" if value > 0 else "(-Inf)"
-    text = repr(value)
-    text = text.removesuffix(".0")
-    return f"({text})" if value < 0 else text
+    return number_text(value, "NaN", "Inf", lambda number: repr(number).removesuffix(".0"))
 
 
 def _results(values: Sequence[str]) -> list[str]:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text
 
 
 def literal(value: float) -> str:
     """Write a number without loss: the shortest decimals that are read as it."""
-    if value != value:
-        return "f64::NAN"
-    if value in (float("inf"), float("-inf")):
-        return "f64::INFINITY" if value > 0 else "(-f64::INFINITY)"
-    return f"({value!r})" if value < 0 else repr(value)
+    return number_text(value, "f64::NAN", "f64::INFINITY")
 
 
 def string(text: str) -> str:
