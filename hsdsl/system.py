@@ -156,7 +156,7 @@ class Mode:
     has the numbers of the system's shapes, one shape behind the other.
     ``slides`` names the two modes between which a mode of a completion slides. A final mode without flow has
     ``states == ()`` here: it has the states it is entered with. The last ``derived`` states are derivatives of the
-    others: no surface or condition depends on them, and their flow is linear in them.
+    others, and the flow's Jacobian leaves out how they depend on these.
     """
 
     name: str

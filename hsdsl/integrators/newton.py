@@ -63,10 +63,10 @@ class Convergence:
         noise = NOISE * unit / tolerance
         enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
         left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
-        late = _followers(scales)
         for count, (largest, z) in enumerate(iterations, 1):
             size = _scaled(largest, x, scales, z) / tolerance
-            if before is not None and count > 1 + late:
+            rated = before is not None and count > 1 + _followers(x, scales, z)
+            if rated:
                 rate = size / before
                 if rate >= DIVERGING:
                     if size <= noise:
@@ -78,7 +78,6 @@ class Convergence:
             if size == 0 or ahead <= enough:
                 self.left = left
                 return z
-            rated = before is not None and count > 1 + late
             for _ in range(count, MOST if rated else count):
                 ahead = ahead * self.rate
             if count == MOST or (rated and ahead > enough and size > noise):
@@ -97,7 +96,6 @@ class Convergence:
         """
         unit, before, z = self._arithmetic.unit, None, None
         allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
-        late = _followers(scales)
         for count, (largest, z) in enumerate(islice(iterations, 16 + 2 * self._arithmetic.bits), 1):
             size = _scaled(largest, x, scales, z)
             rate = SLOW if not before else size / before
@@ -105,7 +103,7 @@ class Convergence:
             if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
                 self.rate, self.aged = rate, rate > RENEWED
                 return z
-            if before and rate >= SLOW and count > 1 + late:
+            if before and rate >= SLOW and count > 1 + _followers(x, scales, z):
                 if size <= allowed:
                     return z
                 self.rate, self.aged = self._arithmetic.zero + 1, True
@@ -125,6 +123,7 @@ def _scaled(largest: Vector, x: State, scales: Sequence[Number], z: Increments) 
     return size
 
 
-def _followers(scales: Sequence[Number]) -> int:
-    """How many states have been zero so far: each may follow another one, an iteration later."""
-    return sum(not s > 0 for s in scales)
+def _followers(x: State, scales: Sequence[Number], z: Increments) -> int:
+    """How many states that have been zero so far no longer are: each may follow another one, an iteration later."""
+    moved = (max(abs(x[i] + k[i]) for k in z) > 0 for i, s in enumerate(scales) if not s > 0)
+    return sum(moved)

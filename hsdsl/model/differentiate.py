@@ -103,14 +103,6 @@ class Differentiator:
 
     def _prepare(self, ready: _Ready) -> _Ready:
         """Prepare the run of the augmented system with the numbers and the method of the plain one."""
-        key = (ready.by, ready.entries, ready.firsts, ready.change.structure)
-        if key not in self._augmented:
-            from hsdsl.sensitivity.augment import augmented, preferring
-
-            self._augmented[key] = self.pipeline.derived(
-                ("derivatives", *(t.label for t in ready.by), str(ready.entries), *ready.firsts, repr(key[-1])),
-                lambda: preferring(augmented(ready.change, ready.by, ready.entries), ready.firsts),
-            )
         settings, arithmetic = ready.setting.plain.settings, ready.setting.plain.arithmetic
         allowed = tolerance = settings.tolerance
         assert settings.method is not None and allowed is not None and tolerance is not None
@@ -138,8 +130,22 @@ class Differentiator:
             "engine": ready.call.get("engine") or "auto",
             "precision": ready.call.get("precision"),
         }
-        prepared = self._augmented[key].prepare(arguments)
+        prepared = self._written(ready, method).prepare(arguments)
         return replace(ready, setting=replace(ready.setting, augmented=prepared))
+
+    def _written(self, ready: _Ready, method: str) -> Pipeline:
+        """The augmented system for runs by a method."""
+        implicit = METHODS[method].implicit
+        key = (ready.by, ready.entries, ready.firsts, implicit, ready.change.structure)
+        if key not in self._augmented:
+            from hsdsl.sensitivity.augment import augmented, preferring
+
+            texts = (*(t.label for t in ready.by), str(ready.entries), str(implicit), *ready.firsts, repr(key[-1]))
+            self._augmented[key] = self.pipeline.derived(
+                ("derivatives", *texts),
+                lambda: preferring(augmented(ready.change, ready.by, ready.entries, implicit), ready.firsts),
+            )
+        return self._augmented[key]
 
 
 @dataclass(frozen=True)

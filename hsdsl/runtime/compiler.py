@@ -27,6 +27,8 @@ FLAGS = (
     "-Wno-ignored-optimization-argument",  # clang does so by default
     "-ffp-contract=off",  # no a*b + c in one rounding
     "-fno-math-errno",
+    "-fopenmp-simd",  # loops over the states of an implicit step, two or more at once
+    "-DHS_LANES",
     *(f"-fno-builtin-{name}" for name in (*EXACT, "exp", "log", "pow", "atan2")),  # those of the library, as Python's
     "-fPIC",
     "-fvisibility=hidden",

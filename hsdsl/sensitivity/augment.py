@@ -31,12 +31,14 @@ from hsdsl.sensitivity.state_names import ERROR, LAST, SPAN, UNIT, derivative_na
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, started
 
 
-def augmented(given: Overridden, by: Sequence[Target], entries: bool = False) -> HybridSystem:
+def augmented(given: Overridden, by: Sequence[Target], entries: bool = False, implicit: bool = False) -> HybridSystem:
     """Write a system with the derivatives of its states.
 
     ``entries`` lets it make transitions on entry; without it those of a run have the derivative of a crossing.
+    ``implicit`` says that an implicit method runs it: its Jacobian then has the second derivatives of the flow, without
+    which the derivatives follow the states an iteration later, and no factors of a step serve for the next.
     """
-    return _Writer(given, by, entries).system()
+    return _Writer(given, by, entries, implicit).system()
 
 
 def preferring(system: HybridSystem, firsts: Sequence[str]) -> HybridSystem:
@@ -52,8 +54,9 @@ def preferring(system: HybridSystem, firsts: Sequence[str]) -> HybridSystem:
 
 
 class _Writer:
-    def __init__(self, given: Overridden, by: Sequence[Target], entries: bool) -> None:
+    def __init__(self, given: Overridden, by: Sequence[Target], entries: bool, implicit: bool) -> None:
         self.base, self.labels, self.entries = given.system, [t.label for t in by], entries
+        self.implicit = implicit
         self.of = Derivatives(given, by)
         self.start = self._start(given, by)
         self.dependence = Dependence(self.of, self.start, self.base.initial.mode)
@@ -128,7 +131,7 @@ class _Writer:
         jumps = self.dependence.jumps[mode.name]
         return replace(
             mode,
-            derived=len(states) - len(mode.states),
+            derived=0 if self.implicit else len(states) - len(mode.states),
             states=states,
             flow=(*mode.flow, *derivatives, *still),
             flow_texts=(*mode.flow_texts, *(f"the {name}" for name in states[len(mode.flow) :])),

@@ -1,4 +1,4 @@
-"""Guards that a transition leads onto: executions from nearby that begin beyond one part from the run.
+"""Guards that a start or a transition leads onto: executions from nearby that begin beyond one part from the run.
 
 To first order a surface is moved by its derivative through states, time and parameters. Where that is not zero, the
 executions on one side begin beyond the guard: no derivative exists from there on.
@@ -12,39 +12,48 @@ from typing import Any
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
 from hsdsl.simulate.input_segments import make_timeline
-from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
 Row = Mapping[str, Any]  # a derivative by each target
 
 
-def parted(
-    run: RunView, made: Transition, time: Row, state: Mapping[str, Row], parameters: Mapping[str, Sequence[Number]]
-) -> Iterator[tuple[Number, str]]:
-    """The time and the reason where the landing of a transition parts nearby executions.
-
-    ``run`` may have further states than its modes. ``time`` and ``state`` are the derivatives of the landing's time and
-    states, ``parameters`` those of all parameters by each target.
-    """
-    state_there = made.after or made.before
+def landing(run: RunView, made: Transition) -> Place:
+    """Where a transition leads, of a run that may have further states than its modes."""
+    state = made.after or made.before
     mode = run.problem.program.modes[run.index(made.target)]
-    place = run.place(made.target, made.time, tuple(state_there[x] for x in mode.states))
+    return run.place(made.target, made.time, tuple(state[x] for x in mode.states))
+
+
+def parted(
+    run: RunView,
+    place: Place,
+    time: Row,
+    state: Mapping[str, Row],
+    parameters: Mapping[str, Sequence[Number]],
+    crossing: bool = False,
+) -> Iterator[str]:
+    """The surfaces that part executions near a place where a run begins or goes on, and what moves them there.
+
+    ``time`` and ``state`` are the derivatives of the place's time and states, ``parameters`` those of all parameters by
+    each target. ``crossing`` says that a surface which is crossed at once counts too.
+    """
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         try:
-            if _begins_on(place, k):
+            if _begins_on(place, k, crossing):
                 moved = (by for by, slopes in parameters.items() if _moves(run, place, k, time[by], state, by, slopes))
                 for by in moved:
-                    where = f"at t = {show(place.t)} {made.edge} leads onto the surface of {place.name(k)}"
-                    yield place.t, f"{where}, and from nearby, moved by {by}, beyond it or not"
+                    yield f"the surface of {place.name(k)}, and from nearby, moved by {by}, beyond it or not"
                     return
         except DOMAIN_ERRORS:
             continue
 
 
-def _begins_on(place: Place, k: int) -> bool:
-    """Whether a state is on a surface that it does not cross at once."""
-    if abs(place.value(k)) > place.roundoff_bound(k) or place.rate(k) > place.rate_roundoff(k):
+def _begins_on(place: Place, k: int, crossing: bool) -> bool:
+    """Whether a state is on a surface, one that it does not cross at once unless ``crossing``."""
+    if abs(place.value(k)) > place.roundoff_bound(k):
+        return False
+    if not crossing and place.rate(k) > place.rate_roundoff(k):
         return False
     return k >= len(place.mode.edges) or bool(place.kernel.conditions[k](place.t, *place.x)[0])
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
-from hsdsl.sensitivity.landing import parted
+from hsdsl.sensitivity.landing import landing, parted
 from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
 from hsdsl.sensitivity.ties import Tie, ties
 from hsdsl.sensitivity.touching import touched
@@ -158,9 +158,25 @@ class Sensitivity:
             after = made.after or {}
             time = self._shifts(after)
             state = self._followed(made.target, made.time, after, time, True)
-            if found := next(parted(view, made, time, state, self.setting.parameters), None):
-                return [found]
+            if found := next(parted(view, landing(view, made), time, state, self.setting.parameters), None):
+                return [(made.time, f"at t = {show(made.time)} {made.edge} leads onto {found}")]
         return []
+
+    @cached_property
+    def starts(self) -> tuple[str, ...]:
+        """Surfaces that the run starts on: the derivatives are those of the executions that start inside the domain.
+
+        Beyond a guard an execution makes its transition at once, so one that the run crosses at once counts as well.
+        """
+        run, arc = self.execution, self.execution.arcs[0]
+        at = dict(zip(arc.states, run.values[arc.first].tolist(), strict=False))
+        view = RunView(self.setting.plain, run)
+        time = dict.fromkeys(self.wrt, 0.0)
+        state = self._followed(arc.mode, run.times[0], at, time, True)
+        states = view.problem.program.modes[view.index(arc.mode)].states
+        place = view.place(arc.mode, run.times[0], tuple(at[x] for x in states))
+        found = parted(view, place, time, state, self.setting.parameters, crossing=True)
+        return tuple(f"the run starts on {reason}" for reason in found)
 
     @cached_property
     def touches(self) -> tuple[str, ...]:
@@ -177,7 +193,7 @@ class Sensitivity:
     @property
     def exists(self) -> bool | None:
         """Whether the derivatives exist; None where that is not known, as something of the run could not be decided."""
-        if self.breaks or self._smooth.theorem == "left":
+        if self.breaks or self.starts or self._smooth.theorem == "left":
             return False
         if self._smooth.theorem == "unknown" and self.touches:
             return False
@@ -186,7 +202,7 @@ class Sensitivity:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why they do not exist, or are not known to."""
-        own = tuple(reason for _, reason in self.breaks)
+        own = (*self.starts, *(reason for _, reason in self.breaks))
         return own if self._smooth.theorem == "holds" else (*own, *self.touches, *self._smooth.reasons)
 
     def _exists_at(self, index: int) -> bool:

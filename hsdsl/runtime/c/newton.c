@@ -30,10 +30,16 @@ HS_INLINE hs_real scaled(const hs_run *run, int n) {
   return size;
 }
 
-/* How many states have been zero so far: each may follow another one, an iteration later. */
+/* How many states that have been zero so far no longer are: each may follow another one, an iteration later. */
 HS_INLINE int followers(const hs_run *run, int n) {
+  const hs_radau *const radau = &run->radau;
   int count = 0;
-  for (int s = 0; s < n; s++) count += !(run->radau.scales[s] > 0);
+  for (int s = 0; s < n; s++) {
+    if (radau->scales[s] > 0) continue;
+    int moved = 0;
+    for (int i = 0; i < 3; i++) moved |= fabs(run->x[s] + radau->z[i][s]) > 0;
+    count += moved;
+  }
   return count;
 }
 
@@ -49,11 +55,10 @@ HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h) {
   const hs_real tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
   const hs_real enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
   hs_real left = pow(hs_max(convergence->left, HS_UNIT), (hs_real)4 / 5), before = 0.0;
-  const int late = followers(run, n);
   for (int count = 1;; count++) {
-    const int rated = count > 1 + late;
     const int status = iterate(run, n, t, h);
     if (status) return status;
+    const int rated = count > 1 && count > 1 + followers(run, n);
     const hs_real size = scaled(run, n) / tolerance;
     if (rated) {
       const hs_real rate = size / before;
@@ -95,7 +100,6 @@ HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h) {
   hs_convergence *const convergence = &run->radau.convergence;
   const hs_real allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
   hs_real before = 0.0;
-  const int late = followers(run, n);
   for (int count = 1; count <= MOST_TO_ROUNDOFF; count++) {
     const int status = iterate(run, n, t, h);
     if (status) return status;
@@ -105,7 +109,7 @@ HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h) {
       convergence->aged = rate > RENEWED;
       return 0;
     }
-    if (before != 0 && rate >= SLOW_RATE && count > 1 + late) return size <= allowed ? 0 : unsettled(convergence);
+    if (before != 0 && rate >= SLOW_RATE && count > 1 + followers(run, n)) return size <= allowed ? 0 : unsettled(convergence);
     before = size;
   }
   return 0;

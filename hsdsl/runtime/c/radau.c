@@ -4,7 +4,9 @@
 
 /* The weighted sum of three vectors. */
 HS_INLINE void weighted3(int n, const hs_real *w, hs_real *const v[3], hs_real *out) {
-  for (int s = 0; s < n; s++) out[s] = w[0] * v[0][s] + w[1] * v[1][s] + w[2] * v[2][s];
+  const hs_real *const a = v[0], *const b = v[1], *const c = v[2], p = w[0], q = w[1], r = w[2];
+  HS_SIMD
+  for (int s = 0; s < n; s++) out[s] = p * a[s] + q * b[s] + r * c[s];
 }
 
 /* Solve with the factors of the real matrix. */
@@ -16,6 +18,40 @@ HS_INLINE void solved_real(hs_run *run, int n, const hs_real *right, hs_real *fo
     solve(n, radau->real, radau->order, right, found);
 }
 
+HS_INLINE void plus(int n, const hs_real *a, const hs_real *b, hs_real *sum) {
+  HS_SIMD
+  for (int s = 0; s < n; s++) sum[s] = a[s] + b[s];
+}
+
+/* Make h g - (G, B) u of the sums g, to `right`. */
+HS_INLINE void right_sides(int n, hs_real h, const hs_collocation *known, hs_real *const *u, hs_real *const *right) {
+  const hs_real *const a = u[0], *const b = u[1], *const c = u[2];
+  const hs_real gamma = known->gamma, alpha = known->alpha, beta = known->beta;
+  hs_real *const p = right[0], *const q = right[1], *const r = right[2];
+  HS_SIMD
+  for (int s = 0; s < n; s++) {
+    p[s] = h * p[s] - gamma * a[s];
+    q[s] = h * q[s] - (alpha * b[s] + beta * c[s]);
+    r[s] = h * r[s] - (alpha * c[s] - beta * b[s]);
+  }
+}
+
+/* Add the changes d to u: the largest change of each state, and the sum of all. */
+HS_INLINE hs_real corrected(int n, hs_real *const *d, hs_real *const *u, hs_real *largest) {
+  const hs_real *const a = d[0], *const b = d[1], *const c = d[2];
+  for (int i = 0; i < 3; i++) {
+    const hs_real *const change = d[i];
+    hs_real *const apart = u[i];
+    HS_SIMD
+    for (int s = 0; s < n; s++) apart[s] = apart[s] + change[s];
+  }
+  HS_SIMD
+  for (int s = 0; s < n; s++) largest[s] = hs_max(hs_max(fabs(a[s]), fabs(b[s])), fabs(c[s]));
+  hs_real total = 0.0;
+  for (int s = 0; s < n; s++) total = total + (fabs(a[s]) + fabs(b[s]) + fabs(c[s]));
+  return total;
+}
+
 /* One iteration of Newton's method on Z = h A f(x + Z), in the coordinates that take A apart: the increments after it
    and the largest change of each state. Not 0 where the flow has no value there, or the change has none. */
 HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
@@ -23,17 +59,11 @@ HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
   const hs_collocation *const known = run->method->collocation;
   hs_real *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->slopes;
   for (int i = 0; i < 3; i++) {
-    for (int s = 0; s < n; s++) run->at[s] = run->x[s] + radau->z[i][s];
+    plus(n, run->x, radau->z[i], run->at);
     if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, f[i])) return NO_VALUE;
   }
-  for (int s = 0; s < n; s++) {
-    hs_real g[3];
-    for (int i = 0; i < 3; i++)
-      g[i] = known->unmix[i][0] * f[0][s] + known->unmix[i][1] * f[1][s] + known->unmix[i][2] * f[2][s];
-    radau->right[0][s] = h * g[0] - known->gamma * u[0][s];
-    radau->right[1][s] = h * g[1] - (known->alpha * u[1][s] + known->beta * u[2][s]);
-    radau->right[2][s] = h * g[2] - (known->alpha * u[2][s] - known->beta * u[1][s]);
-  }
+  for (int i = 0; i < 3; i++) weighted3(n, known->unmix[i], f, radau->right[i]);
+  right_sides(n, h, known, u, radau->right);
   const hs_real *const pair[2] = {radau->right[1], radau->right[2]};
   solved_real(run, n, radau->right[0], d[0]);
   if (n > 3 && run->here.table->elimination)
@@ -41,13 +71,7 @@ HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
                          radau->scratch[1], d[1], d[2]);
   else
     solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
-  hs_real total = 0.0;
-  for (int s = 0; s < n; s++) {
-    const hs_real a = fabs(d[0][s]), b = fabs(d[1][s]), c = fabs(d[2][s]);
-    for (int i = 0; i < 3; i++) u[i][s] = u[i][s] + d[i][s];
-    radau->largest[s] = hs_max(hs_max(a, b), c);
-    total = total + (a + b + c);
-  }
+  const hs_real total = corrected(n, d, u, radau->largest);
   for (int i = 0; i < 3; i++) weighted3(n, known->mix[i], u, radau->z[i]);
   return hs_finite(total) ? 0 : NO_CONVERGENCE;
 }
@@ -132,15 +156,16 @@ HS_INLINE void guess(hs_run *run, int n, hs_time t, hs_real h) {
   const int behind = radau->stepped && t == radau->start + radau->length;
   const int known_here = behind || (radau->stepped && t == radau->start);
   const hs_real share = h / radau->length;
-  for (int s = 0; s < n; s++) {
-    hs_real c[3];
-    for (int m = 0; m < 3; m++)
-      c[m] = known->power[m][0] * radau->last[0][s] + known->power[m][1] * radau->last[1][s] +
-             known->power[m][2] * radau->last[2][s];
-    for (int i = 0; i < 3; i++) {
-      const hs_real at = (behind ? 1.0 : 0.0) + known->node[i] * share, base = behind ? radau->last[2][s] : 0.0;
-      radau->z[i][s] = known_here ? at * (c[0] + at * (c[1] + at * c[2])) - base : 0.0;
-    }
+  hs_real *const c[3] = {radau->slopes[0], radau->slopes[1], radau->slopes[2]}; /* of the polynomial */
+  for (int m = 0; known_here && m < 3; m++) weighted3(n, known->power[m], radau->last, c[m]);
+  for (int i = 0; i < 3; i++) {
+    const hs_real at = (behind ? 1.0 : 0.0) + known->node[i] * share;
+    const hs_real *const end = radau->last[2];
+    hs_real *const z = radau->z[i];
+    for (int s = 0; !known_here && s < n; s++) z[s] = 0.0;
+    if (!known_here) continue;
+    HS_SIMD
+    for (int s = 0; s < n; s++) z[s] = at * (c[0][s] + at * (c[1][s] + at * c[2][s])) - (behind ? end[s] : 0.0);
   }
 }
 
@@ -193,13 +218,16 @@ HS_INLINE int estimate(hs_run *run, int n, hs_time t, hs_real h) {
   const hs_collocation *const known = run->method->collocation;
   hs_real *const inside = radau->slopes[0], *const embedded = radau->change[0], *const along = radau->change[1];
   weighted3(n, known->value, radau->z, run->at);
-  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + run->at[s];
+  plus(n, run->x, run->at, run->at);
   if (run->here.table->flow(run->here.p, t + known->share * h, run->at, inside)) return NO_VALUE;
   weighted3(n, known->estimate, radau->z, radau->right[0]);
   weighted3(n, known->slope, radau->z, radau->right[1]);
+  hs_real *const first = radau->right[0], *const second = radau->right[1];
+  const hs_real *const slope = run->slope;
+  HS_SIMD
   for (int s = 0; s < n; s++) {
-    radau->right[0][s] = h * run->slope[s] + radau->right[0][s];
-    radau->right[1][s] = h * inside[s] - radau->right[1][s];
+    first[s] = h * slope[s] + first[s];
+    second[s] = h * inside[s] - second[s];
   }
   solved_real(run, n, radau->right[0], embedded);
   solved_real(run, n, radau->right[1], along);

@@ -17,6 +17,12 @@
 #define HS_INLINE static inline
 #endif
 
+#if defined(HS_LANES) /* given by who has the compiler follow this pragma */
+#define HS_SIMD _Pragma("omp simd")
+#else
+#define HS_SIMD
+#endif
+
 #if defined(HS_FLOAT32)
 #define HS_BITS 24
 #define HS_UNIT 0x1p-24f
