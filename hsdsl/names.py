@@ -12,6 +12,7 @@ INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u00ad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"
 )
 _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
+_MEMORY = "@"  # in no name of a file
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 WORDS = ("and", "or", "not", "true", "false")
@@ -58,9 +59,19 @@ def _spelled(name: str) -> str:
     return "".join(letters).lower().replace("_", "")
 
 
+def memory(owner: str, part: str) -> str:
+    """The name of a state that remembers what an event did: readers see it only where they name it."""
+    return f"{owner}{_MEMORY}{part}"
+
+
+def without_memory(names: Iterable[str]) -> tuple[str, ...]:
+    """The names of states that readers see: those of the file."""
+    return tuple(name for name in names if _MEMORY not in name)
+
+
 def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
-    """A hint with the closest candidate, or with all of them where they are few."""
-    names = list(dict.fromkeys(candidates))
+    """A hint with the closest candidate, or with all of them where they are few; memory of events is none."""
+    names = list(dict.fromkeys(without_memory(candidates)))
     best = closest(name, names)
     if best is not None:
         return f"did you mean '{best}'?"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typer import Context
 
 from hsdsl.errors import CODES, ModelError, UsageError
+from hsdsl.names import without_memory
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -42,8 +43,9 @@ def _names(path: Path) -> Iterator[str]:
     from hsdsl.model.options import KEYS
 
     program = load(path).program
+    states = without_memory(program.modes[program.initial_mode].states)
     yield from program.parameters
-    yield from ("initial.mode", *(f"initial.{state}" for state in program.modes[program.initial_mode].states))
+    yield from ("initial.mode", *(f"initial.{state}" for state in states))
     yield from (f"experiment.{name}" for name in KEYS)
 
 

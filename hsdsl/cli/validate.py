@@ -24,11 +24,12 @@ def validate(
 
 
 def _look(path: Path) -> tuple[dict[str, Any], str]:
+    from hsdsl.elaborate.events import as_written
     from hsdsl.model import load
 
     model = load(path)
     model.resolve()
-    modes, edges = len(model.system.modes), sum(len(mode.edges) for mode in model.system.modes)
+    modes, edges = as_written(model.system)
     parts = len(model.system.parts)
     size = counted(parts, "part") if parts else counted(modes, "mode")
     return {"valid": True}, f"valid, {size}, {counted(edges, 'transition')}"

@@ -1,9 +1,9 @@
 # pyright: basic
 """Events: edges that fire where a condition turns true, written as edges with memory.
 
-The memory of an event NAME is in states that do not flow: ``NAME.armed`` is 1 once the condition was false, and
-``NAME.due`` where a reset made it true. With a delay the state ``NAME.waiting`` is 1 until ``NAME.at``, and
-``NAME.to.x`` is the value that x then gets.
+The memory of an event NAME is in states that do not flow (`hsdsl.names.memory`): ``NAME@armed`` is 1 once the
+condition was false, and ``NAME@due`` where a reset made it true. With a delay the state ``NAME@waiting`` is 1 until
+``NAME@at``, and ``NAME@to.x`` is the value that x then gets.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import Reached, comparisons, condition, number
 from hsdsl.functions import maximum
-from hsdsl.names import SINCE
+from hsdsl.names import SINCE, memory
 from hsdsl.system import (
     HALF,
     ONE,
@@ -34,6 +34,7 @@ from hsdsl.system import (
 )
 
 Values = dict[str, Any]
+_AGAIN = " triggers again"
 
 
 def with_events(system: HybridSystem) -> HybridSystem:
@@ -67,7 +68,7 @@ class _Event:
     @cached_property
     def names(self) -> dict[str, str]:
         parts = ["armed"] + (["due"] if self.jumps else []) + (["waiting", "at"] if self.delay is not None else [])
-        return {part: f"{self.edge.name}.{part}" for part in parts}
+        return {part: memory(self.edge.name, part) for part in parts}
 
     @cached_property
     def jumps(self) -> bool:
@@ -102,7 +103,7 @@ class _Event:
         if self.delay is None:
             return {}
         pairs = zip(self.edge.target_states, self.edge.reset, strict=True)
-        return {state: f"{self.edge.name}.to.{state}" for state, value in pairs if value != symbol(state)}
+        return {state: memory(self.edge.name, f"to.{state}") for state, value in pairs if value != symbol(state)}
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -146,6 +147,15 @@ def _mode(mode: Mode, events: dict[str, tuple[_Event, ...]], order: Mapping[str,
         flow_texts=(*mode.flow_texts, *("0" for _ in further)),
         edges=tuple(edges),
     )
+
+
+def as_written(system: HybridSystem) -> tuple[int, int]:
+    """How many modes and transitions the file has, without those that make its events."""
+    parts = [edge for mode in system.modes for edge in mode.edges if edge.of_event]
+    full = {edge.target for edge in parts if edge.name.endswith(_AGAIN)}
+    events = sum(name.endswith(memory("", "armed")) for mode in system.modes for name in mode.states)
+    plain = sum(not edge.of_event for mode in system.modes for edge in mode.edges)
+    return len(system.modes) - len(full), plain + events
 
 
 Draft = tuple[Edge, _Event | None, Reached | None]
@@ -228,7 +238,7 @@ def _overflow_name(event: _Event) -> str:
 def _overflowing(event: _Event) -> Edge:
     """The edge that ends a run in which an event is triggered while it waits."""
     states = event.mode.states
-    edge = replace(event.edge, event=None, name=f"{event.edge.name} triggers again", target=_overflow_name(event))
+    edge = replace(event.edge, event=None, name=event.edge.name + _AGAIN, target=_overflow_name(event))
     return replace(edge, target_states=states, reset=tuple(map(symbol, states)), reset_texts=states, stays=True)
 
 

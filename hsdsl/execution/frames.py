@@ -9,6 +9,7 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution.samples import Array, optional
+from hsdsl.names import without_memory
 
 if TYPE_CHECKING:
     from hsdsl.execution.ensemble import Ensemble
@@ -35,13 +36,17 @@ def _labelled(taken: Iterable[str], ensemble: Ensemble, values: dict[str, Array]
     """Columns of states and outputs, with their kind before a name that is taken."""
     names = set(taken)
     kind = {name: "state" if name in ensemble.state else "output" for name in values}
-    return {f"{kind[name]}.{name}" if name in names else name: column for name, column in values.items()}
+    return {f"{kind[name]}.{name}" if name in names else name: column for name, column in _seen(values)}
 
 
 def _varied(ensemble: Ensemble, instances: Array) -> dict[str, Array]:
     return {
         name: np.broadcast_to(values, ensemble.shape).ravel()[instances] for name, values in ensemble.varied.items()
     }
+
+
+def _seen(columns: dict[str, Array]) -> list[tuple[str, Array]]:
+    return [(name, columns[name]) for name in without_memory(columns)]
 
 
 def _runs(ensemble: Ensemble) -> tuple[Array, dict[str, Array]]:
@@ -70,5 +75,5 @@ def _transitions(ensemble: Ensemble) -> tuple[Array, dict[str, Array]]:
         raise UsageError("the ensemble has kept no transitions", "give every_transition=True to model.ensemble")
     instances = np.repeat(np.arange(len(table.first) - 1), np.diff(table.first))
     columns = _varied(ensemble, instances) | {"time": table.time, "edge": table.edge, "entry": table.entry}
-    columns |= {f"before.{name}": values for name, values in table.before.items()}
-    return instances, columns | {f"after.{name}": values for name, values in table.after.items()}
+    columns |= {f"before.{name}": values for name, values in _seen(table.before)}
+    return instances, columns | {f"after.{name}": values for name, values in _seen(table.after)}

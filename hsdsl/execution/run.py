@@ -17,7 +17,7 @@ from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.records import Deferred, same
 from hsdsl.execution.samples import Samples
 from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
-from hsdsl.names import visible
+from hsdsl.names import visible, without_memory
 
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
@@ -199,6 +199,11 @@ class Execution(Deferred):
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The states and outputs that readers see: all but the memory of events."""
+        return (*without_memory(self.states), *self.output_names)
+
     @cached_property
     def finer(self) -> Execution | None:
         """The same run, finer; None for one that was read from a file."""
@@ -276,14 +281,14 @@ class Execution(Deferred):
         return evaluate(self, rows[_changes(self)], self.times[_changes(self)])
 
     def to_pandas(self) -> Any:
-        """Make a pandas DataFrame of :meth:`rows`: ``time``, ``mode``, ``j``, states, outputs.
+        """Make a pandas DataFrame of :meth:`rows`: ``time``, ``mode``, ``j``, and :attr:`shown`.
 
         Raises
         ------
         UsageError
             When pandas is not installed.
         """
-        return self.rows().to_pandas()
+        return self.rows().only(self.shown).to_pandas()
 
     def save(
         self,
@@ -305,7 +310,7 @@ class Execution(Deferred):
             chose. Times outside the run are left out (a run may stop early). Left out: the run's own
             :attr:`sample_times`.
         columns : names, optional
-            For a table: which states and outputs, in this order.
+            For a table: which states and outputs, in this order; left out, those of :attr:`shown`.
 
         Returns
         -------

@@ -18,6 +18,7 @@ from hsdsl.execution.samples import split
 from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.options import check_arguments
 from hsdsl.model.settings import whole
+from hsdsl.names import without_memory
 from hsdsl.program import Program
 from hsdsl.simulate.plan import Prepared, Watch
 from hsdsl.simulate.state_layouts import StateLayouts
@@ -56,8 +57,9 @@ class Rows:
         columns: Sequence[str] | None,
         write: Callable[[bytes], None],
     ) -> None:
-        self._program, self._every, self._columns, self._write = program, every, columns, write
+        self._program, self._every, self._write = program, every, write
         self._names = tuple(dict.fromkeys((*states, *program.all_states)))
+        self._columns = (*without_memory(self._names), *program.outputs) if columns is None else columns
         self._layouts = StateLayouts(program, states)
         self._arc = 0, 0, 0  # the last one's mode, jump and layout
         self._held: dict[str, Array] | None = None  # the last row: whether a jump follows it is not known yet

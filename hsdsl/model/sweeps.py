@@ -17,7 +17,7 @@ from hsdsl.model.ensemble import cores
 from hsdsl.model.ensemble_request import INITIAL
 from hsdsl.model.options import KEYS, as_written, check_arguments, overrides_of
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, without_memory
 from hsdsl.processes import can_fork
 from hsdsl.sweep import Sweep, recording, variation
 from hsdsl.sweep import manifest as manifests
@@ -115,7 +115,8 @@ def _planned(
     if chunk is not None and chunk < 1:
         raise UsageError(f"--chunk: expected at least 1 row, got {chunk}")
     program = model.program
-    kept = {name for name in (*program.all_states, *program.outputs) if outputs is None or name in outputs}
+    states = without_memory(program.all_states)
+    kept = {name for name in (*states, *program.outputs) if outputs is None or name in outputs}
     return manifests.new(
         model=program.path,
         digest=program.digest,
@@ -124,7 +125,7 @@ def _planned(
         variation=varied,
         recording=recording.read(record),
         arguments={name: _plain(value) for name, value in given.items()},
-        states=tuple(name for name in program.all_states if name in kept),
+        states=tuple(name for name in states if name in kept),
         outputs=tuple(name for name in program.outputs if name in kept),
         chunk=chunk or 1,
     )

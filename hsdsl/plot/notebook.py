@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.execution import Ensemble, Execution
-from hsdsl.names import visible
+from hsdsl.names import visible, without_memory
 from hsdsl.plot.style import ALARM, INK, styled, write_figure
 from hsdsl.plot.view import View
 from hsdsl.report import words
@@ -70,7 +70,8 @@ def _curves(ensemble: Ensemble) -> Figure:
 
     ((name, values),) = ensemble.varied.items()
     x, failed = np.asarray(values, dtype=float).ravel(), ensemble.failed.ravel()
-    states = dict(list(ensemble.state.items())[:PANELS]) or {"transitions": ensemble.transitions}
+    states = {name: ensemble.state[name] for name in without_memory(ensemble.state)[:PANELS]}
+    states = states or {"transitions": ensemble.transitions}
     figure = Figure(figsize=(8, 1.9 * len(states) + 0.6), layout="constrained")
     axes = figure.subplots(len(states), 1, squeeze=False, sharex=True)[:, 0]
     for axis, (state, ends) in zip(axes, states.items(), strict=True):

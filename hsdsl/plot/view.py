@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, without_memory
 from hsdsl.plot.curves import GuardLine
 from hsdsl.program import Program
 
@@ -66,8 +66,8 @@ class View:
         known = names_of(runs)
         if self.phases is not None:
             return [(checked(across, known), checked(up, known)) for across, up in dict.fromkeys(self.phases)]
-        states = list(dict.fromkeys(name for run in runs for name in run.states))
-        shown = len(states) == 2 and all(len(arc.states) == 2 for run in runs for arc in run.arcs)
+        states = list(dict.fromkeys(name for run in runs for name in without_memory(run.states)))
+        shown = len(states) == 2 and all(len(without_memory(arc.states)) == 2 for run in runs for arc in run.arcs)
         return [(states[0], states[1])] if shown and set(states) <= set(self.names(runs)) else []
 
     def called(self, runs: Sequence[Execution]) -> list[str]:
@@ -86,7 +86,7 @@ class View:
 def names_of(runs: Iterable[Execution]) -> list[str]:
     """Return the states of all runs, then their outputs."""
     kept = list(runs)
-    states = [name for run in kept for name in run.states]
+    states = [name for run in kept for name in without_memory(run.states)]
     return list(dict.fromkeys([*states, *(name for run in kept for name in run.output_names)]))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from hsdsl.execution import Execution
-from hsdsl.names import shown, visible
+from hsdsl.names import shown, visible, without_memory
 from hsdsl.program import EdgeProgram, ModeProgram, Program
 from hsdsl.report.graph_layout import STUB, Box, Layout, Line, laid_out
 from hsdsl.report.visited import visited_part
@@ -83,9 +83,15 @@ def _svg(layout: Layout, parts: Sequence[str]) -> str:
     return f'<svg class="modes" role="img" aria-label="mode graph" {size}>\n<defs>{markers}</defs>\n{inner}\n</svg>'
 
 
+def _seen(states: Sequence[str], texts: Sequence[str]) -> list[tuple[str, str]]:
+    """The states that a reader sees, and what is written of each."""
+    text = dict(zip(states, texts, strict=True))
+    return [(name, text[name]) for name in without_memory(states)]
+
+
 def _lines(mode: ModeProgram, with_flow: bool) -> list[str]:
     """What a box says: the mode's name, and its flow."""
-    flow = [f"{name}' = {text}" for name, text in zip(mode.states, mode.flow_texts, strict=True)] if with_flow else []
+    flow = [f"{name}' = {text}" for name, text in _seen(mode.states, mode.flow_texts)] if with_flow else []
     if len(flow) > MOST_LINES:
         flow = [*flow[: MOST_LINES - 1], f"and {len(flow) - MOST_LINES + 1} more"]
     return [shown(mode.name, LONGEST), *(shown(line, LONGEST) for line in flow)]
@@ -146,7 +152,7 @@ def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int] |
     rows: list[str] = []
     for number, edge in enumerate(edges, start=1):
         when = edge.text + (f" if {edge.condition_text}" if edge.condition_text else "")
-        resets = zip(edge.target_states, edge.reset_texts, strict=True)
+        resets = _seen(edge.target_states, edge.reset_texts)
         changed = ", ".join(f"{name} := {text}" for name, text in resets if name != text)
         ends = f"{program.modes[edge.source].name} -> {program.modes[edge.target].name}"
         cells = [str(number), edge.name, ends, when, changed]

@@ -7,7 +7,7 @@ from html import escape
 
 from hsdsl.elaborate.functions import named_functions
 from hsdsl.expression.scope import state
-from hsdsl.names import shown, visible_lines
+from hsdsl.names import shown, visible_lines, without_memory
 from hsdsl.program import Program
 from hsdsl.report import mode_graph
 from hsdsl.report.mathml import Mathematics
@@ -48,7 +48,8 @@ def _said(text: str) -> str:
 def _start(system: HybridSystem, math: Mathematics) -> str:
     initial, until = system.initial, math.value(system.experiment.until)
     numbers = {part.name for part in system.parts if part.is_numbered}
-    start = [(name, value) for name, value in initial.values if name not in numbers]
+    seen = {*without_memory(dict(initial.values))} - numbers
+    start = [(name, value) for name, value in initial.values if name in seen]
     values = ", ".join(f"{_said(name)} = {math.value(value)}" for name, value in start[:MOST_ROWS])
     values += ", ..." if len(start) > MOST_ROWS else ""
     where = "" if system.parts else f" in {_said(initial.mode)}"
@@ -93,9 +94,9 @@ def _list(items: Sequence[str]) -> str:
 
 
 def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -> str:
-    numbers = {part.name for part in system.parts if part.is_numbered}
+    seen = {*without_memory(mode.states)} - {part.name for part in system.parts if part.is_numbered}
     flows = zip(mode.states, mode.flow_texts, strict=True)
-    flow = [math.derivative(name, text) for name, text in flows if name not in numbers]
+    flow = [math.derivative(name, text) for name, text in flows if name in seen]
     walls = [f"domain: {math.inequality(wall.text)}" for wall in mode.walls]
     edges = [_edge(edge, math, not system.parts) for edge in mode.edges[:MOST_EQUATIONS]]
     edges += [f"{len(mode.edges) - MOST_EQUATIONS} more transitions"] * (len(mode.edges) > MOST_EQUATIONS)
@@ -111,6 +112,7 @@ def _edge(edge: Edge, math: Mathematics, named: bool) -> str:
     """A transition; ``named`` says that its target has a name that people gave."""
     condition = f" if {math.condition(edge.condition_text)}" if edge.condition_text else ""
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
-    changed = ", ".join(math.reset(name, text) for name, text in resets if text != name)
+    seen = without_memory(edge.target_states)
+    changed = ", ".join(math.reset(name, text) for name, text in resets if text != name and name in seen)
     ends = f"<strong>{_said(edge.name)}</strong>{f' to {_said(edge.target)}' if named else ''}"
     return f"{ends} when {math.inequality(edge.surface.text)}{condition}{': ' if changed else ''}{changed}"

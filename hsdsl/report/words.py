@@ -10,6 +10,7 @@ from typing import Any
 from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
+from hsdsl.names import without_memory
 from hsdsl.parts import change, compact
 
 MOST_ALIKE = 3  # of reasons that differ in numbers only
@@ -67,7 +68,7 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     waiting = ", waiting in a strip" if final.kind == "strip" else ""
     yield "stop", stop(execution)
     yield "final", f"mode {compact(final.mode)} after {count}{waiting}"
-    yield "state", values(final.state)
+    yield "state", values({name: final.state[name] for name in without_memory(final.state)})
     yield "outputs", values({name: value for name, value in final.outputs.items() if value == value})
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
@@ -154,11 +155,12 @@ def _state(transition: Transition) -> str:
     before, after = transition.before, transition.after
     if after is None:
         return "the run ended in the strip"
+    old, new = without_memory(before), without_memory(after)
     words = [
-        f"{name}: {number(before[name])} -> {number(value)}"
-        for name, value in after.items()
-        if name in before and before[name] != value
+        f"{name}: {number(before[name])} -> {number(after[name])}"
+        for name in new
+        if name in before and before[name] != after[name]
     ]
-    words += [f"{name}: {number(value)} (new)" for name, value in after.items() if name not in before]
-    words += [f"{name} dropped" for name in before if name not in after]
+    words += [f"{name}: {number(after[name])} (new)" for name in new if name not in before]
+    words += [f"{name} dropped" for name in old if name not in after]
     return ", ".join(words) or "unchanged"

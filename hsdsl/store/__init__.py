@@ -43,7 +43,7 @@ def save(
     if suffix not in _TABLES:
         raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix gives the format")
     rows = execution.rows() if samples is None else at_samples(execution, samples)
-    rows = rows.only(columns)
+    rows = rows.only(execution.shown if columns is None else columns)
     description = sidecar_of(target)
     with unplaced(target) as table:
         _TABLES[suffix](rows, table.file)

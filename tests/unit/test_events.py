@@ -9,7 +9,12 @@ import pytest
 from engines import COMPILER
 
 import hsdsl
+import hsdsl.store
 from hsdsl import UsageError
+from hsdsl.elaborate.events import as_written
+from hsdsl.plot.view import View
+from hsdsl.report import mode_graph, summary
+from hsdsl.report.model import model_html
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 ENGINES = ["python", *(["c"] if COMPILER else [])]
@@ -199,3 +204,72 @@ def test_comparisons_that_are_reached_together_turn_true_once(tmp_path, start, f
     event = "{name: e, event: x > 0 and y > 0, reset: {x: x + 1}}"
     run = model(tmp_path, flow, event, start, "3").simulate()
     assert times(run, "e") == pytest.approx([when])
+
+
+DELAYED = """
+hsdsl: 1
+modes:
+  on:
+    flow: {x: cos(t), y: 1}
+    transitions: [{name: rise, event: x > 1/2, delay: 0.3, reset: {y: 0}}, {to: off, when: t >= 8}]
+  off: {flow: {x: -x, y: 0}}
+initial: {mode: on, x: 0, y: 0}
+outputs: {z: x + y}
+experiment: {until: 10}
+"""
+MEMORY = {"rise@armed", "rise@waiting", "rise@at", "rise@to.y"}
+
+
+@pytest.fixture(scope="module")
+def delayed():
+    return hsdsl.loads(DELAYED)
+
+
+def test_memory_is_hidden_where_readers_look(delayed, tmp_path):
+    run = delayed.simulate()
+    assert {name for name in run.states if name in MEMORY} == MEMORY
+    run.save(tmp_path / "run.csv")
+    header = (tmp_path / "run.csv").read_text().partition("\n")[0]
+    assert header == "time,mode,j,x,y,z"
+    frame = pytest.importorskip("pandas") and run.to_pandas()
+    assert [*frame.columns] == ["time", "mode", "j", "x", "y", "z"]
+    ensemble = delayed.ensemble(initial={"x": [0, 0.1]}, every_transition=True)
+    texts = [
+        summary(run),
+        model_html(delayed.system, delayed.program),
+        mode_graph.graph_of(delayed.program),
+        *View().names([run]),
+        *ensemble.to_pandas().columns,
+        *ensemble.to_pandas("transitions").columns,
+    ]
+    assert not [text for text in texts if "@armed" in text]
+    run.save(tmp_path / "named.csv", columns=["x", "rise@armed"])
+    assert (tmp_path / "named.csv").read_text().startswith("time,mode,j,x,rise@armed\n")
+
+
+def test_memory_is_kept_and_a_run_goes_on_from_it(delayed, tmp_path):
+    """At t = 0.6 the event waits until 0.82: a run that begins with that point's state makes it as well."""
+    delayed.simulate(until=0.6).save(tmp_path / "half.npz")
+    point = hsdsl.store.load(tmp_path / "half.npz").final
+    assert point.state.keys() >= MEMORY and point.state["rise@waiting"] == 1
+    rest = delayed.simulate(until=0.9, initial=point.state | {"rise@at": point.state["rise@at"] - 0.6})
+    assert times(rest, "rise") == pytest.approx([math.pi / 6 + 0.3 - 0.6], abs=1e-9)
+
+
+def test_memory_is_no_column_of_sweeps_and_streams(delayed, tmp_path):
+    pytest.importorskip("pyarrow")
+    table = delayed.sweep(["initial.x=0:0.1:2"], tmp_path / "sweep", record="final,transitions").table()
+    assert not [name for name in table.column_names if "@" in name] and "final.y" in table.column_names
+    if COMPILER:
+        delayed.stream(tmp_path / "rows.csv")
+        assert (tmp_path / "rows.csv").read_text().startswith("time,mode,j,x,y,z\n")
+
+
+def test_modes_and_transitions_are_counted_as_written(delayed):
+    assert as_written(delayed.system) == (2, 2)
+
+
+def test_memory_is_never_suggested(delayed):
+    with pytest.raises(UsageError) as caught:
+        delayed.simulate(initial={"rise.armed": 0})
+    assert caught.value.hint == "known here: x, y"

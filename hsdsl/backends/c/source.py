@@ -17,7 +17,7 @@ from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise,
 from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
-_GIVEN = re.compile(r"^ +p\d+ = given\[\d+\]\n", re.MULTILINE)
+_GIVEN = re.compile(r"^ +[px]\d+ = given\[\d+\]\n", re.MULTILINE)
 _HEAD = """\
 /* Generated from a model; see hs.h for what the tables mean. */
 
@@ -104,6 +104,14 @@ def factors(program: Program) -> int:
 def constant_bodies(program: Program) -> dict[str, str]:
     """The bodies of `Program.constants`' routines in C, of parameters ``p``, by their names."""
     return _bodies(program.constants, {f"p{i}": f"p[{i}]" for i in range(len(program.parameters))})
+
+
+def initial_bodies(program: Program) -> dict[str, str]:
+    """The bodies of `Program.initial_values`' routines in C, of ``p``: parameters, then initial values."""
+    count = len(program.parameters)
+    names = {f"p{i}": f"p[{i}]" for i in range(count)}
+    names |= {f"x{i}": f"p[{count + i}]" for i in range(len(program.initial_states))}
+    return _bodies(program.initial_values, names)
 
 
 def switching_bodies(program: Program) -> dict[str, str]:

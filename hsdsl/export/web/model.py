@@ -11,7 +11,7 @@ from hsdsl.backends.c import width
 from hsdsl.execution import Execution
 from hsdsl.export.source import Source
 from hsdsl.export.web.numbers import SETTINGS, fixed
-from hsdsl.names import visible
+from hsdsl.names import visible, without_memory
 from hsdsl.parts import layout_of, numbered
 from hsdsl.plot.style import colours
 from hsdsl.program import ModeProgram, Program
@@ -29,7 +29,7 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
     """
     system, problem = source.system, source.problem
     program, states = problem.program, problem.program.all_states
-    hidden = numbered(program.parts)
+    seen = [name for name in without_memory(states) if name not in numbered(program.parts)]
     colour = colours([mode.name for mode in program.modes])
     return {
         "title": visible(system.title or source.name),
@@ -40,7 +40,8 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
         "states": len(states),
         "outputs": len(shown.problem.program.outputs),
         "width": width(program),
-        "columns": [*(name for name in states if name not in hidden), *program.outputs],
+        "columns": [*seen, *program.outputs],
+        "unseen": [k for k, name in enumerate(states) if name not in seen],
         "units": {name: visible(unit) for name, unit in program.units.items()},
         "modes": [_mode(mode, colour[mode.name]) for mode in program.modes],
         "parts": _parts(program),
@@ -124,9 +125,10 @@ def _bounds(source: Source, values: Mapping[str, Any]) -> dict[str, tuple[float 
 
 def _starts(source: Source, run: Execution) -> Iterator[Data]:
     problem = source.problem
-    shown = frozenset(run.arcs[0].states)
+    shown = frozenset(without_memory(run.arcs[0].states))
     for name, value in zip(problem.states, problem.x, strict=True):
-        hidden = bool(problem.program.parts) and name not in shown  # a mode, or what it lacks: as exported
+        hidden = name not in shown
+        kept = hidden and bool(problem.program.parts)  # a mode, or what it lacks: as exported
         reach = _largest(run, name) or 1.0
         yield {
             "name": f"initial.{name}",
@@ -136,8 +138,8 @@ def _starts(source: Source, run: Execution) -> Iterator[Data]:
             "value": float(value),
             "low": float(value) - reach,
             "high": float(value) + reach,
-            "given": hidden or f"initial.{name}" in problem.settings.overrides,
-            "fixed": hidden,
+            "given": kept or f"initial.{name}" in problem.settings.overrides,
+            "fixed": kept,
             "hidden": hidden,
         }
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from hsdsl import limits
 from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.c import constant_bodies, switching_bodies
+from hsdsl.backends.c import constant_bodies, initial_bodies, switching_bodies
 from hsdsl.backends.c.printer import literal
 from hsdsl.defaults import DEFAULTS
 from hsdsl.export.c.text import array
@@ -34,7 +34,9 @@ def page_numbers(problem: Problem) -> str:
         for name, body in bodies.items()
         if not name.startswith(("tolerance", "sample_")) and (name not in SETTINGS or by_file(problem, name))
     )
-    return "".join([*_sizes(problem), *functions, *_tables(problem), _inputs(program), _switches(problem)])
+    bodies = initial_bodies(program)
+    following = (_function(f"file_{name}", "const double *p", body) for name, body in bodies.items())
+    return "".join([*_sizes(problem), *functions, *following, *_tables(problem), _inputs(program), _switches(problem)])
 
 
 def by_file(problem: Problem, name: str) -> bool:
@@ -73,6 +75,8 @@ def _sizes(problem: Problem) -> Iterable[str]:
     relaxation = FLOAT64.constant(DEFAULTS["relaxation"]) if by_default else 0.0
     sizes = {
         "STARTS": len(problem.states),
+        "INITIAL": len(program.initial_states),
+        "FOLLOWERS": len(program.initial_order),
         "STATES": len(program.all_states),
         "INPUT_COUNT": len(program.inputs),
         "SWITCH_COUNT": len(program.switches),
@@ -99,11 +103,14 @@ def _tables(problem: Problem) -> Iterable[str]:
         yield array("static page_constant *const", f"page_{kind}", pointers)
     pointers = (f"file_{name}" if by_file(problem, name) else "0" for name in SETTINGS)
     yield array("static page_constant *const", "page_setting", pointers)
-    start = (
-        str(program.initial_states.index(name)) if f"initial.{name}" not in overrides else "-1"
-        for name in problem.states
-    )
+    known = program.initial_states
+    start = (str(known.index(name)) if name in known else "-1" for name in problem.states)
     yield array("static const int", "page_start_place", start)
+    given = (str(int(f"initial.{name}" in overrides)) for name in problem.states)
+    yield array("static const int", "page_start_given", given)
+    yield array("static const int", "page_follower", map(str, program.initial_order))
+    pointers = (f"file_initial_{i}" for i in program.initial_order)
+    yield array("static page_constant *const", "page_following", pointers)
     scaled = (
         name in program.scaled_states and f"experiment.scale.{name}" not in overrides for name in program.all_states
     )

@@ -300,7 +300,7 @@ static int jump(hs_run *run) {
     if (resumed > until + tie(run, until)) {
       hs_time rows[2][2] = {{t, 0.0}, {until, until - t}};
       strip(run, 2, rows, crossing->state);
-      record(run, crossing, NAN, 0, 0);
+      record(run, crossing, NAN, without_value ? 0 : run->after, 0);
       return in_strip(run, HS_UNTIL_IN_STRIP, until);
     }
     resumed = earlier(resumed, until);

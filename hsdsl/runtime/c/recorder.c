@@ -76,7 +76,7 @@ static void strip(hs_run *run, int rows, hs_time (*row)[2], const hs_real *q) {
   }
 }
 
-/* Write one transition down; `after` is 0 where the run ended before it was made. */
+/* Write one transition down; `after` is 0 where its reset has no value. */
 static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, const hs_real *after, int entry) {
   hs_chunk *chunk = &run->task->chunk;
   const int w = run->width;
@@ -97,7 +97,7 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   for (int a = 0; a < run->alternatives_count; a++)
     chunk->alternatives[chunk->alternatives_used++] = run->alternatives[a];
   copy(chunk->before + i * w, crossing->state, run->here.dimension);
-  if (after) copy(chunk->after + i * w, after, edge->target_dimension);
+  for (int s = 0; s < edge->target_dimension; s++) chunk->after[i * w + s] = after ? after[s] : (hs_real)NAN;
 }
 
 static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_time time, hs_time other) {

@@ -196,7 +196,7 @@ static int through_strip(hs_run *run) {
   if (resumed > until + tie(run, until)) {
     hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
     strip(run, 3, rows, crossing->state);
-    record(run, crossing, NAN, 0, 0);
+    record(run, crossing, NAN, without_value ? 0 : run->after, 0);
     return in_strip(run, HS_UNTIL_IN_STRIP, until);
   }
   if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);

@@ -60,7 +60,7 @@ function changes({mode, edge, target, before, after, resumed}) {
   if (Number.isNaN(resumed)) return "the run ended first";
   const from = model.modes[mode].states, to = model.modes[mode].edges[edge].states;
   const had = (name) => hasState(mode, from.indexOf(name)) ? before[from.indexOf(name)] : undefined;
-  const texts = to.map((name, k) => [name, after[k], had(name)]).filter(([, a, b], k) => a !== b && hasState(target, k))
+  const texts = to.map((name, k) => [name, after[k], had(name)]).filter(([name, a, b], k) => a !== b && hasState(target, k) && model.columns.includes(name))
     .map(([name, a, b]) => `${name}: ${b === undefined ? "" : `${format(b)} \u2192 `}${format(a)}`);
   return texts.join(", ") || "unchanged";
 }

@@ -20,7 +20,8 @@ const hasState = (mode, place) => model.modes[mode].has?.[place] ?? true;
 
 function withProducts(run) {
   for (const made of run.transitions) made.target = model.modes[made.mode].edges[made.edge].target;
-  if (!model.parts) return run;
+  const seen = (columns) => columns.filter((_, s) => !model.unseen.includes(s));
+  if (!model.parts) return {...run, columns: seen(run.columns)};
   const {owners} = model.parts, firsts = run.arcs.map((_, k) => run.arcOf.indexOf(k));
   const at = (point) => owners.map((_, s) => run.columns[s][point]);
   const arcs = run.arcs.map((arc, k) => ({...arc, mode: productOf(arc.mode, at(firsts[k]))}));
@@ -28,10 +29,10 @@ function withProducts(run) {
     for (let i = 0; i < column.length; i++) if (!hasState(arcs[run.arcOf[i]].mode, s)) column[i] = NaN;
   });
   for (const made of run.transitions) {
-    made.target = Number.isNaN(made.resumed) ? undefined : productOf(made.target, made.after);
+    made.target = made.after.some(Number.isNaN) ? undefined : productOf(made.target, made.after);
     made.mode = productOf(made.mode, made.before);
   }
   const modeOn = (t) => arcs.findLast((arc) => arc.start <= t)?.mode ?? arcs[0].mode;
   const notes = run.notes.map((note) => ({...note, mode: modeOn(note.time)}));
-  return {...run, arcs, notes, mode: last(arcs).mode, columns: run.columns.filter((_, s) => !(owners[s] < 0))};
+  return {...run, arcs, notes, mode: last(arcs).mode, columns: seen(run.columns)};
 }

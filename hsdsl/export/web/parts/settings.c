@@ -23,19 +23,39 @@ static page_refusal set_parameters(double *p) {
   return PAGE_RAN;
 }
 
+/* The initial values of the file behind the parameters in `row`; those that are `known` stay, and others follow them. */
+static int set_initial(double *row, const char *known, int any) {
+  double own[PAGE_INITIAL + 1], *const initial = row + PROBLEM_PARAMETERS;
+  int bad = 0;
+  if (any && PAGE_FOLLOWERS) {
+    for (int k = 0; k < PAGE_FOLLOWERS; k++)
+      if (!known[page_follower[k]]) bad |= page_following[k](row, initial + page_follower[k]);
+    return bad;
+  }
+  bad = file_initial(row, own);
+  for (int k = 0; k < PAGE_INITIAL; k++)
+    if (!known[k]) initial[k] = own[k];
+  return bad;
+}
+
 static page_refusal set_start(const double *p, double *x) {
-  double out[PROBLEM_WIDTH + 1];
-  const int bad = file_initial(p, out);
+  double row[PROBLEM_PARAMETERS + PAGE_INITIAL + 1];
+  char known[PAGE_INITIAL + 1] = {0};
+  int any = 0;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) row[i] = p[i];
   for (int i = 0; i < PAGE_STARTS; i++) {
     const double own = given[PROBLEM_PARAMETERS + i];
     const int place = page_start_place[i];
-    if (own == own) {
-      x[i] = own;
-    } else if (place < 0) {
-      x[i] = problem_x[i];
-    } else {
+    x[i] = own == own ? own : problem_x[i];
+    if (place >= 0 && (own == own || page_start_given[i]))
+      row[PROBLEM_PARAMETERS + place] = x[i], known[place] = 1, any = 1;
+  }
+  const int bad = set_initial(row, known, any);
+  for (int i = 0; i < PAGE_STARTS; i++) {
+    const int place = page_start_place[i];
+    if (place >= 0 && !known[place]) {
       if (bad) return refuse(PAGE_NO_INITIAL, i);
-      x[i] = out[place];
+      x[i] = row[PROBLEM_PARAMETERS + place];
     }
     if (!hs_finite(x[i])) return refuse(PAGE_NO_INITIAL, i);
   }
