@@ -71,6 +71,7 @@ class Made(NamedTuple):
     transition: int
     before: int
     after: int
+    alternatives: int
 
 
 class Gathered:
@@ -97,7 +98,7 @@ class Gathered:
     def made(self) -> Made:
         """Where transitions are."""
         of = self._arrays
-        places = [of[name].ctypes.data for name in ("transition", "before", "after")]
+        places = [of[name].ctypes.data for name in ("transition", "before", "after", "alternatives")]
         return Made(len(of["transition"]), len(of["note"]), *places)
 
 
@@ -170,7 +171,9 @@ class Packed:
         _, arcs, k, notes, _ = self._counts
         transition = self.where.arc + NUMBER * ARC_NUMBERS * arcs
         before = transition + NUMBER * TRANSITION_NUMBERS * k
-        return Made(k, notes, transition, before, before + NUMBER * k * self._shape.width)
+        after = before + NUMBER * k * self._shape.width
+        behind = after + NUMBER * (k * self._shape.width + NOTE_NUMBERS * notes)
+        return Made(k, notes, transition, before, after, behind)
 
 
 Columns = Gathered | Packed

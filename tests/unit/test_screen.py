@@ -25,6 +25,9 @@ MODELS = (
     "tests/conformance/cases/m3-if-of-another-edge",
     "tests/conformance/cases/m5-jump-onto-surface",
     "tests/conformance/cases/m4-past-sizes",
+    "tests/conformance/cases/m6-tie-file-order",
+    "tests/conformance/cases/m6-tie-priority",
+    "tests/conformance/cases/m6-guard-and-wall",
 )
 
 

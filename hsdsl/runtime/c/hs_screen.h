@@ -62,6 +62,7 @@ typedef struct {
   const hs_arc *arc;
   const hs_transition *transition;
   const double *before, *after; /* (transitions, model->width) */
+  const int32_t *alternatives;  /* of all transitions */
 } hs_record;
 
 /* Where something may be that only a closer look can tell, one bit each; HS_PARTED: everything. */
@@ -78,6 +79,9 @@ typedef enum {
   HS_FLOW_CHANGE
 } hs_doubt;
 
+/* What needs a closer look at a transition; and that tied ones commute. */
+typedef enum { LOOK_AT_CROSSING = 1, LOOK_AT_RESET = 2, COMMUTES = 4 } hs_look_at;
+
 typedef struct {
   const hs_model *model;
   const hs_timeline *timeline;
@@ -86,7 +90,7 @@ typedef struct {
   double until, relaxation, tolerance;
   int32_t taylor;           /* whether pieces are Taylor polynomials */
   double *workspace;        /* hs_screen_room() numbers */
-  int32_t *crossing;        /* (transition): not 0 where a closer look is needed */
+  int32_t *crossing;        /* (transition): an hs_look_at, or 0 */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
   int32_t doubts;

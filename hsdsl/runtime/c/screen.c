@@ -6,6 +6,7 @@
 #include "screen_view.h"
 
 #include "screen_errors.c"
+#include "screen_ties.c"
 #include "screen_places.c"
 #include "screen_steps.c"
 
@@ -54,7 +55,8 @@ static int undecided_end(hs_view *v) {
   v->last = s->run.rows - 1;
   v->crossed = -1;
   bind(v, s->run.arc[v->arc].mode, segment_at(s->timeline, end));
-  if (!v->table->final && takes_time(&s->run, v->arc) && ends_close(v, 1)) return 1;
+  if (v->table->final) return 0; /* there it ended */
+  if (takes_time(&s->run, v->arc) && ends_close(v, 1)) return 1;
   if (!count) return 0;
   const double last = s->run.transition[count - 1].time;
   return end - last < SAFE * (late_by(v, last) + s->tolerance * length);
@@ -68,7 +70,10 @@ static void look_at_all(hs_view *v) {
   v->arc = s->run.arcs - 1;
   if (undecided_end(v)) s->doubts |= DOUBT(HS_ENDING);
   for (int64_t j = 0; j < s->run.transitions; j++) {
-    if (made[j].alternatives) s->doubts |= DOUBT(HS_CHOICE);
+    if (made[j].alternatives) {
+      if (any_order(v, j)) s->crossing[j] |= COMMUTES;
+      else s->doubts |= DOUBT(HS_CHOICE);
+    }
     if (jumps_close(v, &made[j])) s->crossing[j] |= LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
   }
   for (int i = 0; i < s->model->modes; i++) {
@@ -94,6 +99,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.size = numbers(store, model->states);
   v.floor = numbers(store, 2 * (int64_t)model->states);
   v.late = numbers(store, s->run.transitions);
+  v.tied = take(store, s->run.transitions + 1, sizeof(int64_t));
   double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
                        &v.at_start, &v.at_end, 0};
   for (double ***each = states; *each; each++) **each = numbers(store, w);
@@ -135,7 +141,11 @@ void hs_look(hs_screen *s) {
   s->slowest = s->least = s->margin = INFINITY;
   for (int i = 0; i < s->model->states; i++) v.error[i] = v.size[i] = 0.0;
   for (int i = 0; i < s->model->modes; i++) v.nearest[i].margin = INFINITY;
-  for (int64_t j = 0; j < s->run.transitions; j++) s->crossing[j] = 0;
+  v.tied[0] = 0;
+  for (int64_t j = 0; j < s->run.transitions; j++) {
+    v.tied[j + 1] = v.tied[j] + s->run.transition[j].alternatives;
+    s->crossing[j] = 0;
+  }
   for (int64_t i = 0; i < s->run.arcs; i++) s->landing[i] = s->ending[i] = 0;
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
   fill_matrix(v.matrix, s->run.degree);

@@ -75,9 +75,10 @@ static void reach_row(hs_view *v, int64_t row, int64_t jump, double shift) {
 }
 
 /* How much the error may move a surface of which the gradient is known. */
-static double shift_by(const hs_view *v, double t, const double *gradient) {
-  double shift = fabs(gradient[0]) * late_by(v, t);
-  for (int i = 0; i < v->n; i++) shift += fabs(gradient[i + 1]) * v->own[i];
+static double shift_by(const hs_view *v, double t) {
+  double shift = 0.0;
+  for (int i = 0; i < v->row->count; i++)
+    shift += fabs(v->gradient[i]) * (v->row->place[i] ? v->own[v->row->place[i] - 1] : late_by(v, t));
   return shift;
 }
 

@@ -3,17 +3,20 @@
 
 #include "screen_view.h"
 
+/* Round-off of a surface at a point, of which the gradient is known. */
+static double noise_of(const hs_view *v, double magnitude, double t, const double *x) {
+  for (int i = 0; i < v->row->count; i++)
+    magnitude += fabs(v->gradient[i]) * fabs(v->row->place[i] ? x[v->row->place[i] - 1] : t);
+  return ROUNDOFF_UNITS * HS_UNIT * magnitude;
+}
+
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
 static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
-  double *const g = v->gradient;
-  const hs_sparse *const row = &v->table->gradients[k];
-  if (row->values(v->p, t, x, g) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
-  hs_spread_out(row, v->n + 1, g);
-  double total = v->magnitudes[k] + fabs(g[0]) * fabs(t);
-  for (int i = 0; i < v->n; i++) total += fabs(g[i + 1]) * fabs(x[i]);
+  const hs_sparse *const row = v->row = &v->table->gradients[k];
+  if (row->values(v->p, t, x, v->gradient) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
   found->value = v->values[k];
-  found->noise = ROUNDOFF_UNITS * HS_UNIT * total;
-  found->shift = shift_by(v, t, g);
+  found->noise = noise_of(v, v->magnitudes[k], t, x);
+  found->shift = shift_by(v, t);
   return !hs_finite(found->value + found->noise + found->shift + found->rate);
 }
 
@@ -23,17 +26,24 @@ static int evaluate_surfaces(hs_view *v, double t, const double *x) {
 
 /* Below this the rate of a surface counts as zero; its gradient is the one last judged. */
 static double rate_noise(const hs_view *v) {
-  double total = fabs(v->gradient[0]);
-  for (int i = 0; i < v->n; i++) total += fabs(v->gradient[i + 1] * v->slope[i]);
+  double total = 0.0;
+  for (int i = 0; i < v->row->count; i++)
+    total += fabs(v->gradient[i] * (v->row->place[i] ? v->slope[v->row->place[i] - 1] : 1.0));
   return TANGENT_UNITS * HS_UNIT * total;
 }
 
 /* Whether the reset of edge k leaves its own surface as it is. */
 static int untouched(const hs_view *v, int k) {
   const int32_t *const keeps = v->f->keeps + (int64_t)k * v->n;
-  for (int i = 0; i < v->n; i++)
-    if (v->gradient[i + 1] != 0.0 && !keeps[i]) return 0;
+  for (int i = 0; i < v->row->count; i++)
+    if (v->gradient[i] != 0.0 && v->row->place[i] && !keeps[v->row->place[i] - 1]) return 0;
   return v->table->affine;
+}
+
+/* Whether a transition follows another at one instant. */
+static int follows_another(const hs_view *v, int64_t j) {
+  const hs_transition *const made = v->s->run.transition + j;
+  return j > 0 && made->time - made[-1].resumed <= tie_of(v->s, made->time);
 }
 
 /* Whether an arc begins on, or within the error of, a surface. */
@@ -41,6 +51,7 @@ static int lands_close(hs_view *v) {
   const hs_record *run = &v->s->run;
   const hs_arc *arc = &run->arc[v->arc];
   const double t = run->times[arc->first], *x = recorded_row(run, arc->first);
+  if (arc->jump && follows_another(v, arc->jump - 1)) return 0; /* its choice tells */
   if (evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope)) return 1;
   for (int k = 0; k < v->table->surfaces; k++) {
     hs_judged found;
@@ -74,9 +85,13 @@ static int ends_close(hs_view *v, int all) {
   int close = evaluate_surfaces(v, t, x);
   for (int k = 0; k < v->table->surfaces && !close; k++) {
     hs_judged found;
-    if (k == v->crossed) continue;
+    if (k == v->crossed || (v->crossed >= 0 && is_alternative(v, s->run.arc[v->arc].jump, k))) continue;
     close = judge_surface(v, k, t, x, &found) ||
             (found.rate > 0 && (all || found.value <= found.noise) && fabs(found.value) <= SAFE * found.shift);
+    if (close && v->crossed >= 0 && k < v->table->edges && found.value <= found.noise) {
+      const hs_tied tied = {v->mode, t, x, 2 * -found.value / found.rate};
+      close = !commute(v, &tied, v->crossed, k) || evaluate_surfaces(v, t, x);
+    }
   }
   bind(v, v->mode, step);
   return close;
@@ -93,8 +108,6 @@ static int jumps_close(const hs_view *v, const hs_transition *made) {
   return v->s->formulas[made->mode].jumping[made->edge];
 }
 
-enum { LOOK_AT_CROSSING = 1, LOOK_AT_RESET = 2 };
-
 /* How often the error fits into what keeps a crossing, at the end of the arc. */
 static void look_at_crossing(hs_view *v, int64_t j, int flown) {
   hs_screen *const s = v->s;
@@ -109,7 +122,7 @@ static void look_at_crossing(hs_view *v, int64_t j, int flown) {
             judge_surface(v, made->edge, t, x, &found);
   if (!bad) {
     int flat = 1;
-    for (int i = 0; i <= v->n; i++) flat &= v->gradient[i] == 0.0;
+    for (int i = 0; i < v->row->count; i++) flat &= v->gradient[i] == 0.0;
     if (flat || !(found.rate > rate_noise(v)) || v->table->edge[made->edge].conditional)
       s->crossing[j] |= LOOK_AT_CROSSING;
     if (flown) {

@@ -106,13 +106,9 @@ static int turns_along(hs_view *v, int64_t row) {
   const int d = run->degree, w = run->width, m = v->table->surfaces;
   if (!m) return 0;
   for (int i = 0; i < v->n; i++) {
-    double below = 0.0, above = 0.0;
-    for (int k = 0; k < d; k++) {
-      const double term = c[k * w + i];
-      if (term < 0) below += term;
-      else above += term;
-    }
-    set_box(v, x[i] + below, x[i] + above, i, SAFE * v->own[i]);
+    double total = 0.0, size = 0.0;
+    for (int k = 0; k < d; k++) total += c[k * w + i], size += fabs(c[k * w + i]);
+    set_box(v, x[i] + (total - size) / 2, x[i] + (total + size) / 2, i, SAFE * v->own[i]);
   }
   set_times(v, run->times[row], run->times[row + 1] - run->times[row], 0.0, 1.0);
   for (int k = 0; k < m; k++) v->open[v->s->model->surfaces + k] = 1;

@@ -33,7 +33,9 @@ typedef struct {
   int64_t segment, arc, last, fine_row, fine_arc;
   int mode, n, crossed;
   double *error, *size, *floor, *late; /* of all states; of each transition */
+  int64_t *tied; /* where the alternatives of each transition begin */
   double *own;                        /* how wrong the states of the mode are */
+  const hs_sparse *row; /* whose values `gradient` holds */
   double *x, *y, *z, *gradient, *slope, *values, *magnitudes, *at_start, *at_end;
   double *matrix, *bernstein;
   double *enough;

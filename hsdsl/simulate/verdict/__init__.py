@@ -31,7 +31,7 @@ from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
-from hsdsl.simulate.verdict.commutation import choices
+from hsdsl.simulate.verdict.commutation import choices, together
 from hsdsl.simulate.verdict.crossings import crossings, summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.flows import flows
@@ -61,7 +61,9 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if left:
         return Verdict("left", _once(left, unknown))
     if run.screen is not None and not run.screen.doubts() and not run.execution.enters_beyond:
-        return Verdict("holds", (*summary(run, *run.screen.crossings), *run.screen.nearest_miss))
+        screen = run.screen
+        margins = *summary(run, *screen.crossings), *together(screen.commuting), *screen.nearest_miss
+        return Verdict("holds", _once(margins))
     found = list(reliability(run))
     for look in (crossings, choices, landings, misses, flows):
         findings, reasons = look(run)

@@ -24,9 +24,11 @@ Landed = tuple[str, State]
 
 def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every transition that others were passed over for."""
+    if run.screen is not None and not run.doubts("choice"):
+        return [], together(run.screen.commuting)
     found: list[Finding] = []
     commuting: list[Number] = []
-    for made in run.relied_transitions if run.doubts("choice") else ():
+    for made in run.relied_transitions:
         if not made.alternatives:
             continue
         place, k = run.before(made)
@@ -46,11 +48,16 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
                 "they lead to different points",
             )
         )
-    if not commuting:
-        return found, []
+    return found, together(commuting)
+
+
+def together(commuting: Sequence[Number]) -> list[str]:
+    """Say when transitions are reached together that commute."""
     instants = list(dict.fromkeys(map(show, commuting)))
+    if not instants:
+        return []
     listed = ", ".join(instants[:3]) + (f" and {len(instants) - 3} more" if len(instants) > 3 else "")
-    return found, [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
+    return [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
 
 
 def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:

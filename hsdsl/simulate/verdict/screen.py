@@ -22,7 +22,7 @@ from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
 ENDED = ("until", "final")
-LOOK_AT_CROSSING, LOOK_AT_RESET = 1, 2
+LOOK_AT_CROSSING, LOOK_AT_RESET, COMMUTES = 1, 2, 4
 DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
 
 
@@ -62,7 +62,7 @@ class Screen:
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
         if not words:
-            return bool(self.table.doubts) or bool(self.marked("crossing").any())
+            return bool(self.table.doubts) or bool((self.marked("crossing") & ~COMMUTES).any())
         return any(self.table.doubts & DOUBTS[word] for word in words)
 
     def marked(self, name: str) -> Array:
@@ -83,6 +83,11 @@ class Screen:
     def crossings(self) -> tuple[int, float, float]:
         """How many transitions the flow made, the least rate and the least margin."""
         return self.table.crossed, self.table.slowest, self.table.least
+
+    @property
+    def commuting(self) -> list[float]:
+        """When transitions were reached together of which every order leads to the same point."""
+        return self._first["transition"]["time"][self.marked("crossing") & COMMUTES != 0].tolist()
 
     @property
     def nearest_miss(self) -> list[str]:
@@ -115,5 +120,5 @@ def _record(columns: Any) -> Any:
     where, made = columns.where, columns.made
     return structures.Record(
         where.rows, where.arcs, made.transitions, where.width, where.degree, where.times, where.values, where.pieces,
-        where.arc, made.transition, made.before, made.after,
+        where.arc, made.transition, made.before, made.after, made.alternatives,
     )  # fmt: skip
