@@ -130,6 +130,20 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
     return path
 
 
+def entries(kind: str) -> int:
+    """How many entries of a kind there are."""
+    with suppress(OSError):
+        return sum(path.is_dir() for path in (folder() / kind).iterdir())
+    return 0
+
+
+def forget(kind: str) -> None:
+    """Remove all entries of a kind."""
+    import shutil
+
+    shutil.rmtree(folder() / kind, ignore_errors=True)
+
+
 def making(kind: str, key: str) -> AbstractContextManager[None]:
     """Let one process at a time make an entry, where the cache can be written: others wait and find it."""
     from hsdsl.unfinished import locked

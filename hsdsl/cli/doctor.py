@@ -5,19 +5,25 @@ from __future__ import annotations
 import platform
 import sys
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Annotated, Any
 
-from typer import Exit
+from typer import Exit, Option
 
 from hsdsl.cli.console import print_json
 from hsdsl.cli.options import Json
 
 NEEDED = "pyyaml pydantic sympy mpmath numpy typer matplotlib scipy clarabel pint threadpoolctl"  # of pyproject.toml
+Forget = Annotated[bool, Option("--forget", help="Try again to compile models that took too long.")]
 OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
 
 
-def doctor(json: Json = False) -> None:
+def doctor(json: Json = False, forget: Forget = False) -> None:
     """Check this installation: its packages, its compiler and its cache."""
+    from hsdsl import cache
+    from hsdsl.runtime.library import GIVEN_UP
+
+    if forget:
+        cache.forget(GIVEN_UP)
     installation = _installation()
     if json:
         print_json(installation)
@@ -50,6 +56,7 @@ def _engines() -> dict[str, Any]:
     from hsdsl import cache
     from hsdsl.runtime.compiler import NoCompiler, find_compiler
     from hsdsl.runtime.kernel import runtime
+    from hsdsl.runtime.library import GIVEN_UP
 
     compiler = failure = None
     try:
@@ -63,6 +70,7 @@ def _engines() -> dict[str, Any]:
         "compiler_failure": failure,
         "cache": str(cache.folder()),
         "cache_refused": cache.private(cache.folder()),
+        "given_up": cache.entries(GIVEN_UP),
     }
 
 
@@ -82,6 +90,7 @@ def _text(installation: dict[str, Any]) -> str:
         f"engines: {', '.join(installation['engines'])}",
         f"compiler: {installation['compiler'] or installation['compiler_failure']}",
         f"compiled code: {installation['cache_refused'] or installation['cache']}",
+        f"models that took too long to compile, and are not tried again: {installation['given_up']}",
         f"schemes: {', '.join(installation['schemes'])}",
         f"methods: {', '.join(installation['methods'])}",
     ]

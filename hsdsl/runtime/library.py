@@ -11,17 +11,20 @@ import os
 import platform
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from hsdsl import limits
 from hsdsl.cache import find, keep, key_of, making
 from hsdsl.names import shown
-from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, find_compiler
+from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
 
 RUNTIME = Path(__file__).parent / "c"
 BACKENDS = Path(__file__).parents[1] / "backends"
 SHIPPED = Path(__file__).parent / "shipped"
 KIND = "compiled"
+GIVEN_UP = "given-up"  # entries for models that took too long to compile: the seconds that the compiler had
 
 
 # the text, symbol and effort of the loop; -O2 compiles 1.6 times as long
@@ -114,16 +117,39 @@ def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], str], 
     """Compile a library, try it, and keep it where anything can be kept."""
     from hsdsl.runtime.process import workshop
 
+    allowed, is_loop = limits.current().compile, symbol == LOOP[1]
+    if not is_loop and (seconds := _given_up(key)) >= allowed:
+        again = f"--limit compile={10 * seconds:g} allows more, hsdsl doctor --forget has it tried again"
+        raise TooSlow(f"{compiler} took more than {seconds:g} s before; {again}")
     text = source()
     try:
         with workshop() as folder:
             library = folder / "model.so"
-            _compile(compiler, text, library, effort)
+            try:
+                _compile(compiler, text, library, effort)
+            except TooSlow:
+                if not is_loop:  # which is compiled in seconds, unless much else runs
+                    _give_up(key, allowed)
+                raise
             loaded = _tried(compiler, library, symbol)
             _keep(key, library)
             return loaded
     except OSError as error:
         raise NoCompiler(f"there is no room to compile: {error.strerror or error}") from None
+
+
+def _given_up(key: str) -> float:
+    path = find(GIVEN_UP, key)
+    return 0.0 if path is None else float(path.read_text())
+
+
+def _give_up(key: str, seconds: float) -> None:
+    with suppress(OSError):
+        keep(GIVEN_UP, key, ".txt", lambda path: _write(path, f"{seconds!r}"))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text)
 
 
 def _compile(compiler: Compiler, source: str, library: Path, effort: Effort) -> None:

@@ -13,6 +13,7 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
+from hsdsl.cli.verbs import obey
 from hsdsl.errors import UsageError
 from hsdsl.limits import Limits
 from hsdsl.model import engines
@@ -146,6 +147,31 @@ def test_a_compiler_has_so_much_time(use, capsys) -> None:
     assert hsdsl.load(MODEL, limits=Limits(compile=2)).simulate(until=0.1).engine == "python"
     said = capsys.readouterr().err
     assert "--limit compile=20" in said and "the longest expression is the flow of T in mode" in said
+
+
+@needs_compiler
+def test_what_takes_too_long_is_tried_once(use, capsys, tmp_path: Path) -> None:
+    """It is tried again with more time, by another compiler, and where it is to be forgotten."""
+    real, tried = compiler.find_compiler().command[0], tmp_path / "tried"
+    slow = f'case "$*" in *-O2*) echo once >> {tried}; sleep 600;; esac\nexec {real} "$@"'
+    use(slow)
+
+    def runs(seconds: float) -> int:
+        """How often the compiler has been tried, after another run."""
+        engines._warn_once.cache_clear()
+        assert hsdsl.load(MODEL, limits=Limits(compile=seconds)).simulate(until=0.1).engine == "python"
+        return len(tried.read_text().split())
+
+    assert [runs(2), runs(2), runs(1.5), runs(2.5), runs(2)] == [1, 1, 1, 2, 2]
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 5 and "took more than 2 s before" in said[1]
+    assert "--limit compile=20" in said[1] and "hsdsl doctor --forget" in said[1]
+    assert obey(["doctor", "--json"]) == 0
+    assert '"given_up": 1' in capsys.readouterr().out
+    assert obey(["doctor", "--forget"]) == 0
+    assert runs(2) == 3
+    use(slow + "\n# another one")
+    assert runs(2) == 4
 
 
 @needs_compiler
