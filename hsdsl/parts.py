@@ -7,9 +7,15 @@ modes, and a product mode exists only where a run visits it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from hsdsl.names import did_you_mean
+
+_INDEX = re.compile(r"\[\d+\]")
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,29 @@ def numbers_of(parts: Sequence[Part], name: str) -> dict[str, int]:
 def present(parts: Sequence[Part], state: Mapping[str, Any]) -> frozenset[str]:
     """The states that the product mode at a state of the system has."""
     return frozenset(name for part in parts for name in part.states[part.number(state)])
+
+
+def of_all(name: str) -> str:
+    """The name of something that all instances of a `count` have: `leg.k` for `leg[3].k`."""
+    return _INDEX.sub("", name)
+
+
+def for_all(given: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
+    """Values by name, those for all instances under the name of each; one that is given by itself counts more."""
+    whole, all_of = {*known}, defaultdict[str, list[str]](list)
+    for name in dict.fromkeys(known):
+        all_of[of_all(name)].append(name)
+    members = {name: all_of.get(name, [name]) for name in given if name not in whole}
+    spread = {member: given[name] for name, own in members.items() for member in own}
+    return spread | {name: value for name, value in given.items() if name in whole}
+
+
+def meant(name: str, known: Iterable[str]) -> str | None:
+    """The hint for a name that is none of those known, nor one for all instances."""
+    names = list(dict.fromkeys(known))
+    if alike := [each for each in names if of_all(each) == of_all(name)]:
+        return f"known here: {alike[0]} to {alike[-1]}, and {of_all(name)} for all"
+    return did_you_mean(name, names if "[" in name else map(of_all, names))
 
 
 @dataclass(frozen=True)

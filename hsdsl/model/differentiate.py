@@ -79,8 +79,8 @@ class Differentiator:
 
         call = located_arguments(self.pipeline, arguments)
         plain = self.pipeline.prepare(call)
-        parameters = overrides_of(call, "parameters")
-        initial = start_of_parts(self.pipeline.program, overrides_of(call, "initial"))
+        parameters = overrides_of(call, "parameters", self.pipeline.program)
+        initial = start_of_parts(self.pipeline.program, overrides_of(call, "initial", self.pipeline.program))
         values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
         by = targets(wrt, self.pipeline.program, started_with(values, initial))
         given: dict[str, Any] = dict(call.get("settings") or {})

@@ -19,7 +19,7 @@ from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.ensemble_request import EnsembleRequest
 from hsdsl.model.options import KEYS, Options
 from hsdsl.model.settings import check_memory, setting_columns, whole
-from hsdsl.model.values import InstanceTable, evaluate_parameters, initial_columns
+from hsdsl.model.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
 from hsdsl.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
 from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept
@@ -163,7 +163,10 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
         why = next(iter(columns.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
         raise NothingToRunError(why)
     base = pipeline.prepare(request.single(first))
-    start = np.array(initial_columns(columns, base.states, call["initial"], request.arrays(initial=True)), dtype=float)
+    varied = request.arrays(initial=True)
+    shared = start_of_parts(pipeline.program, dict.fromkeys(varied) | call["initial"])
+    shared = {name: value for name, value in shared.items() if name not in varied}
+    start = np.array(initial_columns(columns, base.states, shared, varied), dtype=float)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
     settings = _settings(columns, base.settings, options)
     places = list(settings)
@@ -203,7 +206,7 @@ def run_ensemble(
     """Run many instances of a model; see `Model.ensemble`."""
     if threads is not None:
         whole(threads, "threads", least=1)
-    request = EnsembleRequest.of(call, samples, transition_times, every_transition)
+    request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
     completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
     return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
 

@@ -14,6 +14,7 @@ from hsdsl.execution import Array
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.settings import whole
 from hsdsl.model.values import InstanceTable
+from hsdsl.program import Program
 
 INITIAL = "initial."
 
@@ -34,7 +35,7 @@ class EnsembleRequest:
 
     @staticmethod
     def of(
-        call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
+        program: Program, call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
     ) -> EnsembleRequest:
         """Sort the arguments.
 
@@ -45,7 +46,7 @@ class EnsembleRequest:
         whole(transition_times, "transition_times", least=0)
         varied: dict[str, Array] = {}
         for group, prefix in (("parameters", ""), ("initial", INITIAL)):
-            given = overrides_of(call, group)
+            given = overrides_of(call, group, program)
             varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
             call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
         try:

@@ -39,8 +39,8 @@ def fit(
     if sigma and weights:
         raise UsageError("expected sigma or weights, got both", "a weight is one over a standard deviation")
     measured = measurements(data, model.columns)
-    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters"))
-    _, states, x = initial_state(values, overrides_of(arguments, "initial"))
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters", model.program))
+    _, states, x = initial_state(values, overrides_of(arguments, "initial", model.program))
     by = targets(wrt, model.program, states)
     if measured.count < len(by):
         raise UsageError(f"{measured.count} measurements cannot determine {len(by)} values")
@@ -60,7 +60,7 @@ def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) 
 
     def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
         call = dict(arguments) | {"until": until}
-        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        parameters, initial = (overrides_of(call, group, model.program) for group in ("parameters", "initial"))
         for target in by:
             (initial if target.initial else parameters)[target.name] = given[target.label]
         return model.sensitivity(labels, **call | {"parameters": parameters, "initial": initial})

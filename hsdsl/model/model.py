@@ -217,7 +217,7 @@ class Model:
         gone = set(self.columns) - {"mode", *smaller.columns}
         for group in ("initial", "scale"):
             arguments[group] = {
-                name: value for name, value in overrides_of(arguments, group).items() if name not in gone
+                name: value for name, value in overrides_of(arguments, group, self.program).items() if name not in gone
             }
         return smaller.simulate(**arguments, watch=watch)
 

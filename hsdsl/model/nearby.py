@@ -40,8 +40,8 @@ def orbital_stability(
     if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
         raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
     call = located_arguments(model.pipeline, arguments)
-    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters"))
-    _, states, x = initial_state(values, overrides_of(call, "initial"))
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
+    _, states, x = initial_state(values, overrides_of(call, "initial", model.program))
     by = targets(wrt if wrt is not None else [f"initial.{name}" for name in states], model.program, states)
     known: dict[str, float] = dict(zip(model.program.parameters, map(float, values.parameters), strict=True))
     known |= {f"initial.{name}": float(value) for name, value in zip(states, x, strict=True)}
@@ -52,7 +52,7 @@ def orbital_stability(
 
     def look(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
         nonlocal done
-        parameters, initial = overrides_of(call, "parameters"), overrides_of(call, "initial")
+        parameters, initial = (overrides_of(call, group, model.program) for group in ("parameters", "initial"))
         for target in by:
             (initial if target.initial else parameters)[target.name] = known[target.label] + shift[target.label]
         moved: dict[str, Any] = {**call, "parameters": parameters, "initial": initial}

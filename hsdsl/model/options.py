@@ -16,6 +16,8 @@ from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.integrators import AUTO, METHODS, Method
 from hsdsl.names import closest, did_you_mean
+from hsdsl.parts import for_all, numbered
+from hsdsl.program import Program
 from hsdsl.simulate import SCHEMES
 
 KEYS = (
@@ -67,10 +69,21 @@ def check_arguments(given: Iterable[str], what: str, without: Collection[str]) -
             raise UsageError(f"{what} has no argument '{name}'", did_you_mean(name, known))
 
 
-def overrides_of(arguments: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """The overrides of a group, ``parameters``, ``initial`` or ``scale``, among the arguments of a run."""
+def overrides_of(arguments: Mapping[str, Any], group: str, program: Program) -> dict[str, Any]:
+    """The overrides of a group, ``parameters``, ``initial`` or ``scale``, among the arguments of a run.
+
+    One for all instances of a `count` (`leg.k`) is given to each.
+    """
     given: Mapping[str, Any] | None = arguments.get(group)
-    return dict(given or {})
+    return for_all(given or {}, names_of(program, group)) if program.parts else dict(given or {})
+
+
+def names_of(program: Program, group: str) -> tuple[str, ...]:
+    """The names of a group's overrides, without `mode`."""
+    if group == "parameters":
+        return program.parameters
+    modes = (f"{part.name}.mode" for part in program.parts) if group == "initial" else ()
+    return (*(name for name in program.all_states if name not in numbered(program.parts)), *modes)
 
 
 def resolve(sources: Mapping[str, Mapping[str, Any]]) -> Options:

@@ -66,7 +66,7 @@ class Orbits:
         self._period = period
         self._phase = PHASE if self.forced else None
         self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
-        self._parameters = overrides_of(arguments, "parameters")
+        self._parameters = overrides_of(arguments, "parameters", self.model.program)
         self._stiff = False
         self._at: Entered | None = None  # the product mode of a system of parts
 

@@ -181,7 +181,7 @@ class Pipeline:
 
     def prepare(self, arguments: Mapping[str, Any]) -> Prepared:
         """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
-        parameters, initial = overrides_of(arguments, "parameters"), overrides_of(arguments, "initial")
+        parameters, initial = (overrides_of(arguments, group, self.program) for group in ("parameters", "initial"))
         engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
         options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
         engines.check(engine)

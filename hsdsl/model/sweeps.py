@@ -17,7 +17,8 @@ from hsdsl.model.ensemble import cores
 from hsdsl.model.ensemble_request import INITIAL
 from hsdsl.model.options import KEYS, as_written, check_arguments, overrides_of
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean, without_memory
+from hsdsl.names import without_memory
+from hsdsl.parts import meant, of_all
 from hsdsl.processes import can_fork
 from hsdsl.sweep import Sweep, recording, variation
 from hsdsl.sweep import manifest as manifests
@@ -108,8 +109,9 @@ def _planned(
         if value not in (None, {}) and (name, value) != ("engine", "auto")
     }
     check_arguments(given, "a sweep", without=("samples", "precision"))
-    fixed = {group: overrides_of(given, group) for group in ("parameters", "initial")}
-    values = with_parameters(model.pipeline.values(FLOAT64), fixed["parameters"])
+    fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
+    shared = overrides_of(given, "parameters", model.program)
+    values = with_parameters(model.pipeline.values(FLOAT64), shared)
     varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
     _check_names(model, varied.names, fixed)
     if chunk is not None and chunk < 1:
@@ -142,10 +144,10 @@ def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping
     program = model.program
     known = [*program.parameters, *(f"{INITIAL}{state}" for state in program.all_states)]
     for name in names:
-        if name not in known:
+        if name not in known and name not in map(of_all, known):
             settings = name.removeprefix("experiment.") in KEYS
             hint = "until and relaxation may be expressions of a parameter that varies" if settings else None
-            hint = hint or did_you_mean(name, known) or f"it may vary {', '.join(known)}"
+            hint = hint or meant(name, known) or f"it may vary {', '.join(known)}"
             raise UsageError(f"--vary: the model has no parameter or initial value '{name}'", hint)
         group = "initial" if name.startswith(INITIAL) else "parameters"
         if name.removeprefix(INITIAL) in fixed[group]:

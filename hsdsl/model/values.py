@@ -15,9 +15,9 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.backends.python import PythonKernel
 from hsdsl.backends.text import compile_routines
 from hsdsl.errors import UsageError
-from hsdsl.model.options import KEYS
+from hsdsl.model.options import KEYS, names_of
 from hsdsl.names import did_you_mean
-from hsdsl.parts import numbers_of
+from hsdsl.parts import meant, numbers_of, of_all
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show
 
@@ -203,11 +203,11 @@ def _elsewhere(name: str, program: Program) -> str | None:
     """The hint for a name that is no parameter: how settings and initial values are reached, or the nearest one."""
     if name in KEYS:
         return f"write experiment.{name}"
-    if name == "mode" or any(name in mode.states for mode in program.modes):
+    if name == "mode" or name in map(of_all, names_of(program, "initial")) or name in program.all_states:
         return f"write initial.{name}"
     if any(name == sampled.name for sampled in program.inputs):
         return "it is an input: give its values in the file by parameters, and override these"
-    return did_you_mean(name, program.parameters)
+    return meant(name, program.parameters)
 
 
 def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tuple[str, ...], Row]:
@@ -258,9 +258,10 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
     index = program.initial_mode if given is None else names.index(given)
     mode = program.modes[index]
     states = program.initial_states if mode.final and not mode.states else mode.states
+    where, known = (f"mode {mode.name}", states) if not program.parts else ("the model", names_of(program, "initial"))
     for name in overrides:
         if name != "mode" and name not in states:
-            raise UsageError(f"mode {mode.name} has no state '{name}'", did_you_mean(name, states))
+            raise UsageError(f"{where} has no state '{name}'", meant(name, known))
     if missing := [name for name in states if name not in (*program.initial_states, *overrides)]:
         raise UsageError(
             f"mode {mode.name} starts with {', '.join(states)}, but no value is given for {', '.join(missing)}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
 from hsdsl.names import without_memory
-from hsdsl.parts import change, compact
+from hsdsl.parts import change, compact, of_all
 
 MOST_ALIKE = 3  # of reasons that differ in numbers only
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -58,7 +59,13 @@ def _kept(execution: Execution) -> str:
 
 def overrides(execution: Execution) -> str:
     """Parameters and initial values that are not those of the file; `settings` has the others."""
-    return values({n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")})
+    given = {n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")}
+    alike = Counter((of_all(name), values({"": value})) for name, value in given.items())
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        count = alike[of_all(name), values({"": value})]
+        found[name if count == 1 else f"{of_all(name)} of {count} instances"] = value
+    return values(found)
 
 
 def facts(execution: Execution) -> Iterator[tuple[str, str]]:

@@ -328,9 +328,7 @@ class TestInABrowser:
     def test_memory_of_events_is_no_slider_and_follows_the_start(self, driver, tmp_path):
         model = hsdsl.loads(REMEMBERING)
         opened(driver, exported(model, tmp_path))
-        names = (
-            "return [model.columns, [...document.querySelectorAll('#controls input[name]')].map((e) => e.name)]"
-        )
+        names = "return [model.columns, [...document.querySelectorAll('#controls input[name]')].map((e) => e.name)]"
         assert driver.execute_script(names) == [["x", "n"], ["initial.x", "initial.n"]]
         assert "@" not in driver.find_element("id", "transitions").text
         for x in (0.75, -0.25):  # beyond the threshold, the event is not armed where the run starts
