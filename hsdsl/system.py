@@ -93,7 +93,8 @@ class Event:
     """What an edge has that fires where a condition turns true, until `elaborate.events` writes it as edges.
 
     ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later,
-    and unless ``persistent`` only if the condition holds until then.
+    and unless ``persistent`` only if the condition holds until then; the states of ``given`` get values of before.
+    At most ``waiting`` executions wait at a time.
     """
 
     trigger: Trigger
@@ -101,6 +102,8 @@ class Event:
     delay: sp.Expr | None = None
     persistent: bool = True
     initially: bool = True
+    given: tuple[str, ...] = ()
+    waiting: int = 1
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ class Edge:
     ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
     ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
     ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again;
-    one ``of_event`` is part of an event.
+    one ``of_event`` is part of an event. That of a ``part`` leaves the mode with this number of it.
     """
 
     name: str
@@ -127,6 +130,7 @@ class Edge:
     event: Event | None = None
     stays: bool = False
     of_event: bool = False
+    part: tuple[str, int] | None = None
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}

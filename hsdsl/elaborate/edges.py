@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
@@ -16,7 +17,8 @@ from hsdsl.schema import ModeDocument, TransitionDocument
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import ZERO, Edge, Event, Surface
 
-_NOWHERE = Surface(ZERO, ZERO, ZERO, "")
+NOWHERE = Surface(ZERO, ZERO, ZERO, "")
+MOST_WAITING = 100
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 
@@ -72,8 +74,8 @@ def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
 
 def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:
     resolver = symbols.resolver
-    event = _event(symbols, transition, scope)
-    crossed = surface(resolver, transition.when, scope, "when") if transition.event is None else _NOWHERE
+    event = event_of(symbols, transition, scope)
+    crossed = surface(resolver, transition.when, scope, "when") if transition.event is None else NOWHERE
     condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
     values = symbols.numbers(transition.reset.values(), scope)
     stays = transition.event is not None and transition.to.value == ABSENT
@@ -101,17 +103,17 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         reset_texts=tuple(texts.get(s, s) for s in states),
         priority=transition.priority,
         condition_text=None if transition.condition is None else transition.condition.value,
-        event=event,
+        event=None if event is None else replace(event, given=tuple(resets)),
         stays=stays,
     )
 
 
 def of_events(transition: TransitionDocument) -> list[str]:
     """The keys of a transition that only events have."""
-    return [key for key in ("delay", "persistent", "initially") if key in transition.model_fields_set]
+    return [key for key in ("delay", "persistent", "initially", "waiting") if key in transition.model_fields_set]
 
 
-def _event(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -> Event | None:
+def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -> Event | None:
     """What a transition has that fires where a condition turns true; None for another one, and where it has faults."""
     given = transition.event
     if given is None:
@@ -134,8 +136,13 @@ def _event(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -
         return None
     if not _continuous(symbols, given, trigger):
         return None
+    if not 1 <= transition.waiting <= MOST_WAITING:
+        message = f"`waiting` must be between 1 and {MOST_WAITING}, not {transition.waiting}"
+        symbols.report(given.place, "HS323", message, "so many executions of an event can wait at a time")
+        return None
     after = None if delay is None else delay.expr
-    return Event(trigger, given.value, after, transition.persistent, transition.initially)
+    flags = transition.persistent, transition.initially
+    return Event(trigger, given.value, after, *flags, waiting=transition.waiting)
 
 
 def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger) -> bool:

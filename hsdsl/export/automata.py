@@ -40,7 +40,7 @@ class Automaton:
         for _, mode in self.modes:
             found += [*texts(mode.flow or {}), *texts(mode.let), *(scalar.value for scalar in mode.domain)]
             for transition in mode.transitions:
-                given = (transition.when, transition.condition, transition.on)
+                given = (transition.when, transition.event, transition.condition, transition.on, transition.delay)
                 found += [scalar.value for scalar in given if scalar is not None]
                 found += [*texts(transition.reset), *map(str, transition.reset)]
         return found

@@ -58,6 +58,12 @@ class Reached:
         margin = self._reach(rate, time)
         return sp.Or(sp.Gt(self.residual, margin), sp.And(sp.Ge(self.residual, -margin), rises))
 
+    def rises(self, rate: Any, time: Any) -> Any:
+        """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
+        reach = self._reach(rate, time)
+        beyond, on = (1 + sign(2 * sign(self.residual - reach) - 1)) / 2, self.nearly_holds(rate, time)
+        return maximum(beyond, minimum(on, (1 + sign(2 * sign(rate) - 1)) / 2))
+
     def turns(self, other: Reached) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
         same = self.residual == other.residual

@@ -86,7 +86,7 @@ def _unreachable(document: SystemDocument, name: Key, kind: AutomatonDocument) -
     while waiting:
         mode = waiting.pop()
         for transition in next(m for key, m in kind.modes.items() if key == mode).transitions:
-            target = transition.to.value if transition.to else mode
+            target = transition.target or mode
             if target not in entered:
                 entered.add(target)
                 waiting.append(target)

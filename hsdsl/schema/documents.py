@@ -36,7 +36,7 @@ from hsdsl.schema.fields import (
     required,
 )
 from hsdsl.schema.shapes import BoxShape, CircleShape, LineShape, PointShape, Shape, SpringShape
-from hsdsl.source import Scalar, absent
+from hsdsl.source import ABSENT, Scalar, absent
 
 
 def _mapping_or_not(value: Any) -> str:
@@ -135,7 +135,12 @@ class TransitionDocument(Document):
         "With `event`: how long after its condition turned true the transition is made, with the values of then.", 2
     )
     persistent: Flag = optional(
-        "With `delay`: whether the transition is made even if the condition turns false before.", False, default=True
+        "With `event`: whether the transition is made even if its condition turns false before it is its turn.",
+        False,
+        default=True,
+    )
+    waiting: Whole = optional(
+        "With `delay`: how many executions can wait at a time, at most 100. One more ends the run.", 8, default=4
     )
     initially: Flag = optional(
         "With `event`: what its condition counts as before the mode is entered; with `false` it fires there if it "
@@ -143,6 +148,12 @@ class TransitionDocument(Document):
         False,
         default=True,
     )
+
+    @property
+    def target(self) -> str | None:
+        """The mode entered; None where the mode stays, or is not known."""
+        label: Scalar | None = self.to
+        return None if label is None or label.value == ABSENT else label.value  # pyright: ignore[reportUnnecessaryComparison]
 
     @model_validator(mode="before")
     @classmethod

@@ -70,20 +70,58 @@ def test_the_order_of_events_reached_together(tmp_path):
     """Each goes with the values that the one before left."""
     three = (
         "{name: low, event: x >= 1, reset: {n: 2*n}}, {name: high, event: x >= 1, priority: 2, reset: {n: n + 1}},"
-        "{name: never, event: x >= 1 and n <= 1/2, priority: 1, reset: {n: 100}}"
+        "{name: never, event: x >= 1 and n <= 1/2, priority: 1, persistent: false, reset: {n: 100}}"
     )
     run = model(tmp_path, "x: 1, n: 0", three, "x: 0, n: 0", "2").simulate()
     assert [m.edge for m in run.transitions][:2] == ["high", "low"]
     assert run.final.state["n"] == 2
+    kept = three.replace(", persistent: false", "")
+    run = model(tmp_path, "x: 1, n: 0", kept, "x: 0, n: 0", "2").simulate()
+    assert [m.edge for m in run.transitions][:3] == ["high", "never", "low"]
+    assert run.final.state["n"] == 200
 
 
 def test_a_second_trigger_while_it_waits_ends_the_run(tmp_path):
     run = model(
-        tmp_path, "x: y, y: -x, n: 0", "{name: e, event: x >= 1/2, delay: 9, reset: {n: 1}}", "x: 0, y: 1, n: 0"
+        tmp_path,
+        "x: y, y: -x, n: 0",
+        "{name: e, event: x >= 1/2, delay: 9, waiting: 1, reset: {n: 1}}",
+        "x: 0, y: 1, n: 0",
     )
     end = run.simulate()
     assert end.stop.reason == "final" and end.final.mode == "e-waits-already"
     assert end.stop.time == pytest.approx(math.pi / 6 + 2 * math.pi, abs=1e-8)
+
+
+def test_no_execution_is_lost(tmp_path):
+    """sin(t) rises through 1/2 once a period, and what waits for 1 to 4 periods is made."""
+    for periods in (1, 2, 3.5):
+        wait = 2 * math.pi * periods - 0.01
+        event = f"{{name: e, event: x >= 1/2, delay: {wait!r}, reset: {{n: n + 1, m: t}}}}"
+        run = model(tmp_path, "x: y, y: -x, n: 0, m: 0", event, "x: 0, y: 1, n: 0, m: 0", "60").simulate()
+        triggers = [math.pi / 6 + 2 * k * math.pi for k in range(10)]
+        assert times(run, "e triggers") == pytest.approx([t for t in triggers if t < 60], abs=1e-7)
+        assert times(run, "e") == pytest.approx([t + wait for t in triggers if t + wait < 60], abs=1e-7)
+        made = [m for m in run.transitions if m.edge == "e"]
+        assert [m.after["m"] for m in made] == pytest.approx([m.time - wait for m in made], abs=1e-7)
+        assert run.stop.reason == "until"
+
+
+def test_a_fifth_trigger_ends_the_run_also_by_a_reset(tmp_path):
+    """At first four executions can wait."""
+    text = (
+        "{name: e, event: x >= 1, delay: 90, reset: {n: 1}}, {name: go, when: s >= 1, to: m, reset: {s: 0, x: 3 - x}}"
+    )
+    run = model(tmp_path, "s: 1, x: 0, n: 0", text, "s: 0, x: 0, n: 0", "20").simulate()
+    assert times(run, "e triggers") == pytest.approx([1, 3, 5, 7])
+    assert run.final.mode == "e-waits-already" and run.stop.time == pytest.approx(9)
+
+
+@pytest.mark.parametrize("waiting", [0, 101])
+def test_how_many_wait_is_checked(tmp_path, waiting):
+    event = f"{{name: e, event: x >= 1/2, delay: 9, waiting: {waiting}, reset: {{n: 1}}}}"
+    with pytest.raises(hsdsl.ModelError, match="between 1 and 100"):
+        model(tmp_path, "x: 1, n: 0", event, "x: 0, n: 0")
 
 
 def test_delays_are_evaluated_when_the_condition_turns_true(tmp_path):
@@ -146,7 +184,21 @@ MADE = {  # flow, transitions, initial values, and the transitions that are made
         "{name: low, event: x >= 0, initially: false, priority: 1, reset: {x: -1}},"
         "{name: e, event: x >= 0, initially: false, reset: {n: n + 1}}",
         "x: 1, n: 0",
-        [("low", 0.0), ("e", 0.0), ("low", 1.0), ("low", 2.0)],
+        [("low", 0.0), ("e", 0.0), ("low", 1.0), ("e", 1.0), ("low", 2.0), ("e", 2.0)],
+    ),
+    "does not persist": (
+        "x: 1, n: 0",
+        "{name: low, event: x >= 0, initially: false, priority: 1, reset: {x: -1}},"
+        "{name: e, event: x >= 0, initially: false, persistent: false, reset: {n: n + 1}}",
+        "x: 1, n: 0",
+        [("low", 0.0), ("low", 1.0), ("low", 2.0)],
+    ),
+    # re-arming on its surface is no turning true
+    "falls": (
+        "x: -1, n: 0",
+        "{name: low, when: x <= 0, to: m, reset: {x: 2}}, {name: e, event: x > 0, reset: {n: n + 1}}",
+        "x: 1, n: 0",
+        [("low", 1.0)],
     ),
 }
 

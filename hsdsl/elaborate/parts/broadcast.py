@@ -89,8 +89,8 @@ class Broadcast:
         return values
 
     def _timer(self, made: PartTransition) -> dict[str, Any]:
-        """The timer of an instance, which each of its transitions sets to 0."""
-        return {made.one.full(SINCE): ZERO} if made.one.name in self.board.timed else {}
+        """The timer of an instance, which each of its transitions that does not stay sets to 0."""
+        return {made.one.full(SINCE): ZERO} if made.one.name in self.board.timed and not made.stays else {}
 
     def _clash(self, state: str, one: PartTransition, other: PartTransition) -> None:
         message = (

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.elaborate.edges import surface
+from hsdsl.elaborate.edges import NOWHERE, surface
 from hsdsl.elaborate.parts.broadcast import Broadcast
 from hsdsl.elaborate.parts.instances import Instance
 from hsdsl.elaborate.parts.names import Board, Names
@@ -55,8 +55,8 @@ class Composition:
         transitions = [t for one in self.instances for t in transitions_of(self.board, one)]
         if self.board.symbols.resolver.findings.diagnostics:
             return ()
-        broadcast = Broadcast(self.board, [t for t in transitions if not t.surface])
-        edges = [self._edge(broadcast, t) for t in transitions if t.surface]
+        broadcast = Broadcast(self.board, [t for t in transitions if t.listens])
+        edges = [self._edge(broadcast, t) for t in transitions if not t.listens]
         flow += [(ONE, "1")] * len(self.timers)
         count = len(self.states) - len(flow)
         whole = Mode(
@@ -124,16 +124,18 @@ class Composition:
         one, states = made.one, self.states
         values = broadcast.changes(made)
         ends = one.part.final[made.target]
-        assert made.surface is not None
         return Edge(
             name=one.full(made.name),
             source=MODE,
             target=FINAL if ends else MODE,
-            surface=self._surface(one, made.source, made.surface),
+            surface=self._surface(one, made.source, made.surface) if made.surface else NOWHERE,
             condition=made.condition,
             target_states=states,
             reset=tuple(values[s] if s in values else symbol(s) for s in states),
             reset_texts=tuple(made.texts.get(s, s) for s in states),
             priority=made.priority,
             condition_text=made.condition_text,
+            event=made.rising,
+            stays=made.stays,
+            part=(one.name, made.source + 1) if one.part.is_numbered else None,
         )

@@ -42,7 +42,7 @@ class Instance:
         modes = self.kind.modes
         if not (modes[mode].final and modes[mode].flow is None):
             return list(map(str, modes[mode].flow or ()))
-        before = [m for m in modes.values() for t in m.transitions if t.to is not None and t.to.value == mode]
+        before = [m for m in modes.values() for t in m.transitions if t.target == mode]
         return list(dict.fromkeys(str(key) for m in before for key in m.flow or ()))
 
     @cached_property

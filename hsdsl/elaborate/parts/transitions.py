@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from hsdsl.elaborate.edges import of_events, surface, unnamed
+from hsdsl.elaborate.edges import event_of, of_events, surface, unnamed
 from hsdsl.elaborate.parts.instances import Instance
 from hsdsl.elaborate.parts.names import MEMBER, Board, Names
 from hsdsl.expression.scope import Refusal
 from hsdsl.names import did_you_mean, shown
 from hsdsl.schema import PartModeDocument, PartTransitionDocument
 from hsdsl.source import ABSENT, Key, Scalar
+from hsdsl.system import Event as Rising
 from hsdsl.system import Surface
 
 Event = tuple[str, str]  # an instance and the name of its transition
@@ -23,8 +24,9 @@ Event = tuple[str, str]  # an instance and the name of its transition
 class PartTransition:
     """A transition of an instance out of its mode ``source``, an index.
 
-    ``after`` has the events it fires together with, where it has no surface. ``resets`` maps states of the whole to
-    their values, and ``keys`` to where they are set; ``place`` is where a fault of it is reported.
+    It has a ``surface``, or fires where a condition is ``rising``, or ``after`` has what it fires together with. One
+    that ``stays`` does not enter its mode again. ``resets`` maps states of the whole to their values, and ``keys`` to
+    where they are set; ``place`` is where a fault of it is reported.
     """
 
     one: Instance
@@ -32,6 +34,8 @@ class PartTransition:
     target: int
     name: str
     surface: Surface | None
+    rising: Rising | None
+    stays: bool
     after: tuple[Event, ...]
     condition: Any | None
     condition_text: str | None
@@ -40,6 +44,11 @@ class PartTransition:
     keys: dict[str, Key]
     priority: int
     place: Scalar | Key
+
+    @property
+    def listens(self) -> bool:
+        """Whether it fires together with others alone."""
+        return self.surface is None and self.rising is None
 
     @property
     def event(self) -> Event:
@@ -69,8 +78,7 @@ def _labels(board: Board, mode: str, document: PartModeDocument) -> list[str]:
         given |= {label.value} if label is not None else set()
     counts: dict[str, int] = {}
     return [
-        t.name.value if t.name else unnamed(f"{mode}->{t.to.value if t.to else mode}", counts, given)
-        for t in document.transitions
+        t.name.value if t.name else unnamed(f"{mode}->{t.target or mode}", counts, given) for t in document.transitions
     ]
 
 
@@ -79,21 +87,15 @@ def _transition(
 ) -> PartTransition | None:
     one, resolver = names.instance, board.symbols.resolver
     assert one is not None
-    if document.event is not None:
-        message, hint = "a part has no events", "use `when`, with a mode for each side of its surface"
-        board.report_once(document.event, "HS353", message, hint)
+    if not _of_one_kind(board, one, name, document):
         return None
-    if (document.when is None) == (document.on is None):
-        which = "one of `when` and `on`, not both" if document.when else "either `when` or `on`"
-        board.report_once(document.when or document.to or document.name or one.key, "HS353",
-                          f"the transition '{name}' of '{one.automaton}' needs {which}", None)  # fmt: skip
-        return None
-    for key in of_events(document):
-        message = f"only a transition with `event` has `{key}`, and a part has no events"
-        board.report_once(document.when or document.on or one.key, "HS323", message, "use `since` in `when`")
     target = _target(board, one, source, document)
-    crossed, after = None, ()
-    if document.when is not None and not board.is_broken(document.when, names):
+    crossed, rising, after = None, None, ()
+    if document.event is not None:
+        if not board.is_broken(document.event, names):
+            rising = event_of(board.symbols, document, names.scope)
+            board.note(document.event, names, rising)
+    elif document.when is not None and not board.is_broken(document.when, names):
         crossed = surface(resolver, document.when, names.scope, "when")
         board.note(document.when, names, crossed)
     elif document.on is not None:
@@ -103,20 +105,38 @@ def _transition(
         condition = resolver.condition(document.condition, names.scope)
         board.note(document.condition, names, condition)
     resets, keys, texts, whole = _resets(board, names, document)
-    if target is None or not whole or (crossed is None and after is None):
+    if target is None or not whole or (crossed is None and rising is None and not document.on) or after is None:
         return None
     if document.condition is not None and condition is None:
         return None
     _check_entered(board, one, source, target, document, resets)
     text = None if document.condition is None else document.condition.value
-    return PartTransition(one, source, target, name, crossed, after or (), condition, text, resets, texts, keys,
-                          document.priority, document.to or document.on or one.key)  # fmt: skip
+    rising = None if rising is None else replace(rising, given=tuple(resets))
+    stays = rising is not None and document.target is None
+    return PartTransition(one, source, target, name, crossed, rising, stays, after, condition, text, resets, texts,
+                          keys, document.priority, document.to or document.on or one.key)  # fmt: skip
+
+
+def _of_one_kind(board: Board, one: Instance, name: str, document: PartTransitionDocument) -> bool:
+    """Whether a transition has one of `when`, `event` and `on`, and only keys of its kind; else that is reported."""
+    given = {key: getattr(document, key) for key in ("when", "event", "on")}
+    known = [key for key, scalar in given.items() if scalar is not None and scalar.value != ABSENT]
+    if len(known) != 1:
+        found = " and ".join(f"`{key}`" for key in known) or "none"
+        message = f"the transition '{name}' of '{one.automaton}' needs one of `when`, `event` and `on`, and has {found}"
+        board.report_once(given[known[0]] if known else document.to or document.name or one.key, "HS353", message, None)
+        return False
+    if known != ["event"]:
+        for key in of_events(document):
+            message = f"only a transition with `event` has `{key}`"
+            board.report_once(given[known[0]], "HS323", message, "use `since` in `when`")
+    return True
 
 
 def _target(board: Board, one: Instance, source: int, document: PartTransitionDocument) -> int | None:
     label, names = document.to, one.part.modes
     if label is None or label.value == ABSENT:
-        return source if label is None else None
+        return source if label is None or document.event is not None else None
     if label.value in names:
         return names.index(label.value)
     message = f"the automaton '{one.automaton}' has no mode '{shown(label.value)}'"

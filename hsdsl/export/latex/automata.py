@@ -63,7 +63,7 @@ def _transition(mode: str, made: Any, math: Mathematics) -> Iterator[str]:
     fires = fires or rf"together with \texttt{{{escaped(made.on.value)}}}"
     condition = rf" while \({math.condition(made.condition.value)}\)" if made.condition else ""
     changed = [(rf"{math.symbol(state)}^{{+}}", math.expression(text)) for state, text in pairs(made.reset)]
-    target = made.to.value if made.to else mode
+    target = made.target or mode
     priority = f", with priority {made.priority}" if made.priority else ""
     yield rf"\item {label}to {escaped(target)}, {fires}{condition}{priority}" + (":" if changed else ".")
     yield from equations(changed)

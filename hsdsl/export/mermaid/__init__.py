@@ -53,7 +53,7 @@ def _automata(found: Automata) -> Iterator[str]:
             yield f"        {names[name]} : {_label([name, *flow, *own, *walls])}"
         for name, mode in automaton.modes:
             for made in mode.transitions:
-                target = made.to.value if made.to else name
+                target = made.target or name
                 yield f"        {names[name]} --> {names[target]} : {_label(_transition_lines(made))}"
             if mode.final:
                 yield f"        {names[name]} --> [*]"
@@ -68,7 +68,8 @@ def _automata(found: Automata) -> Iterator[str]:
 
 def _transition_lines(made: Any) -> list[str]:
     name = [made.name.value] if made.name else []
-    fires = [f"when {made.when.value}"] if made.when else [f"with {made.on.value}"] if made.on else []
+    given = {"event": made.event, "with": made.on, "when": made.when}
+    fires = [f"{word} {scalar.value}" for word, scalar in given.items() if scalar is not None][:1]
     condition = [f"if {made.condition.value}"] if made.condition else []
     return [*name, *fires, *condition, *(f"{state} := {text}" for state, text in pairs(made.reset))]
 
