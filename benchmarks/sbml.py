@@ -1,0 +1,154 @@
+# pyright: basic
+"""The semantic test suite of SBML: how many of its cases the language expresses, and how many runs are right.
+
+Each case is converted (`sbml_convert.py`), run as its settings say, and compared with its results: every number must be
+within the case's absolute plus relative tolerance.
+
+    python benchmarks/sbml.py SUITE [--cases 1-200] [--processes 2] [--verbose]
+
+SUITE is the folder `cases/semantic` of github.com/sbmlteam/sbml-test-suite.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+import sys
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from sbml_convert import convert
+from sbml_math import NotExpressible
+
+import hsdsl
+
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a case: ``right``, ``wrong``, ``refused`` or ``not expressible``, and why."""
+
+    case: str
+    kind: str
+    reason: str = ""
+    verdict: str = ""
+    seconds: float = 0.0
+
+
+def settings(folder: Path) -> dict[str, Any]:
+    """The settings of a case."""
+    pairs = re.findall(r"^(\w+):[ \t]*(.*?)\s*$", next(folder.glob("*-settings.txt")).read_text(), re.MULTILINE)
+    given: dict[str, Any] = dict(pairs)
+    for name in ("variables", "amount", "concentration"):
+        given[name] = [word for word in re.split(r"[,\s]+", given.get(name, "")) if word]
+    return given
+
+
+def model_file(folder: Path) -> Path:
+    """The newest version of a case's model."""
+    return max(folder.glob("*-sbml-l*v*.xml"), key=lambda path: path.stem[-4:])
+
+
+def document(folder: Path) -> dict[str, Any]:
+    """A case in the language."""
+    given = settings(folder)
+    if not given["start"]:
+        raise NotExpressible("flux balance: a steady state, not a course of time")
+    kinds = {name: kind for kind in ("amount", "concentration") for name in given[kind]}
+    outputs = {name: kinds.get(name, "value") for name in given["variables"]}
+    return convert(model_file(folder), outputs, float(given["start"]) + float(given["duration"]))
+
+
+def expected(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The times of the results, and their columns."""
+    with next(folder.glob("*-results.csv")).open() as file:
+        header, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
+    values = np.array([[float(cell) for cell in row] for row in rows])
+    return values[:, 0], dict(zip(header[1:], values[:, 1:].T, strict=True))
+
+
+def differences(folder: Path, run: Any) -> str:
+    """Where a run is off the results of a case; nothing where it is right."""
+    given, (times, columns) = settings(folder), expected(folder)
+    if run.stop.reason not in ("until",):
+        return f"stopped: {run.stop.reason}: {run.stop.message}"
+    samples = run.sample(np.minimum(times, run.time_span[1]))
+    for name, right in columns.items():
+        own = samples[f"out_{name}"]
+        allowed = float(given["absolute"]) + float(given["relative"]) * np.abs(right)
+        off = ~((np.abs(own - right) <= allowed) | (np.isnan(own) & np.isnan(right)) | (own == right))
+        if off.any():
+            first = int(np.argmax(off))
+            return f"{name} at {times[first]:g}: expected {right[first]:.9g}, got {own[first]:.9g}"
+    return ""
+
+
+def outcome(folder: Path, engine: str) -> Outcome:
+    """Run a case and compare."""
+    case, began = folder.name, time.perf_counter()
+
+    def done(kind: str, reason: str = "", verdict: str = "") -> Outcome:
+        return Outcome(case, kind, reason, verdict, time.perf_counter() - began)
+
+    try:
+        model = hsdsl.loads(yaml.safe_dump(document(folder), sort_keys=False, width=10**6))
+        run = model.simulate(tolerance=TOLERANCE, engine=engine)
+        wrong, verdict = differences(folder, run), run.verdict.theorem
+    except NotExpressible as feature:
+        return done("not expressible", str(feature))
+    except (hsdsl.ModelError, hsdsl.UsageError) as error:
+        return done("refused", str(error).strip().replace("\n", " | ")[:400])
+    except Exception as error:  # every case must have its line
+        return done("refused", f"DEFECT {type(error).__name__}: {error}"[:300])
+    return done("wrong", wrong, verdict) if wrong else done("right", "", verdict)
+
+
+def outcomes(folders: list[Path], processes: int, engine: str) -> Iterator[Outcome]:
+    """The outcome of each case, in order."""
+    if processes == 1:
+        yield from (outcome(folder, engine) for folder in folders)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        yield from pool.map(outcome, folders, [engine] * len(folders), chunksize=10)
+
+
+def main() -> None:
+    """Run the cases, and count."""
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("suite", type=Path)
+    arguments.add_argument("--cases", default="1-99999", help="such as 1-200 or 39,41,900-950")
+    arguments.add_argument("--processes", type=int, default=1)
+    arguments.add_argument("--engine", default="python", help="python compiles nothing, which is faster for short runs")
+    arguments.add_argument("--verbose", action="store_true", help="a line for every case")
+    given = arguments.parse_args()
+    ranges = [[int(n) for n in part.split("-")] for part in given.cases.split(",")]
+    numbered = [f for f in sorted(given.suite.iterdir()) if f.is_dir() and f.name.isdigit()]
+    folders = [f for f in numbered if any(r[0] <= int(f.name) <= r[-1] for r in ranges)]
+    kinds, verdicts, features = Counter[str](), Counter[str](), Counter[str]()
+    began = time.perf_counter()
+    for done in outcomes(folders, given.processes, given.engine):
+        kinds[done.kind] += 1
+        verdicts[f"{done.kind}, verdict {done.verdict}"] += bool(done.verdict)
+        features[done.reason] += done.kind == "not expressible"
+        if given.verbose or done.kind in ("wrong", "refused"):
+            print(done.case, done.kind, done.verdict, done.reason, f"{done.seconds:.2f}s", flush=True)
+    print(f"{sum(kinds.values())} cases in {time.perf_counter() - began:.0f} s")
+    for counter in (kinds, verdicts, features):
+        for what, count in counter.most_common():
+            print(f"{count:5d}  {what}") if count else None
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    sys.setrecursionlimit(10000)
+    main()
