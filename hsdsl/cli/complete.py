@@ -27,6 +27,8 @@ def complete(
         from hsdsl.store.atomic import replacing
 
         check_target(out, "--out", (".yaml", ".yml"))
+        if out is not None and out.exists() and model.exists() and out.samefile(model):
+            raise UsageError(f"--out {out}: this is the model itself", "choose another name")
         text = load(model).completed()
         if text is None:
             raise UsageError(NOTHING)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isinf
 from pathlib import Path
 from typing import Any, cast
 
@@ -40,7 +41,7 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
         A CSV file whose first row has names, or columns by name; ``t`` or ``time`` has the times. An empty cell was not
         measured. The columns ``mode`` and ``j`` of a run's own file are passed over.
 
-    Raises UsageError: a column that is neither, no times, or a cell that is no number.
+    Raises UsageError: a column that is neither or comes twice, no times, or a cell that is no finite number.
     """
     if isinstance(given, Measurements):
         return given
@@ -58,7 +59,7 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
     found = {column: _numbers(name, column, columns[column]) for column in measured}
     if any(len(column) != len(times) for column in found.values()):
         raise UsageError(f"{name}: columns differ in length")
-    if not np.isfinite(times).all() or (len(times) and times.min() < 0):
+    if not (times >= 0).all():
         raise UsageError(f"{name}: expected times that are not negative, got {times[~(times >= 0)][0]}")
     result = Measurements(times, found)
     if not result.count:
@@ -71,7 +72,7 @@ def _columns(given: Any) -> tuple[str, dict[str, Sequence[Any]]]:
         return str(given), _read(Path(given))
     if hasattr(given, "columns") or isinstance(given, Mapping):
         table = cast(Any, given)
-        names: Sequence[Any] = getattr(table, "columns", table)
+        names = _single("data", [*getattr(table, "columns", table)])
         return "data", {str(name): list(table[name]) for name in names}
     raise UsageError(f"data: expected a CSV file, a mapping or a DataFrame, got {type(given).__name__}")
 
@@ -80,15 +81,25 @@ def _read(path: Path) -> dict[str, Sequence[str]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise UsageError(f"{path} cannot be read: it is no text in UTF-8") from None
+    except (OSError, csv.Error) as error:
         raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not rows:
         raise UsageError(f"{path} is empty", "its first row has the names of columns")
-    names = [name.strip() for name in rows[0]]
+    names = _single(str(path), [name.strip() for name in rows[0]])
     for k, row in enumerate(rows[1:], 2):
         if len(row) != len(names):
             raise UsageError(f"{path}: row {k} has {len(row)} cells, and the first one has {len(names)}")
     return {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)}
+
+
+def _single(source: str, names: list[Any]) -> list[Any]:
+    """The names, unless one comes twice."""
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise UsageError(f"{source}: two columns are called '{shown(str(name))}'")
+    return names
 
 
 def _numbers(name: str, column: str, cells: Sequence[Any]) -> Array:
@@ -98,7 +109,11 @@ def _numbers(name: str, column: str, cells: Sequence[Any]) -> Array:
         try:
             found.append(float("nan") if text in ("", None) else float(text))
         except (TypeError, ValueError):
-            raise UsageError(
-                f"{name}: expected a number in column {column}, row {k + 2}, got '{shown(str(cell))}'"
-            ) from None
+            raise _no_number(name, column, k, cell) from None
+        if isinf(found[-1]):
+            raise _no_number(name, column, k, cell)
     return np.array(found)
+
+
+def _no_number(name: str, column: str, k: int, cell: Any) -> UsageError:
+    return UsageError(f"{name}: expected a finite number in column {column}, row {k + 2}, got '{shown(str(cell))}'")

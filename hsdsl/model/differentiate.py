@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import Number
 from hsdsl.defaults import DEFAULT_TOLERANCE
+from hsdsl.errors import UsageError
 from hsdsl.integrators import AUTO, METHODS
 from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import check_arguments, overrides_of
@@ -181,6 +182,11 @@ def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[
     given: Mapping[str, Any] = arguments.get("settings") or {}
     settings = {name: value for name, value in given.items() if name not in ("step", "scheme")}
     call["settings"] = settings
+    method = METHODS.get(str(call.get("method")))
+    if method is not None and not method.adaptive:
+        adaptive = ", ".join(name for name, each in METHODS.items() if each.adaptive)
+        sentence = f"method '{method.name}' has fixed steps, expected one that keeps a tolerance"
+        raise UsageError(sentence, f"known here: auto, {adaptive}")
     if "tolerance" not in call and pipeline.resolve(settings, {"scheme": "located"}).size == "step":
         call["tolerance"] = DEFAULT_TOLERANCE
     return call

@@ -320,6 +320,8 @@ def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
     path.write_text("hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n")
     assert obey(["complete", str(path)]) == 2
     assert "nothing to complete" in capsys.readouterr().err
+    assert obey(["complete", str(path), "--out", str(path)]) == 2
+    assert "this is the model itself" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("engine", ENGINES)

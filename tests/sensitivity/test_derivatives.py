@@ -363,6 +363,7 @@ def test_moving_jumps_are_refused() -> None:
         ("", {}, "got none", "for example"),
         ("c", {"step": 1e-3}, "no argument 'step'", ""),
         ("c", {"scheme": "relaxed"}, "no argument 'scheme'", ""),
+        ("c", {"method": "midpoint"}, "method 'midpoint' has fixed steps", "dop853"),
         ("c", {"tolerence": 1e-3}, "no argument 'tolerence'", "tolerance"),
     ],
 )
