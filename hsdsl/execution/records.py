@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -16,14 +17,18 @@ class Deferred:
     """
 
     @classmethod
-    def deferred(cls, later: Mapping[str, Callable[[Any], Any]], **now: Any) -> Self:
+    def deferred(
+        cls, later: Mapping[str, Callable[[Any], Any]], known: Mapping[str, Any] = MappingProxyType({}), **now: Any
+    ) -> Self:
         """Make one from the values of some fields and, for the others, functions that make
         them of the object itself.
 
-        Fields in ``later`` must have no default; nothing is checked.
+        Fields in ``later`` must have no default; nothing is checked. ``known`` is what many have in common.
         """
         made = object.__new__(cls)
-        made.__dict__.update(now, _later=later)
+        values = made.__dict__
+        values.update(known)
+        values.update(now, _later=later)
         return made
 
     if not TYPE_CHECKING:

@@ -181,8 +181,8 @@ class Execution(Deferred):
     @property
     def enters_beyond(self) -> bool:
         """Whether a transition fired at once on entry; of a compiled run that is sooner known than the transitions."""
-        known: Callable[[], bool] | None = self.__dict__.get("_enters_beyond")
-        return any(made.entry for made in self.transitions) if known is None else known()
+        known: Callable[[Execution], bool] | None = self.__dict__.get("_enters_beyond")
+        return any(made.entry for made in self.transitions) if known is None else known(self)
 
     @property
     def time_span(self) -> tuple[Any, Any]:

@@ -120,7 +120,7 @@ class Sampler:
         ends = 0, n, 2 * n, (2 + k) * n, (2 + k + m) * n  # time, row, states, results, scratch
         memory = np.empty(ends[-1] + 2 * own.width)
         memory[:n] = times
-        table, start = structures.Sampling.from_buffer_copy(own), memory.ctypes.data
+        table, start = structures.Sampling.from_buffer_copy(own), structures.start_of(memory)
         table.samples, table.columns, table.outputs, table.left = n, k, m, left
         table.dimension, table.column = self._sampled.columns(self._kinds, states)
         table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]

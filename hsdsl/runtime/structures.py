@@ -86,6 +86,11 @@ def address(memory: Any) -> c_void_p:
     return ctypes.cast(memory, c_void_p)
 
 
+def start_of(array: np.ndarray[Any, Any]) -> int:
+    """Where the numbers of an array are that is not empty and can be written: several times as fast as NumPy's own."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+
+
 def array_at(kind: Any, start: int | None, count: int) -> Any:
     """An array of numbers, addresses or structures that is in memory already."""
     return (kind * count).from_address(start) if count else ()

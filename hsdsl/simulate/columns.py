@@ -128,7 +128,7 @@ class Packed:
             + NOTE_NUMBERS * notes
             + (alternatives + 1) // 2
         )
-        self._start = self._memory.ctypes.data
+        self._start = structures.start_of(self._memory)
         self._width = pack(self._start)
 
     @cached_property

@@ -42,6 +42,8 @@ class OutputBuffers:
     def clear(self, rows: float, memory: int) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
         self._memory, self._taken, self.full = memory, 0, False
+        if max(rows, self._before, LEAST_ROWS) <= self._rows:
+            return
         wanted = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
         wanted = max(wanted, LEAST_ROWS)
         if wanted > self._rows:

@@ -89,7 +89,8 @@ class Prepared(Problem):
 
     @cached_property
     def _about(self) -> dict[str, Any]:
-        return about(self.program, self.settings, self.kernel.arithmetic.digits, "c")
+        assert self.plan is not None
+        return about(self.plan.problem, "c")
 
     def _fresh(self) -> Run:
         """A run that nothing is recorded of yet."""

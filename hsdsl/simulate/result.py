@@ -12,7 +12,6 @@ import numpy as np
 from hsdsl.arithmetic import Number
 from hsdsl.defaults import DEFAULTS
 from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
-from hsdsl.program import Program
 from hsdsl.runtime.sampling import Sampler
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.compiled import CompiledRun
@@ -31,10 +30,9 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repeti
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
         {"verdict": _verdict},
-        **about(run.program, run.settings, run.arithmetic.digits, "python"),
+        about(run, "python"),
         stop=stop,
         seconds=seconds,
-        output_function=run.output_values,
         assessment=partial(_assessment, run, lambda: run.diagnostics),
         repetition=again,
         settings=described(run.settings, run.program.left_out),
@@ -66,23 +64,32 @@ def written(
         found, states = layouts.found(columns["arc"]["mode"])
     return Execution.deferred(
         _LATER,
-        **known,
+        known,
         stop=stop,
         seconds=seconds,
         states=states,
-        output_function=plan.problem.output_values,
-        assessment=partial(_assessment, plan.problem, lambda: under_way.diagnostics),
+        assessment=partial(_assessment_of, under_way),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         _of=_Written(under_way, columns),
         _made=under_way.made,
-        _enters_beyond=lambda: under_way.made > 0 and bool(columns["transition"]["entry"].any()),
+        _enters_beyond=_enters_beyond,
     )
 
 
 class _Written(NamedTuple):
     under_way: CompiledRun
     columns: Columns
+
+
+def _enters_beyond(execution: Execution) -> bool:
+    return execution.made > 0 and bool(_of(execution).columns["transition"]["entry"].any())
+
+
+def _assessment_of(
+    under_way: CompiledRun, execution: Execution, finer: Execution | None, followed: bool = False
+) -> Verdict:
+    return _assessment(under_way.plan.problem, lambda: under_way.diagnostics, execution, finer, followed)
 
 
 def _column(name: str) -> Callable[[Execution], Any]:
@@ -129,8 +136,9 @@ _LATER: dict[str, Callable[[Execution], Any]] = {
 }
 
 
-def about(program: Program, settings: Settings, digits: int | None, engine: str) -> dict[str, Any]:
-    """Return what all runs with these settings have in common."""
+def about(problem: Problem, engine: str) -> dict[str, Any]:
+    """Return what all runs of a problem have in common."""
+    program, settings = problem.program, problem.settings
     return {
         "model": program.path,
         "digest": program.digest,
@@ -139,8 +147,9 @@ def about(program: Program, settings: Settings, digits: int | None, engine: str)
         "method": settings.method.name if settings.method else "two-step",
         "output_names": program.outputs,
         "title": program.title,
-        "digits": digits,
+        "digits": problem.arithmetic.digits,
         "overrides": dict(settings.overrides),
+        "output_function": problem.output_values,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from hsdsl.arithmetic import Number
@@ -19,8 +20,9 @@ def show(x: Any) -> str:
         return f"{x!s:.24}"
 
 
+@lru_cache(maxsize=64, typed=True)
 def reached(t: Number) -> Stop:
-    """The end of the experiment."""
+    """The end of the experiment; many runs end alike."""
     return Stop("until", t, f"reached t = {show(t)}")
 
 

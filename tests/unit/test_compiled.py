@@ -109,6 +109,28 @@ def press_when_under_way(run):
     threading.Thread(target=press, daemon=True).start()
 
 
+BEYOND = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: 1}
+    transitions: [{name: up, when: x >= 1, to: b}]
+  b:
+    flow: {x: 1}
+    transitions: [{name: on, when: x >= 0.5, to: a, reset: {x: -9}}]
+initial: {mode: a, x: 0}
+experiment: {until: 2, scheme: located, tolerance: 1e-6}
+"""
+
+
+@needs_compiler
+def test_a_run_remembers_its_entries_when_its_workspace_is_used_again():
+    beyond = model(BEYOND)
+    first = beyond.simulate(engine="c")
+    assert beyond.simulate(0.5, engine="c").made == 0
+    assert first.enters_beyond == any(t.entry for t in first.transitions) is True
+
+
 @needs_compiler
 def test_control_c_keeps_what_was_computed():
     endless = {"until": 1e9, "method": "dop853", "step": 1e-4, "relaxation": 1e-9, "max_transitions": 10**9}
