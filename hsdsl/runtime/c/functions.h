@@ -190,6 +190,7 @@ static hs_real *off_of(const hs_curves *curves, int part, int k);
 static int *degree_of(const hs_curves *curves, int part, int k);
 static hs_walk begin_walk(int k, hs_real level, int beyond, int risen);
 static hs_real slope_of(const hs_real *c, int n, hs_real s);
+static hs_real slope_at_end(const hs_real *c, int n);
 static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise);
 static int settles(hs_run *run, hs_real off, hs_real enough, hs_allowed *allowed, int k, int *answer);
 static void begin_curves(hs_curves *curves, int count);

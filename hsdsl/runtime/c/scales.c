@@ -16,7 +16,11 @@ static double power_of_two(int k) {
 }
 #endif
 
-static int rounded_down(int exponent, int m) { return exponent >= 0 ? exponent / m : -((-exponent + m - 1) / m); }
+/* exponent / m, rounded down, of exponents of numbers; this division need not wait for the exponent. */
+static int rounded_down(int exponent, int m) {
+  const int64_t inverse = (1 << 30) / m + 1;
+  return (int)(((exponent + 2048 * m) * inverse) >> 30) - 2048;
+}
 
 /* x**(-1/m); of x 2**(k m) it is exactly 2**-k times as much. */
 static hs_real root(hs_real x, int m) {

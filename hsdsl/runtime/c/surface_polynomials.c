@@ -34,6 +34,13 @@ static hs_real slope_of(const hs_real *c, int n, hs_real s) {
   return slope;
 }
 
+/* The same at 1. */
+static hs_real slope_at_end(const hs_real *c, int n) {
+  hs_real slope = 0.0;
+  for (int k = n; k > 0; k--) slope = k * c[k] + slope;
+  return slope;
+}
+
 /* Give the next point where the surface rises through zero and goes on above its level: 1; 0 where there is none. */
 static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
   const hs_curves *curves = &run->curves;

@@ -34,12 +34,15 @@ HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece
 
 /* The part of an interpolant before theta, over [0, 1] again. */
 static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_polynomial *part) {
-  hs_real power = theta;
-  part->degree = piece->degree;
-  for (int m = 0; m < piece->degree; m++) {
-    for (int s = 0; s < run->here.dimension; s++)
-      part->c[m * run->width + s] = piece->c[m * run->width + s] * power;
-    power = power * theta;
+  const int degree = piece->degree, w = run->width;
+  part->degree = degree;
+  for (int s = 0; s < run->here.dimension; s++) {
+    const hs_real *from = piece->c + s;
+    hs_real *to = part->c + s, power = theta;
+    for (int m = 0; m < degree; m++, from += w, to += w) {
+      *to = *from * power;
+      power = power * theta;
+    }
   }
 }
 

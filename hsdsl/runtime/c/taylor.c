@@ -35,13 +35,15 @@ static int taylor_step(hs_run *run, hs_time t, hs_real h) {
 }
 
 HS_INLINE void taylor_piece(const hs_run *run, const int n, hs_real h, hs_polynomial *piece) {
-  const int order = run->method->order, length = series_length(run->method), w = run->width;
-  const hs_real *line = series_of(run, 0);
-  hs_real *c = piece->c, power = 1.0;
+  const int order = run->method->order, w = run->width;
   piece->degree = order;
-  for (int m = 1; m <= order; m++, c += w) {
-    power = power * h;
-    for (int s = 0; s < n; s++) c[s] = line[s * length + m] * power;
+  for (int s = 0; s < n; s++) {
+    const hs_real *const line = series_of(run, s);
+    hs_real *c = piece->c + s, power = 1.0;
+    for (int m = 1; m <= order; m++, c += w) {
+      power = power * h;
+      *c = line[m] * power;
+    }
   }
 }
 

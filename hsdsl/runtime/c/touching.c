@@ -46,7 +46,7 @@ static int touched(hs_run *run, int k, hs_crossing *crossing) {
   const int n = *degree_of(&run->curves, 0, k);
   hs_real rate, share = 1.0;
   if (!may_be_touched(run, k)) return 0;
-  const hs_real slope = slope_of(c, n, 1.0);
+  const hs_real slope = slope_at_end(c, n);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
   if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
   crossing->time = span->t1;
