@@ -640,7 +640,9 @@ def test_equations_of_a_part_are_solved_in_their_mode(way):
         ("twice: 2*b", "twice: b**2", "HS325"),
         ("{push: mass.y}", "{push: cart.a}", "HS352"),
         ("let: {a: 0}", "let: {}", "HS354"),
-        ("automata:\n", "solve: {unknowns: [c], equations: [2*c == 1]}\nautomata:\n", "HS353"),
+        ("automata:\n", "solve: {unknowns: [c], equations: [c**2 == 1]}\nautomata:\n", "HS325"),
+        ("automata:\n", "solve: {unknowns: [g], equations: [2*g == 1]}\nautomata:\n", "HS301"),
+        ("automata:\n", "solve: {unknowns: [c], equations: [2*c == cart.nothing]}\nautomata:\n", "HS111"),
     ],
 )
 def test_equations_of_parts_that_have_no_solution_are_reported(old, new, code):
@@ -648,3 +650,57 @@ def test_equations_of_parts_that_have_no_solution_are_reported(old, new, code):
     with pytest.raises(hsdsl.ModelError) as error:
         hsdsl.loads(SOLVED.replace(old, new, 1))
     assert code in {diagnostic.code for diagnostic in error.value.diagnostics}
+
+
+MANIFOLD = """
+hsdsl: 1
+parameters: {R: 2}
+functions: {cube: {of: [z], is: z**3}}
+let: {volts: 5*cos(t), twice: 2*pressure}
+solve:
+  unknowns: [pressure, flux]
+  equations: [flux == sum(tank.pull), R*flux + pressure == volts]
+automata:
+  tank:
+    parameters: {c: 1}
+    let: {pull: "c*(twice/2 - q)"}
+    modes:
+      open: {flow: {q: pull}, transitions: [{name: shut, when: q >= 1, to: closed}]}
+      closed:
+        flow: {q: cube(-q)/3 + flux/100}
+        let: {pull: 0*q}
+        transitions: [{name: reopen, when: q <= 1/2, to: open}]
+system:
+  tank: {automaton: tank, count: 2, initial: {mode: open, q: index/4}, parameters: {c: index}}
+outputs: {p: pressure}
+experiment: {until: 6}
+"""
+
+
+def flat_manifold() -> str:
+    """The same, with four modes: p (1 + R sum(c)) = volts + R sum(c q) over the open tanks."""
+    text = "hsdsl: 1\nmodes:\n"
+    for modes in itertools.product(("open", "closed"), repeat=2):
+        pull = [f"{k}*(p - q{k})" if mode == "open" else "0" for k, mode in enumerate(modes, 1)]
+        own = [k for k, mode in enumerate(modes, 1) if mode == "open"]
+        held = " + ".join(f"{k}*q{k}" for k in own) or "0"
+        text += f"  {'_'.join(modes)}:\n    let: {{p: (5*cos(t) + 2*({held}))/(1 + 2*{sum(own)})}}\n    flow:\n"
+        for k, mode in enumerate(modes, 1):
+            flow = pull[k - 1] if mode == "open" else f"-q{k}**3/3 + ({' + '.join(pull)})/100"
+            text += f"      q{k}: {flow}\n"
+        text += "    outputs: {p: p}\n    transitions:\n"
+        for k, mode in enumerate(modes, 1):
+            target = "_".join((*modes[: k - 1], "closed" if mode == "open" else "open", *modes[k:]))
+            name, when = ("shut", f"q{k} >= 1") if mode == "open" else ("reopen", f"q{k} <= 1/2")
+            text += f'      - {{name: "tank[{k}].{name}", when: {when}, to: {target}}}\n'
+    return text + "initial: {mode: open_open, q1: 1/4, q2: 1/2}\nexperiment: {until: 6}\n"
+
+
+@pytest.mark.parametrize("way", [{}, {"method": "radau", "tolerance": 1e-9}])
+def test_equations_of_the_file_reach_through_parts(way):
+    found, expected = (hsdsl.loads(text).simulate(**way) for text in (MANIFOLD, flat_manifold()))
+    assert len(expected.transitions) > 3
+    assert [made.edge for made in found.transitions] == [made.edge for made in expected.transitions]
+    assert [t.time for t in found.transitions] == pytest.approx([t.time for t in expected.transitions], abs=1e-8)
+    assert list(found.final.state.values()) == pytest.approx(list(expected.final.state.values()), abs=1e-8)
+    assert found.final.outputs["p"] == pytest.approx(expected.final.outputs["p"], abs=1e-8)

@@ -13,6 +13,7 @@ from hsdsl.elaborate.parts.instances import Instance, roster_of
 from hsdsl.elaborate.parts.names import Board, Names, unknowns_of
 from hsdsl.elaborate.parts.starts import Starts
 from hsdsl.elaborate.scene import elaborate_scene
+from hsdsl.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Refusal, Scope, Value, state
 from hsdsl.expression.selection import NO_VALUE, ZERO, whole
@@ -40,7 +41,6 @@ class Parts:
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
         self.symbols = symbols
         self._refuse_modes(document)
-        self._refuse_equations(document)
         self.roster = roster_of(symbols, document)
         self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
         instances = self.roster.instances.values()
@@ -53,6 +53,7 @@ class Parts:
         names = [one.full(name) for one in instances for name in one.states]
         symbols.names |= dict.fromkeys(names, "states") | {p.name: "parameters" for p in self.parameters}
         symbols.values |= {name: state(name) for name in names}
+        self._solve(document)
         self.outputs, values = self._outputs(document)
         symbols.all_outputs = self.outputs
         self.scene: tuple[Shape, ...]
@@ -62,12 +63,16 @@ class Parts:
         self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
 
-    def _refuse_equations(self, document: SystemDocument) -> None:
-        solve = document.solve
-        if solve is not None:
-            place = (solve.equations or solve.unknowns)[0].place
-            message = "the file of a system of parts has no `solve`"
-            self.symbols.report(place, "HS353", message, "write it in a mode of an automaton")
+    def _solve(self, document: SystemDocument) -> None:
+        """Solve the file's equations, in which definitions of parts have the unknowns as symbols of their own."""
+        solve, values = document.solve, self.symbols.values
+        if solve is None:
+            return
+        values |= placeholders(solve)
+        found = solutions(self.symbols, solve, Names(self.board).scope)
+        self.board.forget()
+        unknowns = dict.fromkeys(map(str, solve.unknowns))
+        values |= unknowns if found is None else with_solutions(placeholders(solve), found)
 
     def _refuse_modes(self, document: SystemDocument) -> None:
         """Report `modes` or `initial` next to a system."""

@@ -97,6 +97,11 @@ class Board:
             self._solved[key] = {} if found is None else with_solutions(placeholders(document, label), found)
         return self._solved[key].get(name)
 
+    def forget(self) -> None:
+        """Work everything out anew."""
+        self._known.clear()
+        self._solved.clear()
+
     def value(self, scalar: Scalar, names: Names) -> Value | None:
         """The value of an expression; what another instance of the same automaton reports already is not repeated."""
         if self.is_broken(scalar, names):
