@@ -94,7 +94,7 @@ class Event:
 
     ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later,
     and unless ``persistent`` only if the condition holds until then; the states of ``given`` get values of before.
-    At most ``waiting`` executions wait at a time.
+    At most ``waiting`` executions wait at a time. ``priority`` is an expression; None where it is that of the edge.
     """
 
     trigger: Trigger
@@ -104,6 +104,7 @@ class Event:
     initially: bool = True
     given: tuple[str, ...] = ()
     waiting: int = 1
+    priority: sp.Expr | None = None
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         target_states=states,
         reset=tuple(resets[s].expr if s in resets else symbol(s) for s in states),
         reset_texts=tuple(texts.get(s, s) for s in states),
-        priority=transition.priority,
+        priority=transition.priority if isinstance(transition.priority, int) else 0,
         condition_text=None if transition.condition is None else transition.condition.value,
         event=None if event is None else replace(event, given=tuple(resets)),
         stays=stays,
@@ -129,7 +129,9 @@ def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope)
             return None
     trigger = symbols.resolver.trigger(given, scope)
     delay = None if transition.delay is None else symbols.number(transition.delay, scope)
-    if trigger is None or (transition.delay is not None and delay is None):
+    ranked = transition.priority
+    priority = None if isinstance(ranked, int) else symbols.number(ranked, scope)
+    if trigger is None or (transition.delay and delay is None) or not (isinstance(ranked, int) or priority):
         return None
     if not comparisons(trigger):
         symbols.report(given.place, "HS323", "a condition that never changes is no event", "write an inequality")
@@ -142,7 +144,8 @@ def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope)
         return None
     after = None if delay is None else delay.expr
     flags = transition.persistent, transition.initially
-    return Event(trigger, given.value, after, *flags, waiting=transition.waiting)
+    rank = None if priority is None else priority.expr
+    return Event(trigger, given.value, after, *flags, waiting=transition.waiting, priority=rank)
 
 
 def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger) -> bool:

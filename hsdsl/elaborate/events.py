@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from math import prod
 from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import is_mode, placed, select, total, whole
-from hsdsl.expression.trigger import Reached, comparisons, condition, number
-from hsdsl.functions import maximum
+from hsdsl.expression.trigger import Reached, comparisons, condition, number, reached
+from hsdsl.functions import below, maximum, minimum
 from hsdsl.names import SINCE, memory
 from hsdsl.parts import Part
 from hsdsl.system import (
@@ -124,6 +124,23 @@ class _Event:
     def delay(self) -> Any | None:
         return self.event.delay
 
+    @cached_property
+    def priority(self) -> Any:
+        """The number that decides which event goes first; 0 where its part is in another mode."""
+        given, here = self.event.priority, self.here({}, {})
+        return whole(self.edge.priority) if given is None else select(here, self.guarded(given, here), ZERO)
+
+    @cached_property
+    def ready(self) -> Any:
+        """1 where it is to be made at this instant, else 0."""
+        if self.slots:
+            ready = reduce(maximum, (slot.ready for slot in self.slots))
+        else:
+            ready = self.symbol("armed") * self.rises()
+            ready = maximum(ready, self.symbol("due")) if self.jumps else ready
+        here = self.here({}, {})
+        return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
+
     @property
     def event(self) -> Any:
         assert self.edge.event is not None
@@ -199,6 +216,11 @@ class _Slot:
         return symbol(self._state("at"))
 
     @property
+    def ready(self) -> Any:
+        """1 where it is to be made at this instant, else 0."""
+        return self.waits * reached(TIME, self.at)
+
+    @property
     def values(self) -> dict[str, str]:
         return {state: self._state(f"to.{state}") for state in self.stored}
 
@@ -237,11 +259,11 @@ def _part(part: Part, events: Sequence[_Event]) -> Part:
 
 
 def _mode(mode: Mode, memories: Mapping[str, _Memory], order: Mapping[str, tuple[str, ...]]) -> Mode:
-    own = memories[mode.name].events
-    edges: list[Edge] = []
+    own, edges = memories[mode.name].events, list[Edge]()
+    highest = _highest(own)
     by_name = {e.edge.name: e for e in own}
     for edge in mode.edges:
-        drafts = [(edge, None, None)] if edge.event is None else _edges(by_name[edge.name])
+        drafts = [(edge, None, None)] if edge.event is None else _edges(by_name[edge.name], highest)
         made = [_remembered(draft, memories, order) for draft in drafts]
         edges += made if edge.event is None else [replace(part, of_event=True) for part in made]
     further = _memory(own)
@@ -266,13 +288,22 @@ def as_written(system: HybridSystem) -> tuple[int, int]:
 Draft = tuple[Edge, _Event | None, Reached | None]
 
 
-def _edges(event: _Event) -> Iterator[Draft]:
+def _highest(events: Sequence[_Event]) -> Any | None:
+    """The highest priority of the events that are to be made at this instant; None where the edges' own decide."""
+    if all(event.event.priority is None for event in events):
+        return None
+    least = reduce(minimum, (event.priority for event in events))
+    return reduce(lambda most, e: e.ready * maximum(most, e.priority) + (1 - e.ready) * most, events, least)
+
+
+def _edges(event: _Event, highest: Any | None) -> Iterator[Draft]:
     """The edges of an event: which of them fires it, and the comparison that was reached."""
     edge, trigger, armed = replace(event.edge, event=None), event.event.trigger, event.symbol("armed")
     fires = edge if event.delay is None else _staying(event, f"{edge.name} triggers", _waits(event))
     if event.delay is not None:  # what only remembers goes before anything that changes states
         fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
-    free = [at_least(HALF, event.full)] if event.slots else []
+    turn = None if highest is None else at_least(event.priority, highest)
+    free = [at_least(HALF, event.full)] if event.slots else [] if turn is None else [turn]
     for part in comparisons(trigger):
         others = condition(trigger, partial(_with, event, part, True))
         surface = event.surface(part.left, part.right, part.text)
@@ -283,10 +314,14 @@ def _edges(event: _Event) -> Iterator[Draft]:
             yield replace(_overflowing(fires, event), surface=surface, condition=full), None, None
     if event.jumps:
         due = event.symbol("due")
+        if highest is not None and not event.slots:
+            due *= below(event.priority - highest, ZERO, ZERO, ONE)
         yield _when_due(fires, event, due * (1 - event.full)), event, None
         if event.slots:
             yield _when_due(_overflowing(fires, event), event, due * event.full), None, None
-    yield from ((_executes(event, slot), None, None) for slot in event.slots)
+    for slot in event.slots:
+        made = _executes(event, slot)
+        yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
     arms = _staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | _dropped(event))
     for part in comparisons(trigger):
         holds = condition(trigger, partial(_with, event, part, False))

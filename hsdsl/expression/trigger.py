@@ -70,6 +70,11 @@ class Reached:
         return same if same or self.residual == -other.residual else None
 
 
+def reached(left: Any, right: Any) -> Any:
+    """1 where one number is not below another one but by round-off; 0 elsewhere."""
+    return Reached(left, right, left - right, False, "", "").holds({})
+
+
 @dataclass(frozen=True)
 class Joined:
     """Parts joined by `and` or by `or`."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
-from typing import Literal
+from typing import Any, Literal
 
 from hsdsl.errors import Span
 from hsdsl.expression import Expected, parse
@@ -34,6 +34,7 @@ Role = Literal[
     "when",  # the surface of a transition
     "event",  # the condition of an event
     "delay",  # its delay
+    "priority",  # its priority
     "if",  # its condition
     "reset",  # its new value of the state `name`
     "output",  # the output `name`, of `mode` or of the whole model
@@ -137,7 +138,8 @@ def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
             yield SourceExpression("when", transition.when, "", name, index)
         else:
             yield SourceExpression("event", transition.event, "", name, index)
-        yield from (SourceExpression("delay", s, "", name, index) for s in (transition.delay,) if s is not None)
+        further: dict[Role, Any] = {"delay": transition.delay, "priority": transition.priority}
+        yield from (SourceExpression(k, s, "", name, index) for k, s in further.items() if isinstance(s, Scalar))
         if transition.condition is not None:
             yield SourceExpression("if", transition.condition, "", name, index)
         for key, scalar in transition.reset.items():

@@ -23,6 +23,7 @@ from hsdsl.schema.fields import (
     OptionalCondition,
     OptionalExpression,
     OptionalLabel,
+    Priority,
     Scheme,
     StateTable,
     Table,
@@ -128,8 +129,12 @@ class TransitionDocument(Document):
         {"v": "-c*v"},
     )
     name: OptionalLabel = optional("What to call the transition; left out, it is `SRC->DST`.", "impact")
-    priority: Whole = optional(
-        "Of transitions reached together, the one with the largest priority goes first.", 1, default=0
+    priority: Priority = optional(
+        "Of transitions reached together, the one with the largest priority goes first. That of an event may be an "
+        "expression, whose value at that instant counts.",
+        1,
+        "2*x",
+        default=0,
     )
     delay: OptionalExpression = optional(
         "With `event`: how long after its condition turned true the transition is made, with the values of then.", 2

@@ -8,7 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, LiteralString, TypeVar, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from hsdsl.expression.scope import RESERVED
@@ -98,6 +107,14 @@ def _whole(value: Any) -> int:
     if not (scalar.kind == "number" and digits.isdigit()):
         raise _unexpected("a whole number", scalar, "such as 1 or -2", "HS204")
     return int(scalar.value)
+
+
+def _priority(value: Any, info: ValidationInfo) -> int | Scalar:
+    """A whole number, or an expression where the transition is an event."""
+    if info.data.get("event") is None:
+        return _whole(value)
+    scalar = _expression(value)
+    return _whole(scalar) if scalar.kind == "number" and scalar.value.lstrip("+-").isdigit() else scalar
 
 
 def choice(*words: str) -> Callable[[Any], Scalar]:
@@ -227,6 +244,7 @@ OptionalLabel = Annotated[
 ]
 Flag = Annotated[bool, PlainValidator(_flag), WithJsonSchema({"type": "boolean"})]
 Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"})]
+Priority = Annotated[int | Scalar, PlainValidator(_priority), WithJsonSchema({"type": ["integer", "string"]})]
 Word = Annotated[Scalar | None, PlainValidator(_identifier), WithJsonSchema({"type": "string"})]
 Version = Annotated[Scalar, PlainValidator(_version), WithJsonSchema({"const": 1})]
 Scheme = Annotated[

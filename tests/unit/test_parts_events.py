@@ -268,3 +268,27 @@ def compared(seed: int, engine: str) -> int:
 
 def test_random_systems_run_as_in_rational_numbers():
     assert sum(compared(seed, "python") for seed in range(5)) > 12
+
+
+def test_priorities_across_parts_count_at_the_instant():
+    """Of three that are reached together each raises the rank of another one."""
+    text = """
+    hsdsl: 1
+    automata:
+      one:
+        inputs: [rank]
+        modes:
+          off: {flow: {x: 0, n: 0}}
+          on: {flow: {x: 1, n: 0}, transitions: [{name: e, event: x >= 1, priority: 100*rank, reset: {n: last.n + 1}}]}
+      last: {modes: {m: {flow: {n: 0}, transitions: [{on: one.e, reset: {n: n + 1}}]}}}
+    system:
+      a: {automaton: one, initial: {mode: on, x: 0, n: 0}, inputs: {rank: 0.1 + b.n}}
+      b: {automaton: one, initial: {mode: on, x: 0, n: 0}, inputs: {rank: c.n}}
+      c: {automaton: one, initial: {mode: on, x: 0, n: 0}, inputs: {rank: 0.2 - a.n}}
+      d: {automaton: one, initial: {mode: off, x: 2, n: 0}, inputs: {rank: 9}}
+      last: {automaton: last, initial: {n: 0}}
+    experiment: {until: 2}
+    """
+    run = hsdsl.loads(text).simulate()
+    assert [t.edge for t in run.transitions] == ["c.e", "b.e", "a.e"]
+    assert [run.final.state[f"{name}.n"] for name in "abcd"] == [3, 2, 1, 0]

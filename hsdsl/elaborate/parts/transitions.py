@@ -113,8 +113,9 @@ def _transition(
     text = None if document.condition is None else document.condition.value
     rising = None if rising is None else replace(rising, given=tuple(resets))
     stays = rising is not None and document.target is None
+    priority = document.priority if isinstance(document.priority, int) else 0
     return PartTransition(one, source, target, name, crossed, rising, stays, after, condition, text, resets, texts,
-                          keys, document.priority, document.to or document.on or one.key)  # fmt: skip
+                          keys, priority, document.to or document.on or one.key)  # fmt: skip
 
 
 def _of_one_kind(board: Board, one: Instance, name: str, document: PartTransitionDocument) -> bool:
