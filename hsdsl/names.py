@@ -15,6 +15,7 @@ _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrog
 _MEMORY = "@"  # in no name of a file
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
+NO_FILE = "<text>"  # the path of a model that is in no file
 WORDS = ("and", "or", "not", "true", "false")
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300
@@ -67,6 +68,11 @@ def memory(owner: str, part: str) -> str:
 def without_memory(names: Iterable[str]) -> tuple[str, ...]:
     """The names of states that readers see: those of the file."""
     return tuple(name for name in names if _MEMORY not in name)
+
+
+def called(title: str | None, path: str) -> str:
+    """What a model is called: by its title, else by its file."""
+    return title or ("a model without a file" if path.rpartition("/")[2] == NO_FILE else path)
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hsdsl.execution.run import Execution
 from hsdsl.execution.samples import Array
-from hsdsl.names import visible
+from hsdsl.names import called, visible
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,12 @@ class Ensemble:
     refusals: Mapping[tuple[int, ...], str]
     transition_table: TransitionTable | None = field(repr=False)
     again: Callable[[tuple[int, ...]], Execution] = field(repr=False)
+    title: str | None = None
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
         how = f"{self.scheme} {self.method}, shape {self.shape}"
-        return f"<Ensemble of {visible(self.model)}: {how}, stops: {counts or 'none'}>"
+        return f"<Ensemble of {visible(called(self.title, self.model))}: {how}, stops: {counts or 'none'}>"
 
     def _repr_html_(self) -> str:
         """Show what was varied, how the runs ended, and a picture in notebooks."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.fitting.fit import Fit
+from hsdsl.names import called
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
 
@@ -28,7 +29,7 @@ def summary(fit: Fit) -> str:
 
 def _lines(fit: Fit) -> Iterator[str]:
     run = fit.execution
-    yield f"{run.title or run.model}: {fit.measured.count} measurements, {fit.evaluations} runs"
+    yield f"{called(run.title, run.model)}: {fit.measured.count} measurements, {fit.evaluations} runs"
     width = max(map(len, fit.values))
     for name, value in fit.values.items():
         deviation = fit.deviations[name]

@@ -20,6 +20,7 @@ from hsdsl.metrics.interval import Interval
 from hsdsl.metrics.points import SpaceMetric, SpacePoint
 from hsdsl.metrics.table import CurvePair, between, check_same_model
 from hsdsl.model.options import parameters_of
+from hsdsl.names import called
 from hsdsl.simulate.stops import show
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def plot_distance(
     curves = profiles(run, other, source.space(depth), depth)
     labels = {"rho": "in the quotient" if depth is None else "in the relaxed space", "sup": "of states and modes"}
     bounds = {labels[name]: (profile.lower, profile.upper) for name, profile in curves.items()}
-    plot_over_time(path, curves["rho"].times, bounds, f"Distance over time: {run.title or run.model}")
+    plot_over_time(path, curves["rho"].times, bounds, f"Distance over time: {called(run.title, run.model)}")
 
 
 def budget_of(seconds: float, watch: Callable[[float, float], None] | None = None) -> Budget:

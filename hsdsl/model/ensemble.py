@@ -131,6 +131,7 @@ class PreparedEnsemble:
             refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
             transition_table=self._transition_table(kept, placed(kept.transitions, 0)) if kept.logs else None,
             again=self.again,
+            title=self.base.program.title,
         )
 
     def _transition_table(self, kept: Kept, counts: Array) -> TransitionTable:

@@ -17,7 +17,7 @@ from hsdsl.model.options import ARGUMENTS, Options, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
 from hsdsl.model.visible import visible_run
-from hsdsl.names import did_you_mean, visible
+from hsdsl.names import NO_FILE, called, did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.progress import counted, in_notebook, running
 from hsdsl.simulate import Prepared
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 MOST_PREPARED = 16
-NO_FILE = "<text>"  # the path of a model that is in no file
 
 
 def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
@@ -87,10 +86,11 @@ class Model:
         return type(self), (self.pipeline,)
 
     def __repr__(self) -> str:
+        name = visible(called(None, Path(self.program.path).name))
         if parts := self.program.parts:
-            return f"<hsdsl model {visible(Path(self.program.path).name)}: a system of {len(parts)} parts>"
+            return f"<hsdsl model {name}: a system of {len(parts)} parts>"
         modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
-        return f"<hsdsl model {visible(Path(self.program.path).name)}: modes {modes}>"
+        return f"<hsdsl model {name}: modes {modes}>"
 
     def _repr_html_(self) -> str:
         """Show modes, equations and the graph of modes in notebooks."""

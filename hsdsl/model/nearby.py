@@ -17,6 +17,7 @@ from hsdsl.model.distances import distance_of_runs
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.settings import whole
 from hsdsl.model.values import initial_state, with_parameters
+from hsdsl.names import called
 from hsdsl.orbits.sampling import OrbitalStability, directions, sampled
 from hsdsl.sensitivity.names import targets
 
@@ -63,7 +64,7 @@ def orbital_stability(
             progress(done, total)
         return (*found, tuple(made.edge for made in other.transitions))
 
-    title = run.title or run.model
+    title = called(run.title, run.model)
     return sampled([t.label for t in by], scales, list(radii), ways, look, title)
 
 

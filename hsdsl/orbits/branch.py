@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.names import called
 from hsdsl.orbits.continuation import Bifurcation, Point
 from hsdsl.orbits.orbit import Orbit
 from hsdsl.report.json_form import plain
@@ -75,7 +76,7 @@ class Branch:
 
     def _lines(self) -> Iterator[str]:
         run = self.first.execution
-        yield f"{run.title or run.model}: {len(self.points)} orbits through {self.section} over {self.parameter}"
+        yield f"{called(run.title, run.model)}: {len(self.points)} orbits through {self.section} over {self.parameter}"
         for way, why in zip((self.points[0], self.points[-1]), self.ends, strict=True):
             yield f"  to {self.parameter} = {number(way.parameter, 10)}: {why}"
         for found in self.bifurcations:
@@ -100,5 +101,5 @@ class Branch:
             self.states[k],
             [(p.parameter, float(p.state[k]), p.unstable == 0) for p in self.points],
             marks,
-            f"{self.first.execution.title or self.first.execution.model}: orbits through {self.section}",
+            f"{called(self.first.execution.title, self.first.execution.model)}: orbits through {self.section}",
         )

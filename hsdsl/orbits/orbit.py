@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Array, Execution
+from hsdsl.names import called
 from hsdsl.orbits.shooting import Closed
 from hsdsl.sensitivity.result import Sensitivity
 
@@ -81,7 +82,7 @@ class Orbit:
         from hsdsl.plot.orbit import plot_orbit
 
         states = [x for x in self.state if x not in self.drift]
-        title = f"{self.execution.title or self.execution.model}: {self.verdict}, {shown(self.multipliers)}"
+        title = f"{called(self.execution.title, self.execution.model)}: {self.verdict}, {shown(self.multipliers)}"
         plot_orbit(path, self.execution, states, self.multipliers, self.period, title)
 
     @property

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Array
+from hsdsl.names import called
 from hsdsl.orbits.orbit import Orbit
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number, values
@@ -37,7 +38,7 @@ def summary(orbit: Orbit) -> str:
 def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
     run = orbit.execution
     closing = "" if orbit.laps == 1 else f", closed by {orbit.laps} of them"
-    yield "orbit", f"{run.title or run.model}: right after {orbit.section}{closing}"
+    yield "orbit", f"{called(run.title, run.model)}: right after {orbit.section}{closing}"
     yield "period", number(orbit.period, 12)
     if orbit.phase is not None:
         yield "phase", f"t = {number(orbit.phase, 12)} within the period of the forcing"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.execution import Ensemble, Execution
-from hsdsl.names import visible, without_memory
+from hsdsl.names import called, visible, without_memory
 from hsdsl.plot.style import ALARM, INK, styled, write_figure
 from hsdsl.plot.view import View
 from hsdsl.report import words
@@ -42,10 +42,10 @@ def ensemble_html(ensemble: Ensemble) -> str:
     rows += [(f"varied {name}", _range(values)) for name, values in ensemble.varied.items()]
     rows += [("stops", ", ".join(f"{number:,} {reason}" for reason, number in ensemble.reasons.items()) or "none")]
     rows += [("transitions", _range(ensemble.transitions))] if count else []
-    rows += [(f"final {name}", _range(values)) for name, values in ensemble.state.items()]
+    rows += [(f"final {name}", _range(ensemble.state[name])) for name in without_memory(ensemble.state)]
     rows += [("seconds", ", ".join(f"{name} {value:.3g}" for name, value in ensemble.seconds.items()))]
     body = "".join(f"<tr><th>{escape(visible(name))}</th><td>{escape(visible(text))}</td></tr>" for name, text in rows)
-    heading = f"{ensemble.model}: {ensemble.scheme} {ensemble.method}, engine {ensemble.engine}"
+    heading = f"{called(ensemble.title, ensemble.model)}: {ensemble.scheme} {ensemble.method}, engine {ensemble.engine}"
     table = f'<div class="hsdsl"><p><strong>{escape(visible(heading))}</strong></p><table>{body}</table></div>'
     if not count or len(ensemble.varied) not in (1, 2):
         return table

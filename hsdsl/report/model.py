@@ -7,7 +7,7 @@ from html import escape
 
 from hsdsl.elaborate.functions import named_functions
 from hsdsl.expression.scope import state
-from hsdsl.names import shown, visible_lines, without_memory
+from hsdsl.names import called, shown, visible_lines, without_memory
 from hsdsl.program import Program
 from hsdsl.report import mode_graph
 from hsdsl.report.mathml import Mathematics
@@ -25,7 +25,7 @@ def model_html(system: HybridSystem, program: Program) -> str:
     math = Mathematics(system.names, named_functions(system.functions, parameters))
     kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(system.modes))
     count = f"{number} {kind}{'s' * (number != 1)}"
-    heading = f"<p><strong>{_said(system.title or system.path)}</strong><br>{count}, {_start(system, math)}</p>"
+    heading = f"<p><strong>{_said(called(system.title, system.path))}</strong><br>{count}, {_start(system, math)}</p>"
     modes = [_mode(system, mode, math, len(system.modes) <= MOST_OPEN) for mode in system.modes[:MOST_MODES]]
     left = len(system.modes) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []

@@ -11,7 +11,7 @@ from typing import Any
 from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
-from hsdsl.names import without_memory
+from hsdsl.names import called, without_memory
 from hsdsl.parts import change, compact, of_all
 
 MOST_ALIKE = 3  # of reasons that differ in numbers only
@@ -33,7 +33,7 @@ def values(named: Mapping[str, Any]) -> str:
 
 def heading(execution: Execution) -> str:
     """Name the run: the model's title, or its file."""
-    return execution.title or execution.model
+    return called(execution.title, execution.model)
 
 
 def settings(execution: Execution) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from hsdsl.names import called
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import condensed, number
 from hsdsl.sensitivity.result import EndSlopes, Sensitivity, TransitionSlopes
@@ -66,7 +67,7 @@ def summary(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> str:
 
 def _lines(found: Sensitivity, parts: Sequence[str]) -> Iterator[str]:
     run = found.execution
-    yield f"{run.title or run.model}: derivatives by {', '.join(found.wrt)}"
+    yield f"{called(run.title, run.model)}: derivatives by {', '.join(found.wrt)}"
     answer = {True: "yes", False: "no", None: "not known"}[found.exists]
     reasons = [] if found.exists else condensed(found.reasons)
     yield f"they exist: {answer}" + "".join(f"\n  {reason}" for reason in reasons)

@@ -19,7 +19,7 @@ from typing import Any
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
-from hsdsl.names import did_you_mean, visible
+from hsdsl.names import called, did_you_mean, visible
 from hsdsl.store.atomic import replacing
 from hsdsl.sweep import manifest as manifests
 from hsdsl.sweep.manifest import Manifest
@@ -37,7 +37,7 @@ class Sweep:
     manifest: Manifest
 
     def __repr__(self) -> str:
-        of = visible(self.manifest.model)
+        of = visible(called(self.manifest.title, self.manifest.model))
         return f"<Sweep of {of} in {self.folder}: {self.done:,} of {self.rows:,} rows>"
 
     @property

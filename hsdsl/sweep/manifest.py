@@ -104,8 +104,25 @@ DECIDING = {
 
 def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:
     for key, name in DECIDING.items():
+        if key == "settings":
+            yield name, _numbers(mine[key]), _numbers(theirs[key])
+            continue
         detail = f"{name} ({theirs[key]}, not {mine[key]})" if key in ("hsdsl", "random", "seed") else name
         yield detail, mine[key], theirs[key]
+
+
+def _numbers(settings: Any) -> Any:
+    """Settings with each number as one, also where a command line gave its text."""
+    if isinstance(settings, Mapping):
+        return {name: _numbers(value) for name, value in cast("Mapping[str, Any]", settings).items()}
+    if isinstance(settings, list):
+        return [_numbers(value) for value in cast("list[Any]", settings)]
+    if isinstance(settings, str):
+        try:
+            return float(settings)
+        except ValueError:
+            return settings.strip()
+    return settings
 
 
 def new(**fields: Any) -> Manifest:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.errors import UsageError
-from hsdsl.names import SINCE, did_you_mean
+from hsdsl.names import SINCE, called, did_you_mean
 from hsdsl.sweep.manifest import Manifest
 from hsdsl.sweep.rows import LISTS, column_of
 
@@ -43,7 +43,10 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
         raise UsageError(f"{most}, and here {', '.join(names)} vary", "read the dataset with pandas, and draw a part")
     if not 0 < tail <= 1:
         raise UsageError(f"--tail: expected a share above 0 and up to 1, got {tail:g}")
-    title, unit = sweep.manifest.title or sweep.manifest.model, sweep.manifest.units.get(column.rpartition(".")[2])
+    title, unit = (
+        called(sweep.manifest.title, sweep.manifest.model),
+        sweep.manifest.units.get(column.rpartition(".")[2]),
+    )
     label = f"{column} [{unit}]" if unit else column
     axes = [_axis(sweep, name) for name in names]
     if listed:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.execution import Array
-from hsdsl.names import visible
+from hsdsl.names import called, visible
 from hsdsl.sweep.manifest import Manifest
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def summary(sweep: Sweep) -> str:
     share = f"  {sweep.done:,} of {sweep.rows:,} rows in {len(sweep.chunks)} of {manifest.chunks} files"
     share += "" if sweep.complete else "; the command that made it goes on"
     stops = "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in sweep.reasons.items())
-    title = visible(manifest.title or manifest.model)
+    title = visible(called(manifest.title, manifest.model))
     return "\n".join([title, *(f"  {text}" for text in _described(manifest)), share, stops, *_ranges(sweep)])
 
 
@@ -61,7 +61,9 @@ def _ranges(sweep: Sweep) -> Iterator[str]:
             values = table.column(name).to_numpy().astype(float)
             values = values[np.isfinite(values)]
             found[name] += [np.array([values.min(), values.max(), values.sum(), len(values)])] if len(values) else []
+    wide = max(map(len, names))
     for name, parts in found.items():
         if parts:
             low, high, total, count = np.transpose(parts)
-            yield f"{name:14} {low.min():<12.6g} to {high.max():<12.6g} mean {total.sum() / count.sum():.6g}"
+            span = f"{low.min():<12.6g} to {high.max():<12.6g}"
+            yield f"{visible(name):{wide}} {span} mean {total.sum() / count.sum():.6g}"

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.campaign
 MODEL = Path(__file__).parents[2] / "models" / "oscillator-with-stop-1.yaml"
 WORDS = [
     "--vary", "c=0.5:0.95:40", "--vary", "a~uniform(0.04, 0.06)", "--random", "100", "--seed", "5",
-    "--record", "final,transitions,outputs:every=1", "--until", "10", "--chunk", "25", "--quiet",
+    "--record", "final,transitions,outputs:every=1", "--until", "10", "--quiet",
 ]  # fmt: skip
 KILLS, ROWS = 20, 4000
 
@@ -35,38 +35,38 @@ def children_of(process: int) -> list[int]:
     return [int(child) for task in tasks for child in task.read_text().split()]
 
 
-def disturbed(out: Path, more: list[str], workers: Callable[[int], list[int]], seed: int) -> int:
-    """Run to the end through kills; a client that is killed is started again. Returns how many there were."""
-    dice, kills = random.Random(seed), 0
+def disturbed(out: Path, more: list[str], files: int, workers: Callable[[int], list[int]], seed: int) -> None:
+    """Run to the end through kills, each soon after so many files are there; a killed client is started again."""
+    dice = random.Random(seed)
     client = started(out, more)
-    while client.poll() is None:
-        time.sleep(dice.uniform(0.5, 2.0))
+    for count in sorted(dice.sample(range(1, files * 3 // 4), KILLS)):
+        while len(list(out.glob("*.parquet"))) < count:
+            time.sleep(0.001)
+            assert client.poll() is None, f"the sweep ended before {count} files were there"
+        time.sleep(dice.uniform(0, 0.01))
         victims = workers(client.pid)
-        if kills >= KILLS or client.poll() is not None:
-            continue
-        kills += 1
         if victims and dice.random() < 0.5:
             os.kill(dice.choice(victims), signal.SIGKILL)
         else:
             client.kill()
             client.wait()
             client = started(out, more)
-    assert client.returncode == 0
-    return kills
+    assert client.wait() == 0
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="children are found in /proc")
-@pytest.mark.parametrize("there", [False, True], ids=["here", "cluster"])
-def test_kills_change_nothing(tmp_path, there):
+@pytest.mark.parametrize(("there", "chunk"), [(False, 5), (True, 25)], ids=["here", "cluster"])
+def test_kills_change_nothing(tmp_path, there, chunk):
     distributed = pytest.importorskip("distributed")
     arguments = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
     with distributed.LocalCluster(**arguments) if there else nullcontext() as cluster:
         more = ["--cluster", cluster.scheduler_address] if there else ["--processes", "2"]
+        more += ["--chunk", str(chunk)]
 
         def workers(client: int) -> list[int]:
             return [nanny.pid for nanny in cluster.workers.values() if nanny.pid] if there else children_of(client)
 
-        kills = disturbed(tmp_path / "disturbed", more, workers, seed=int(there))
+        disturbed(tmp_path / "disturbed", more, ROWS // chunk, workers, seed=int(there))
     whole = hsdsl.load(MODEL).sweep(
         ["c=0.5:0.95:40", "a~uniform(0.04, 0.06)"], tmp_path / "whole", random=100, seed=5, until="10",
         record="final,transitions,outputs:every=1", chunk=400,
@@ -74,4 +74,4 @@ def test_kills_change_nothing(tmp_path, there):
     found = load(tmp_path / "disturbed")
     assert found.complete and found.rows == ROWS
     assert found.table().equals(whole.table())
-    print(f"{kills} kills, {found.rows} rows equal")
+    print(f"{KILLS} kills, {found.rows} rows equal")

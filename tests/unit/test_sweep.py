@@ -363,3 +363,31 @@ def test_a_cluster_that_is_lost_loses_nothing(model, tmp_path, monkeypatch):
         model.sweep(cluster=cluster.scheduler_address, progress=progress, **arguments)
     assert 10 <= load(tmp_path / "s").done < 200
     assert model.sweep(**arguments, processes=1).complete
+
+
+def test_numbers_and_their_texts_are_one_experiment(model, tmp_path):
+    """A command line gives texts, Python gives numbers."""
+    given = {"until": "1", "parameters": {"g": "9.5"}, "settings": {"step": "1/100", "scheme": "relaxed"}}
+    first = model.sweep(["c=0.7,0.8"], tmp_path, **given)
+    again = model.sweep(
+        {"c": [0.7, 0.8]}, tmp_path, until=1, parameters={"g": 9.5}, settings={"step": "1/100", "scheme": "relaxed"}
+    )
+    assert again.table().equals(first.table())
+    with pytest.raises(UsageError, match="differs in the settings"):
+        model.sweep(["c=0.7,0.8"], tmp_path, **given | {"until": 2})
+
+
+def test_ranges_are_aligned_for_long_names(tmp_path):
+    text = TEXT.replace("energy", "energy_of_the_whole_ball")
+    lines = hsdsl.loads(text).sweep(["c=0.7,0.8"], tmp_path).summary.splitlines()
+    rows = [line for line in lines if " mean " in line]
+    assert len(rows) == 5 and len({(row.index(" to "), row.index(" mean ")) for row in rows}) == 1
+
+
+def test_models_without_a_file_are_called_so(model, tmp_path):
+    plain = hsdsl.loads(TEXT.replace("title:", "source:"))
+    for one, name in ((model, "A ball that is thrown"), (plain, "a model without a file")):
+        ensemble = one.ensemble(parameters={"c": [0.7, 0.8]})
+        sweep = one.sweep(["c=0.7,0.8"], tmp_path / name)
+        for shown in (repr(ensemble), ensemble._repr_html_(), repr(sweep), sweep.summary):
+            assert name in shown and "text>" not in shown
