@@ -1,8 +1,8 @@
-"""What a verdict costs: processor time of a run, of its finer repetition, and of all else that the verdict looks at.
+"""What a verdict costs: processor time of a run and of its verdict.
 
 The scenes of `benchmarks/scenes.py` by `located`, and chains of 50 masses (`tests/chains.py`): without stops that are
-hit, with some, and with masses that hit theirs together. Run, repetition and rest take turns; given are the medians,
-and how many times the run's time the verdict takes.
+hit, with some, and with masses that hit theirs together. Run and verdict take turns; given are the medians, how many
+times the run's time the verdict takes, and whether the run was repeated for it.
 
     python benchmarks/verdict.py [S1 S4 chain]
 """
@@ -55,21 +55,19 @@ SCENES: dict[str, Callable[[], Callable[[], hsdsl.Execution]]] = {
 def row(name: str) -> str:
     """One line of the table."""
     simulate = SCENES[name]()
-    run, spent = simulate(), list[tuple[float, float, float]]()
+    run, spent = simulate(), list[tuple[float, float]]()
     for _ in range(TURNS):
         began = process_time()
         run = simulate()
         ran = process_time()
-        run.finer  # noqa: B018
-        repeated = process_time()
         run.verdict  # noqa: B018
-        spent.append((ran - began, repeated - ran, process_time() - repeated))
-    own, finer, rest = (median(each) * 1e3 for each in zip(*spent[TURNS // 6 :], strict=True))
-    times = (finer + rest) / own
-    return f"{name:6} {run.made:5} {own:8.3f} {finer:8.3f} {rest:8.3f} {times:6.2f}  {run.verdict.theorem}"
+        spent.append((ran - began, process_time() - ran))
+    own, verdict = (median(each) * 1e3 for each in zip(*spent[TURNS // 6 :], strict=True))
+    how = "finer run" if "finer" in run.__dict__ else ""
+    return f"{name:6} {run.made:5} {own:8.3f} {verdict:10.3f} {verdict / own:6.2f}  {run.verdict.theorem:8} {how}"
 
 
 if __name__ == "__main__":
-    print("scene   made   run/ms finer/ms  rest/ms  times")
+    print("scene   made   run/ms verdict/ms  times")
     for name in sys.argv[1:] or SCENES:
         print(row(name), flush=True)

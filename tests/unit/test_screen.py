@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hsdsl
+from hsdsl.simulate import verdict
 from hsdsl.simulate.verdict import run_view
 from hsdsl.simulate.verdict.screen import Screen, screened
 
@@ -76,7 +77,10 @@ UNSEEN = "a change of the flow of mode a may not have been seen"
 def both(loaded: Any, method: str, tolerance: float) -> tuple[Any, Any]:
     """The verdict of a run, and that without a screen."""
     found = run_of(loaded, method, tolerance).verdict
-    with patch.object(run_view, "screened", return_value=None):
+    with (
+        patch.object(run_view, "screened", return_value=None),
+        patch.object(verdict, "is_compiled", return_value=False),
+    ):
         return found, run_of(loaded, method, tolerance).verdict
 
 

@@ -6,6 +6,7 @@
 #include "screen_view.h"
 
 #include "screen_errors.c"
+#include "screen_companion.c"
 #include "screen_ties.c"
 #include "screen_places.c"
 #include "screen_steps.c"
@@ -28,7 +29,7 @@ static void look_at_arc(hs_view *v) {
   const hs_arc *arc = &s->run.arc[v->arc];
   const int64_t jump = arc->jump;
   const double shift =
-      jump ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
+      jump && !s->order ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
   const int flown = takes_time(&s->run, v->arc);
   int known = 0;
   if (s->model->mode[arc->mode].final) return;
@@ -98,7 +99,8 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.error = numbers(store, model->states);
   v.size = numbers(store, model->states);
   v.floor = numbers(store, 2 * (int64_t)model->states);
-  v.late = numbers(store, s->run.transitions);
+  v.late = s->late ? s->late : numbers(store, s->run.transitions);
+  v.lines = numbers(store, s->order ? (int64_t)model->lines * (s->order + 2) : 0);
   v.tied = take(store, s->run.transitions + 1, sizeof(int64_t));
   double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
                        &v.at_start, &v.at_end, 0};
@@ -149,7 +151,9 @@ void hs_look(hs_screen *s) {
   for (int64_t i = 0; i < s->run.arcs; i++) s->landing[i] = s->ending[i] = 0;
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
   fill_matrix(v.matrix, s->run.degree);
-  const int apart = !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
+  const int apart =
+      s->order ? !plain_arcs(&s->run, s->model) || !accompany(&v)
+               : !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
   if (apart) s->doubts = DOUBT(HS_PARTED);
   else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);
   else look_at_all(&v);

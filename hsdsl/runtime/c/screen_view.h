@@ -33,6 +33,7 @@ typedef struct {
   int64_t segment, arc, last, fine_row, fine_arc;
   int mode, n, crossed;
   double *error, *size, *floor, *late; /* of all states; of each transition */
+  double *lines; /* series of the companion */
   int64_t *tied; /* where the alternatives of each transition begin */
   double *own;                        /* how wrong the states of the mode are */
   const hs_sparse *row; /* whose values `gradient` holds */

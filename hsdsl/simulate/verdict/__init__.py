@@ -7,6 +7,7 @@ that the run allows itself.
 
 ==============  ==============================================================================
 `screen`        where a compiled look says that there is nothing to find; `formulas`: routines as it takes them
+`companion`     the errors of a run by Taylor series, by what takes the same steps with more terms
 `agreement`     the errors of a run, by the same run made finer
 `run_view`      an execution with its modes' routines; `place` is one state of it
 `steps`         its steps as polynomials, many at once, with routines over intervals
@@ -26,12 +27,14 @@ that the run allows itself.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import choices, together
+from hsdsl.simulate.verdict.companion import has_companion, is_compiled
 from hsdsl.simulate.verdict.crossings import crossings, summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.flows import flows
@@ -50,6 +53,8 @@ LEFT = ("left_domain", "zeno")
 def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a run, are left, or are unknown.
 
+    Where a companion shows that they hold, there is no finer run.
+
     Parameters
     ----------
     run : RunView
@@ -57,6 +62,17 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
+    noted = diagnostics.departures or diagnostics.doubts
+    if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
+        accompanied = replace(run, accompanied=True)
+        if accompanied.screen is not None or not is_compiled(run.execution):
+            found = _assessed(accompanied, diagnostics)
+            if found.theorem == "holds":
+                return found
+    return _assessed(run, diagnostics)
+
+
+def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     left, unknown, margins = list(departures(run, diagnostics)), [*diagnostics.doubts], list[str]()
     if left:
         return Verdict("left", _once(left, unknown))

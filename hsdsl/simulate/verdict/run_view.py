@@ -19,6 +19,7 @@ from hsdsl.program import ModeProgram
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
+from hsdsl.simulate.verdict.companion import Accompanied, accompany
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.screen import Screen, screened
 
@@ -36,6 +37,8 @@ class RunView:
         Until when the run can be relied on.
     followed : bool
         Whether motion along surfaces counts as the flow of a mode of the system, as for derivatives.
+    accompanied : bool
+        Whether errors are those that a companion shows, not a finer run.
     """
 
     problem: Problem
@@ -43,6 +46,7 @@ class RunView:
     against: Execution | None = None
     upto: float = inf
     followed: bool = False
+    accompanied: bool = False
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -74,16 +78,21 @@ class RunView:
     def errors(self) -> Errors | None:
         """How wrong the run is, by a finer one; None where steps are fixed and no finer run is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
+        known = float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(self.execution.times[-1]))
+        if self.accompanied:
+            companion = self.screen.companion if self.screen else accompany(self.problem, self.execution)
+            return Accompanied(self.execution, self.execution, *known, companion)
         if finer is None and tolerance is not None:
             finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":
             return None
-        end = self.execution.times[-1]
-        return Errors(self.execution, finer, float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(end)))
+        return Errors(self.execution, finer, *known)
 
     @cached_property
     def screen(self) -> Screen | None:
         """Where a compiled screen finds that a closer look is needed; None where there is none."""
+        if self.accompanied:
+            return screened(self.problem, self.execution, None)
         return None if self.errors is None else screened(self.problem, self.execution, self.errors.finer)
 
     def doubts(self, *words: str) -> bool:

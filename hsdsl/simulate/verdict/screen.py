@@ -18,32 +18,46 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.verdict.companion import ENDED, empty, is_compiled, order_of
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
-ENDED = ("until", "final")
 LOOK_AT_CROSSING, LOOK_AT_RESET, COMMUTES = 1, 2, 4
 DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
 
 
 class Screen:
-    """What the screen found of one run; ``table`` is its ``hs_screen``."""
+    """What the screen found of one run; ``table`` is its ``hs_screen``.
+
+    Parameters
+    ----------
+    problem : Problem
+    run, finer : compiled runs
+        Without a finer one, the run is held against its companion.
+    """
 
     def __init__(self, problem: Problem, run: Any, finer: Any) -> None:
         plan = run.under_way.plan
         model = plan.compiled
         formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
-        records = [_record(each.columns) for each in (run, finer)]
+        record = _record(run.columns)
+        method = problem.settings.method
+        assert method is not None
+        if finer is None:
+            self.companion = found = empty(record.rows, record.width, record.transitions)
+            held = {"measured": found.apart.ctypes.data, "late": found.late.ctypes.data, "order": order_of(method)}
+        else:
+            held = {"finer": _record(finer.columns)}
         self.table = table = structures.Screen(
             model=ctypes.addressof(model.table),
             timeline=plan.timeline,
             formulas=ctypes.addressof(formulas.table),
-            run=records[0],
-            finer=records[1],
+            run=record,
+            **held,
             until=problem.settings.until,
             relaxation=problem.settings.relaxation,
             tolerance=problem.settings.tolerance,
-            taylor=problem.settings.method is not None and problem.settings.method.kind == "taylor",
+            taylor=method.kind == "taylor",
         )
         rows, arcs, made = table.run.rows, table.run.arcs, table.run.transitions
         self._ends = 0, made, made + arcs, made + 2 * arcs, made + 2 * arcs + rows, made + 2 * (arcs + rows)
@@ -104,13 +118,16 @@ class Screen:
 
 
 def screened(problem: Problem, run: Execution, finer: Execution | None) -> Screen | None:
-    """Screen a run, where that can be done."""
-    if finer is None or problem.settings.scheme != "located" or problem.settings.tolerance is None:
+    """Screen a run, where that can be done; without a finer run by its companion."""
+    if problem.settings.scheme != "located" or problem.settings.tolerance is None:
         return None
-    one, other = (each.__dict__.get("_of") for each in (run, finer))
-    if one is None or other is None or run.stop.reason not in ENDED or finer.stop.reason != run.stop.reason:
+    if not all(map(is_compiled, (run, finer or run))) or any(mode.slides for mode in problem.program.modes):
         return None
-    if one.columns.made.notes or other.columns.made.notes or any(mode.slides for mode in problem.program.modes):
+    one: Any = run.__dict__["_of"]
+    other: Any = finer and finer.__dict__["_of"]
+    if run.stop.reason not in ENDED or (finer and finer.stop.reason != run.stop.reason):
+        return None
+    if one.columns.made.notes or (other and other.columns.made.notes):
         return None
     screen = Screen(problem, one, other)
     return None if screen.doubts("parted", "accumulation") else screen

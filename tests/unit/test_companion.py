@@ -1,0 +1,78 @@
+"""The companion of a run by Taylor series: the errors that it shows are those of the run, and nothing else holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.simulate.verdict import RunView
+from hsdsl.simulate.verdict.companion import accompany
+
+DUFFING = ("v", "x - x**3 - 0.3*v + 0.5*cos(1.2*t)", "x >= 1.2", "-0.9*v")
+VAN_DER_POL = ("v", "3*(1 - x**2)*v - x", "x >= 1.5", "-v/2")
+UNSTABLE = ("2*v", "2*x + sin(x)", "x*v >= 5000", "-v")
+PAIRS = {"duffing": DUFFING, "van der pol": VAN_DER_POL, "unstable": UNSTABLE}
+MORE, LESS = 4.0, 16.0  # how much larger or smaller the true error may be
+
+
+def model(x: str, v: str, when: str, reset: str, until: float = 6, start: float = 0.1) -> Any:
+    return hsdsl.loads(
+        f"""
+hsdsl: 1
+modes:
+  a:
+    flow: {{x: {x}, v: "{v}"}}
+    transitions: [{{name: hit, when: {when}, to: a, reset: {{v: "{reset}"}}}}]
+initial: {{mode: a, x: 0.5, v: {start}}}
+experiment: {{until: {until}, scheme: located, method: taylor}}
+"""
+    )
+
+
+def view(run: Any, **options: Any) -> RunView:
+    return RunView(run.__dict__["_of"].under_way.plan.problem, run, **options)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_it_shows_the_true_error(name: str, tolerance: float) -> None:
+    loaded = model(*PAIRS[name])
+    run, exact = (loaded.simulate(tolerance=each) for each in (tolerance, 1e-14))
+    shown, true = view(run, accompanied=True).errors, view(run, against=exact).errors
+    assert shown is not None
+    assert true is not None
+    for of_true, found in ((true.measured[-1].max(), shown.measured[-1].max()), (true.late[-1], shown.late[-1])):
+        assert of_true / MORE <= found <= LESS * of_true + 1e-11
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_both_engines_follow_alike(name: str) -> None:
+    loaded = model(*PAIRS[name])
+    run = loaded.simulate(tolerance=1e-6)
+    in_c, in_python = view(run, accompanied=True).screen, accompany(view(run).problem, run)
+    assert in_c is not None
+    assert np.allclose(in_c.companion.apart, in_python.apart, rtol=1e-6, atol=1e-14)
+    assert np.allclose(in_c.companion.late[:-1], in_python.late[:-1], rtol=1e-6, atol=1e-14)
+    verdicts = [loaded.simulate(tolerance=1e-6, engine=engine).verdict for engine in ("c", "python")]
+    assert verdicts[0] == verdicts[1]
+
+
+def test_a_clear_run_is_not_repeated() -> None:
+    run = model(*VAN_DER_POL).simulate(tolerance=1e-9)
+    assert run.verdict.theorem == "holds"
+    assert "finer" not in run.__dict__
+
+
+def test_chaos_is_repeated_and_unknown() -> None:
+    run = model(*DUFFING, until=200, start=0).simulate(tolerance=1e-9)
+    assert run.verdict.theorem == "unknown"
+    assert any(reason.startswith("the run is unreliable from t = ") for reason in run.verdict.reasons)
+    assert "finer" in run.__dict__
+
+
+def test_one_that_cannot_follow_is_no_proof() -> None:
+    run = model("1", "0", "1 - (x - 2)**2 - 1 + 1e-13 >= 0", "v").simulate(tolerance=1e-9)  # all but tangent
+    assert run.verdict.theorem != "holds"
