@@ -10,6 +10,7 @@ import numpy as np
 from hsdsl.execution import Array
 from hsdsl.names import called
 from hsdsl.orbits.orbit import Orbit
+from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number, values
 
@@ -48,7 +49,7 @@ def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
     yield "multipliers", shown(orbit.multipliers)
     for edge, found in orbit.sides.items():
         yield "", f"{shown(found)} where {edge} goes first"
-    yield "verdict", f"{orbit.verdict}: {'; '.join(orbit.reasons)}"
+    yield "verdict", f"{orbit.verdict}: {'; '.join(condensed(orbit.reasons))}"
 
 
 def shown(found: Array) -> str:

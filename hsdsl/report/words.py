@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +12,8 @@ from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
 from hsdsl.names import called, without_memory
 from hsdsl.parts import change, compact, of_all
+from hsdsl.report.alike import condensed
 
-MOST_ALIKE = 3  # of reasons that differ in numbers only
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
@@ -87,18 +85,6 @@ def _reasons(execution: Execution) -> list[str]:
     """The reasons of the verdict; a stop that the lines above describe is only named."""
     reason, message = execution.stop.reason, execution.stop.message
     return condensed([text.replace(message, f"the run stops ({reason})") for text in execution.verdict.reasons])
-
-
-def condensed(reasons: Sequence[str]) -> list[str]:
-    """The same reasons; of those that differ in numbers only the first few, and how many more there are."""
-    groups: dict[str, list[str]] = {}
-    for reason in reasons:
-        groups.setdefault(NUMBER.sub("#", reason), []).append(reason)
-    found: list[str] = []
-    for alike in groups.values():
-        more = len(alike) - MOST_ALIKE
-        found += alike if more <= 1 else [*alike[:MOST_ALIKE], f"{more} more like this"]
-    return found
 
 
 def stop(execution: Execution) -> str:

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from hsdsl.names import called
+from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
-from hsdsl.report.words import condensed, number
+from hsdsl.report.words import number
 from hsdsl.sensitivity.result import EndSlopes, Sensitivity, TransitionSlopes
 from hsdsl.sensitivity.ties import Tie
 

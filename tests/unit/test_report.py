@@ -12,10 +12,11 @@ import hand_made
 import numpy as np
 import pytest
 
+import hsdsl
 from hsdsl import decimals, parts, report
 from hsdsl.execution import Verdict
+from hsdsl.report.alike import condensed
 from hsdsl.report.html import html
-from hsdsl.report.words import condensed
 
 FIFTY = decimals.context_of(50)
 
@@ -122,10 +123,36 @@ def test_json_lines_are_short_and_break_only_where_they_must():
     assert '    "outputs": {"double": null}' in text.splitlines()  # a line of 101 characters would not do
 
 
-def test_reasons_that_differ_in_numbers_are_listed_once_each_kind_is_known():
-    slides = [f"sliding from t = {k}.5 to t = {k + 1}e-3" for k in range(9)]
-    assert condensed([*slides, "at rest"]) == [*slides[:3], "6 more like this", "at rest"]
-    assert condensed(slides[:4]) == slides[:4]
+ALIKE = [
+    ([f"sliding between a and b from t = {k}.5 to t = {k + 1}" for k in range(9)],
+     "9 times between t = 0.5 and 9: sliding between a and b"),
+    ([f"up->down at t = {t} crosses at {r}, {m} times the error" for t, r, m in ((3.2, 0.5, 12), (9.7, 0.1, "1,200"))],
+     "2 times between t = 3.2 and 9.7: up->down crosses at 0.1 to 0.5, 12 to 1,200 times the error"),
+    ([f"at t = {t} the choice of leg[{k}].lift matters" for k, t in enumerate(("10", "9", "1e-3"), 1)],
+     "3 times between t = 1e-3 and 10: the choice of leg[1, 2, 3].lift matters"),
+    ([f"inside a step, at t = 2, the run is beyond leg[{k}]" for k in range(1, 7)],
+     "6 times: inside a step, at t = 2, the run is beyond leg[1..6]"),
+    (["Zeno at t = 1: all within 2e-07", "Zeno at t = 2: all within 2e-07"],
+     "2 times between t = 1 and 2: Zeno: all within 2e-07"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("sentences", "expected"), ALIKE)
+def test_reasons_that_differ_in_numbers_are_one(sentences, expected):
+    assert condensed(["first", *sentences, "m-1 rests", "m-2 rests"]) == ["first", expected, "m-1 rests", "m-2 rests"]
+    assert condensed(sentences[:1]) == sentences[:1]
+
+
+def test_every_reason_is_in_json():
+    """The guard is nearly touched at 2 k pi, where an error decides whether it is crossed."""
+    text = "hsdsl: 1\nmodes: {m: {flow: {x: -sin(t)}, transitions: [{name: top, when: x >= 1, to: m}]}}"
+    run = hsdsl.loads(f"{text}\ninitial: {{mode: m, x: 0.999999}}\nexperiment: {{until: 40}}\n").simulate(
+        tolerance=1e-6
+    )
+    each = [reason for reason in report.as_json(run)["verdict"]["reasons"] if "turns back" in reason]
+    assert len(each) > 4
+    whole = " ".join(report.summary(run).split())
+    assert whole.count("turns back") == 1 and f"{len(each)} times between t = 0 and " in whole
 
 
 def test_summary_to_the_letter():

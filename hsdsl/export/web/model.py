@@ -16,6 +16,7 @@ from hsdsl.parts import layout_of, numbered
 from hsdsl.plot.style import colours
 from hsdsl.program import ModeProgram, Program
 from hsdsl.report import words
+from hsdsl.report.alike import condensed
 from hsdsl.runtime import structures
 
 Data = dict[str, Any]
@@ -53,7 +54,10 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
         "reasons": structures.REASONS,
         "notices": structures.NOTICES,
         "failures": structures.FAILURES,
-        "verdict": {"theorem": run.verdict.theorem, "reasons": [visible(text) for text in run.verdict.reasons]},
+        "verdict": {
+            "theorem": run.verdict.theorem,
+            "reasons": [visible(text) for text in condensed(run.verdict.reasons)],
+        },
         "exported": visible(words.stop(run)),
     }
 

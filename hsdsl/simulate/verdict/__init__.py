@@ -45,7 +45,6 @@ from hsdsl.simulate.verdict.run_view import RunView
 
 __all__ = ["RunView", "assess"]
 
-MOST_NAMED = 4  # findings of one kind
 INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
 LEFT = ("left_domain", "zeno")
 
@@ -111,13 +110,10 @@ def _once(*sentences: Sequence[str]) -> tuple[str, ...]:
 
 
 def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
-    """The sentences of one standing, the most telling of each kind first."""
+    """The sentences of one standing, by their kinds."""
     of = [f for f in found if f.theorem == theorem]
     for kind in dict.fromkeys(f.kind for f in of):
-        same = list(dict.fromkeys(f.sentence for f in of if f.kind == kind))
-        yield from same[:MOST_NAMED]
-        if len(same) > MOST_NAMED:
-            yield f"and {len(same) - MOST_NAMED} more like the last"
+        yield from dict.fromkeys(f.sentence for f in of if f.kind == kind)
 
 
 def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
