@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
+from textwrap import fill
 
 from gallery.records import Record, Records
 from gallery.scenes import Entry
@@ -14,6 +16,7 @@ from hsdsl.chart.outcome import OUTCOMES
 from hsdsl.simulate import SCHEMES
 
 OURS = ("hsdsl c", "hsdsl python")
+filled = partial(fill, width=120, break_long_words=False, break_on_hyphens=False)
 HEAD = """<!-- Written by examples/gallery: edit the models and the code, not this page. -->
 
 # Where methods fail
@@ -47,7 +50,7 @@ Each cell counts outcomes: of ours over all methods and sizes and both engines, 
 
 {table}
 
-Versions: {versions}.
+{versions}
 
 Tools other than ours run as their documentation shows (`hsdsl/chart/peers`), with events restarted after each
 transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
@@ -67,7 +70,7 @@ def page(records: Records, entries: Sequence[Entry]) -> str:
         state=WITHIN.state,
         time=WITHIN.time,
         table=_table(records, entries),
-        versions=tools,
+        versions=filled(f"Versions: {tools}."),
         most=MOST,
     )
     return head + "\n".join(_section(records, entry) for entry in entries)
@@ -102,13 +105,13 @@ def _section(records: Records, entry: Entry) -> str:
         "",
         f"![{title}](images/gallery/{entry.name}.svg)",
         "",
-        f"**{title}**: {what}",
+        filled(f"**{title}**: {what}"),
         "",
-        f"Exact: {exact}",
+        filled(f"Exact: {exact}"),
         "",
-        f"Why methods fail: {hard}",
+        filled(f"Why methods fail: {hard}"),
         "",
-        *_others(records, entry),
+        *(filled(line, subsequent_indent="  ") for line in _others(records, entry)),
     ]
     return "\n".join(lines) + "\n"
 
