@@ -79,7 +79,10 @@ static void look_at_all(hs_view *v) {
   }
   for (int i = 0; i < s->model->modes; i++) {
     const hs_near_miss *const each = &v->nearest[i];
-    if (!(each->margin < INFINITY && each->start == each->start)) continue;
+    if (!(each->margin < INFINITY)) continue;
+    bind(v, i, each->segment);
+    measure_miss(v);
+    if (each->start != each->start) continue;
     if (each->surface < s->model->mode[i].edges && s->model->mode[i].edge[each->surface].conditional)
       s->doubts |= DOUBT(HS_NEAREST);
     if (s->missed_mode < 0 || each->start < s->margin)
@@ -111,6 +114,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.bernstein = numbers(store, (int64_t)(LEVELS + 1) * (d + 1) * w);
   v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
   v.enough = numbers(store, w);
+  v.missed = numbers(store, (int64_t)w * model->modes);
   v.unseen = take(store, (int64_t)(LEVELS + 2) * w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
   v.disc = take(store, registers, sizeof(hs_disc));

@@ -203,8 +203,9 @@ static void enclose_in_discs(hs_view *v, int64_t row, double size) {
    along the step both differ by at most M size**(1 - d)/(size - 1). */
 static int disc_hides(hs_view *v, int64_t row, double size) {
   const double length = v->s->run.times[row + 1] - v->s->run.times[row];
+  const double less = 1 / size;
   double share = 1 / (size - 1);
-  for (int k = 1; k < v->s->run.degree; k++) share /= size;
+  for (int k = 1; k < v->s->run.degree; k++) share *= less;
   for (int i = 0; i < v->n; i++) {
     const double hidden = v->disc[v->f->flow.result[i]].radius * share;
     if (!(hidden <= v->enough[i] || hidden * length <= v->own[i])) return 1;
@@ -285,33 +286,54 @@ static void look_for_miss(hs_view *v, int64_t row) {
     hs_near_miss *const best = &v->nearest[v->mode];
     if (margin < best->margin) {
       best->margin = margin, best->row = row, best->surface = k, best->segment = v->segment;
-      best->start = begin;
+      copy(v->missed + v->mode * v->s->model->width, v->own, v->n);
     }
   }
 }
 
-/* Close in on the turning point just noted: how often the error fits. */
+/* The rate of a surface at a share of a step; the states there are left in z. */
+static int rate_within(hs_view *v, const hs_near_miss *miss, double share, double *rate) {
+  const double *const times = v->s->run.times + miss->row;
+  along_step(v, &v->s->run, miss->row, share, v->z);
+  return v->table->rates[miss->surface](v->p, times[0] + share * (times[1] - times[0]), v->z, rate);
+}
+
+/* Close in on a turning point from both ends of its step (Illinois): the share of the step, or not-a-number. */
+static double turning_share(hs_view *v, const hs_near_miss *miss) {
+  double a = 0.0, b = 1.0, rising, falling, share = 1.0, rate, before;
+  int side = 0;
+  if (rate_within(v, miss, a, &rising) || rate_within(v, miss, b, &falling)) return NAN;
+  for (int i = 0; i < ROUNDS; i++) {
+    before = share;
+    share = b - falling * (b - a) / (falling - rising);
+    if (!(share > a && share < b)) share = (a + b) / 2;
+    if (fabs(share - before) <= CLOSE_SHARE) return share;
+    if (rate_within(v, miss, share, &rate)) return NAN;
+    if (rate >= 0) {
+      a = share, rising = rate;
+      if (side > 0) falling /= 2;
+      side = 1;
+    } else {
+      b = share, falling = rate;
+      if (side < 0) rising /= 2;
+      side = -1;
+    }
+  }
+  return b;
+}
+
+/* How often the error fits between the surface and the turning point noted in the mode that is looked at. */
 static void measure_miss(hs_view *v) {
   hs_screen *const s = v->s;
   hs_near_miss *const best = &v->nearest[v->mode];
-  const int64_t row = best->row;
-  const int k = best->surface;
-  const double begin = s->run.times[row], length = s->run.times[row + 1] - begin;
-  double a = 0.0, b = 1.0, rate;
+  const double *const times = s->run.times + best->row;
+  const double share = turning_share(v, best);
   hs_judged found;
-  for (int i = 0; i < ROUNDS; i++) {
-    const double share = (a + b) / 2;
-    along_step(v, &s->run, row, share, v->z);
-    if (v->table->rates[k](v->p, begin + share * length, v->z, &rate)) {
-      s->doubts |= DOUBT(HS_NEAREST);
-      return;
-    }
-    if (rate >= 0) a = share;
-    else b = share;
-  }
-  best->middle = hs_min(begin + b * length, s->run.times[row + 1]);
-  along_step(v, &s->run, row, b, v->z);
-  if (evaluate_surfaces(v, best->middle, v->z) || judge_surface(v, k, best->middle, v->z, &found)) {
+  copy(v->own, v->missed + v->mode * s->model->width, v->n);
+  best->middle = hs_min(times[0] + share * (times[1] - times[0]), times[1]);
+  along_step(v, &s->run, best->row, share, v->z);
+  if (share != share || evaluate_surfaces(v, best->middle, v->z) ||
+      judge_surface(v, best->surface, best->middle, v->z, &found)) {
     s->doubts |= DOUBT(HS_NEAREST);
     return;
   }
@@ -353,9 +375,7 @@ static void look_at_step(hs_view *v, int64_t row, int *known) {
   if (!(s->doubts & DOUBT(HS_TRANSPARENT)) && passes(v, row)) s->doubts |= DOUBT(HS_TRANSPARENT);
   if (!*known) all_rates(v, s->run.times[row], recorded_row(&s->run, row), v->at_start);
   all_rates(v, end, recorded_row(&s->run, row + 1), v->at_end);
-  const double margin = v->nearest[v->mode].margin;
   look_for_miss(v, row);
-  if (v->nearest[v->mode].margin < margin) measure_miss(v);
   swap(&v->at_start, &v->at_end);
   *known = 1;
 }

@@ -18,6 +18,7 @@
 #define LEAST_SIZE 1.25     /* of discs around a step */
 #define LARGEST_SIZE 2.0
 #define ROUNDS 48           /* of closing in on a turning point */
+#define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */
 
 typedef struct {
   double margin, start, middle;
@@ -39,7 +40,7 @@ typedef struct {
   const hs_sparse *row; /* whose values `gradient` holds */
   double *x, *y, *z, *gradient, *slope, *values, *magnitudes, *at_start, *at_end;
   double *matrix, *bernstein;
-  double *enough;
+  double *enough, *missed; /* how wrong states were where each mode's nearest miss is */
   int *open, *unseen;
   hs_range *range;
   hs_disc *disc;
