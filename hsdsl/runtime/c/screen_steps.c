@@ -41,15 +41,33 @@ static double *coefficients_at(const hs_view *v, int level) {
   return v->bernstein + level * (int64_t)(v->s->run.degree + 1) * v->s->model->width;
 }
 
+/* Cut no states but those that open surfaces and their rates depend on: others keep the box of the whole step. */
+static void cut_few(hs_view *v, const int *open) {
+  for (int i = 0; i < v->n; i++) v->cut[i] = 0;
+  for (int k = 0; k < v->table->surfaces; k++) {
+    const hs_sparse *const slopes = &v->table->gradients[k];
+    const hs_formula *const rate = &v->f->rate[k];
+    if (!open[k]) continue;
+    for (int i = 0; i < slopes->count; i++)
+      if (slopes->place[i]) v->cut[slopes->place[i] - 1] = 1;
+    for (int i = rate->first; i <= rate->last; i++) {
+      const hs_operation *const o = &v->f->operation[i];
+      const int one = i < rate->last ? o->a : rate->result[0], other = i < rate->last ? o->b : 0;
+      if (one > 0 && one <= v->n) v->cut[one - 1] = 1;
+      if (other > 0 && other <= v->n) v->cut[other - 1] = 1;
+    }
+  }
+}
+
 /* Bernstein coefficients of the states along a whole step. */
 static void whole_step(hs_view *v, int64_t row) {
   const double *x = recorded_row(&v->s->run, row), *c = recorded_piece(&v->s->run, row);
   const int d = v->s->run.degree, w = v->s->run.width;
   double *b = coefficients_at(v, 0);
-  for (int i = 0; i < v->n; i++)
-    for (int k = 0; k <= d; k++, b++) {
-      *b = x[i];
-      for (int l = 1; l <= k; l++) *b += v->matrix[k * (d + 1) + l] * c[(l - 1) * w + i];
+  for (int i = 0; i < v->n; i++, b += d + 1)
+    for (int k = 0; k <= d && v->cut[i]; k++) {
+      b[k] = x[i];
+      for (int l = 1; l <= k; l++) b[k] += v->matrix[k * (d + 1) + l] * c[(l - 1) * w + i];
     }
   v->looks = 0;
 }
@@ -59,6 +77,7 @@ static void take_half(hs_view *v, int level, int second) {
   const int d = v->s->run.degree;
   double *whole = coefficients_at(v, level), *part = coefficients_at(v, level + 1);
   for (int i = 0; i < v->n; i++, whole += d + 1, part += d + 1) {
+    if (!v->cut[i]) continue;
     if (second) {
       copy(part, whole, d + 1);
       continue;
@@ -76,6 +95,7 @@ static void set_part(hs_view *v, int64_t row, int level, double start, double wi
   const int d = v->s->run.degree;
   set_times(v, times[row], times[row + 1] - times[row], start, width);
   for (int i = 0; i < v->n; i++, b += d + 1) {
+    if (!v->cut[i]) continue;
     double low = b[0], high = b[0];
     for (int k = 1; k <= d; k++) low = hs_min(low, b[k]), high = hs_max(high, b[k]);
     set_box(v, low, high, i, errors * v->own[i]);
@@ -113,6 +133,7 @@ static int turns_along(hs_view *v, int64_t row) {
   set_times(v, run->times[row], run->times[row + 1] - run->times[row], 0.0, 1.0);
   for (int k = 0; k < m; k++) v->open[v->s->model->surfaces + k] = 1;
   if (!turns_close(v, v->open + v->s->model->surfaces, v->open)) return 0;
+  cut_few(v, v->open);
   whole_step(v, row);
   return halves_close(v, row, 0, 0.0, 1.0);
 }
@@ -150,6 +171,7 @@ static void enclose_flow(hs_view *v, int64_t row, int level, double start, doubl
 
 /* How much a step shows of each state's slope: an eighth of it, or of the enclosure's own width, is no pulse. */
 static void look_at_whole(hs_view *v, int64_t row) {
+  for (int i = 0; i < v->n; i++) v->cut[i] = 1;
   whole_step(v, row);
   enclose_flow(v, row, 0, 0.0, 1.0);
   for (int i = 0; i < v->n; i++) {

@@ -42,6 +42,7 @@ typedef struct {
   double *matrix, *bernstein;
   double *enough, *missed; /* how wrong states were where each mode's nearest miss is */
   int *open, *unseen;
+  int *cut; /* whether a state is, where a step is cut in halves */
   hs_range *range;
   hs_disc *disc;
   hs_near_miss *nearest; /* of each mode */
