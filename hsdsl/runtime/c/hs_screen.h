@@ -96,6 +96,7 @@ typedef struct {
   int32_t *crossing;        /* (transition): an hs_look_at, or 0 */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
+  int32_t marks;            /* those of `crossing` together */
   int32_t doubts;
   int64_t crossed;          /* transitions that the flow made; of these: */
   double slowest, least;    /* rate, and how often the error fits into what keeps a crossing */

@@ -76,6 +76,7 @@ static void look_at_all(hs_view *v) {
       else s->doubts |= DOUBT(HS_CHOICE);
     }
     if (jumps_close(v, &made[j])) s->crossing[j] |= LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
+    s->marks |= s->crossing[j];
   }
   for (int i = 0; i < s->model->modes; i++) {
     const hs_near_miss *const each = &v->nearest[i];
@@ -142,7 +143,7 @@ static void fill_matrix(double *matrix, int d) {
 void hs_look(hs_screen *s) {
   hs_store store = {s->workspace, 0};
   hs_view v = make_view(s, &store);
-  s->doubts = 0;
+  s->doubts = s->marks = 0;
   s->crossed = 0;
   s->missed_mode = -1;
   s->slowest = s->least = s->margin = INFINITY;

@@ -48,7 +48,7 @@ static int companion_jumps(hs_view *v, hs_companion *c, int64_t j, double s, dou
   const hs_transition *const made = &screen->run.transition[j];
   const hs_edge *const edge = &c->table->edge[made->edge];
   const double *const before = screen->run.before + j * screen->model->width;
-  if (!companion_crosses(v, c, made->edge, &s)) return 0;
+  if (made->entry || !companion_crosses(v, c, made->edge, &s)) return 0;
   for (int i = 0; i < c->table->dimension; i++) grow(&measured[i], fabs(before[i] - c->y[i]));
   c->t += s;
   v->late[j] = hs_max(j ? v->late[j - 1] : tie_of(screen, screen->run.times[screen->run.rows - 1]),

@@ -27,7 +27,6 @@ that the run allows itself.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
@@ -63,7 +62,7 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """
     noted = diagnostics.departures or diagnostics.doubts
     if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
-        accompanied = replace(run, accompanied=True)
+        accompanied = RunView(run.problem, run.execution, accompanied=True)
         if accompanied.screen is not None or not is_compiled(run.execution):
             found = _assessed(accompanied, diagnostics)
             if found.theorem == "holds":
@@ -75,8 +74,8 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     left, unknown, margins = list(departures(run, diagnostics)), [*diagnostics.doubts], list[str]()
     if left:
         return Verdict("left", _once(left, unknown))
-    if run.screen is not None and not run.screen.doubts() and not run.execution.enters_beyond:
-        screen = run.screen
+    screen = run.screen
+    if screen is not None and not screen.doubts() and (run.accompanied or not run.execution.enters_beyond):
         margins = *summary(run, *screen.crossings), *together(screen.commuting), *screen.nearest_miss
         return Verdict("holds", _once(margins))
     found = list(reliability(run))

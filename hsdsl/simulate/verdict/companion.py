@@ -92,7 +92,10 @@ def order_of(method: Any) -> int:
 
 
 def has_companion(problem: Problem, run: Execution) -> bool:
-    """Whether a run's errors can be told by a companion: one by Taylor series, without strips and inputs' samples."""
+    """Whether a run's errors can be told by a companion: one by Taylor series, without strips and inputs' samples.
+
+    Of a run made in C the rest is seen where it is followed.
+    """
     settings = problem.settings
     return (
         settings.scheme == "located"
@@ -103,9 +106,7 @@ def has_companion(problem: Problem, run: Execution) -> bool:
         and problem.arithmetic.digits is None
         and len(problem.timeline.segments) == 1
         and run.stop.reason in ENDED
-        and not run.enters_beyond
-        and not any(mode.slides for mode in problem.program.modes)
-        and (is_compiled(run) or all(arc.kind == "flow" for arc in run.arcs))
+        and (is_compiled(run) or not (run.enters_beyond or any(arc.kind != "flow" for arc in run.arcs)))
     )
 
 

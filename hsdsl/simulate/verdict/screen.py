@@ -76,7 +76,7 @@ class Screen:
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
         if not words:
-            return bool(self.table.doubts) or bool((self.marked("crossing") & ~COMMUTES).any())
+            return bool(self.table.doubts or self.table.marks & ~COMMUTES)
         return any(self.table.doubts & DOUBTS[word] for word in words)
 
     def marked(self, name: str) -> Array:
@@ -101,6 +101,8 @@ class Screen:
     @property
     def commuting(self) -> list[float]:
         """When transitions were reached together of which every order leads to the same point."""
+        if not self.table.marks & COMMUTES:
+            return []
         return self._first["transition"]["time"][self.marked("crossing") & COMMUTES != 0].tolist()
 
     @property
