@@ -70,6 +70,11 @@ def without_memory(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in names if _MEMORY not in name)
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 def called(title: str | None, path: str) -> str:
     """What a model is called: by its title, else by its file."""
     return title or ("a model without a file" if path.rpartition("/")[2] == NO_FILE else path)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from hsdsl.errors import STEP_AND_TOLERANCE, Diagnostic, ModelError, UsageError
-from hsdsl.names import visible, visible_lines
+from hsdsl.names import counted, visible, visible_lines
 from hsdsl.progress import Text, ticking
 
 MODEL_ERRORS, WRONG_USAGE = 1, 2
@@ -98,11 +98,6 @@ def report_usage(error: UsageError, json: bool) -> None:
         empty = {"code": None, "path": None, "line": None, "column": None}
         print_json({"errors": [{**empty, "message": str(error), "hint": error.hint}]})
     say_lines(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun."""
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 @contextmanager

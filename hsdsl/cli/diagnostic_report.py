@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from typer import Exit
 
 from hsdsl import __version__
-from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, counted, print_errors, print_json, report_usage
+from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, print_errors, print_json, report_usage
 from hsdsl.cli.options import Format
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
-from hsdsl.names import visible
+from hsdsl.names import counted, visible
 
 if TYPE_CHECKING:
     from hsdsl.lint import Ignored

@@ -7,9 +7,10 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from hsdsl.cli.console import counted, print_json, say
+from hsdsl.cli.console import print_json, say
 from hsdsl.cli.options import Json, Limit, Quiet, Until, answering, check_target, option
 from hsdsl.errors import UsageError
+from hsdsl.names import counted
 
 FILE = "A SpaceEx model (.xml)."
 CFG = "Its configuration; left out, the file of the same name that ends in .cfg."

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from typer import Option
 
 from hsdsl.cli.completion import rule_codes
-from hsdsl.cli.console import counted
 from hsdsl.cli.diagnostic_report import DiagnosticReport
 from hsdsl.cli.options import Answer, Formatted, Models, option
+from hsdsl.names import counted
 
 SELECT = "Use these rules alone: codes, beginnings of codes, families or names."
 IGNORE = "Do not use these rules."

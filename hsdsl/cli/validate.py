@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hsdsl.cli.console import counted
 from hsdsl.cli.diagnostic_report import DiagnosticReport
 from hsdsl.cli.options import Answer, Formatted, Models
+from hsdsl.names import counted
 
 
 def validate(

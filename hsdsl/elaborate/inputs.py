@@ -15,7 +15,7 @@ from hsdsl.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.files import DataRefused
-from hsdsl.names import did_you_mean, shown
+from hsdsl.names import counted, did_you_mean, shown
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import SampledInput
@@ -63,7 +63,9 @@ def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) 
     times = symbols.numbers(entry.times, scope, finite_now=True)
     values = symbols.numbers(entry.values, scope, finite_now=True)
     if len(entry.times) != len(entry.values):
-        message = f"the input '{name}' has {len(entry.times)} times and {len(entry.values)} values"
+        message = (
+            f"the input '{name}' has {counted(len(entry.times), 'time')} and {counted(len(entry.values), 'value')}"
+        )
         symbols.report(name.place, "HS310", message, "give one value for each time")
         return None
     if not entry.times:
@@ -140,7 +142,7 @@ class _Table:
         """Read one sample: its time and its value are in these columns."""
         cells = line.split(",")
         if len(cells) != width:
-            self.fault(number, 1, len(line), f"this row has {len(cells)} columns and the header {width}")
+            self.fault(number, 1, len(line), f"this row has {counted(len(cells), 'column')} and the header {width}")
             return
         time, value = self.cell(number, cells, at), self.cell(number, cells, own)
         if time is None or value is None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable
 from hsdsl.expression.equations import Solved, linear_solutions
 from hsdsl.expression.scope import Scope, Value, symbol
+from hsdsl.names import counted
 from hsdsl.schema import SolveDocument
 
 
@@ -30,7 +31,8 @@ def solutions(symbols: SymbolTable, document: SolveDocument, scope: Scope, mode:
             symbols.report(name.place, "HS301", message, "give one of them another name")
             return None
     if len(document.unknowns) != len(document.equations):
-        count = f"{len(document.unknowns)} unknowns and {len(document.equations)} equations"
+        lists = {"unknown": document.unknowns, "equation": document.equations}
+        count = " and ".join(counted(len(items), what) for what, items in lists.items())
         place = document.unknowns[0].place if document.unknowns else document.equations[0].place
         symbols.report(place, "HS325", f"`solve` has {count}", "give one equation for each unknown")
         return None

@@ -189,6 +189,10 @@ def _dotted(node: Name | Call, name: str) -> ExpressionError:
 
 def _product_or_value(node: Call) -> str:
     match node.arguments:
+        case (Number(value),) if node.function == SINCE:
+            return f"write since >= {float(value):g}: it is the time since the mode was entered"
+        case _ if node.function == SINCE:
+            return "write since alone: it is the time since the mode that the run is in was entered"
         case (Name("t"),):
             return f"write {node.function}: every name has its value at the present time"
         case (argument,) if any(isinstance(part, Name) and part.name == "t" for part in walk(argument)):

@@ -110,7 +110,10 @@ def trigger_of(tree: Tree, scope: Scope, text: str, positive: bool = True) -> Tr
 def _reached(tree: Tree, operator: str, left: Tree, right: Tree, scope: Scope, text: str, positive: bool) -> Reached:
     if operator not in _OPPOSITE:
         message = f"`event` takes inequalities, not `{operator}`"
-        raise ExpressionError.at(tree, "HS107", message, "an event fires where one of >= > <= < turns true")
+        a, b = (shown(text[side.start : side.end], 40) for side in (left, right))
+        hint = f"write {a} >= {b} for where it rises, or {a} <= {b} for where it falls; for both, an event each"
+        hint = f"write {a} > {b} or {a} < {b}" if operator == "!=" else hint
+        raise ExpressionError.at(tree, "HS107", message, hint)
     a, b = symbolic.number(left, scope, text).expr, symbolic.number(right, scope, text).expr
     own, other = text[left.start : left.end], text[right.start : right.end]
     operator = operator if positive else _OPPOSITE[operator]

@@ -15,7 +15,7 @@ from hsdsl.fitting.fit import Fit
 from hsdsl.fitting.least_squares import Objective, Progress, fitted
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.values import initial_state, with_parameters
-from hsdsl.names import did_you_mean
+from hsdsl.names import counted, did_you_mean
 from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity
 
@@ -43,7 +43,7 @@ def fit(
     _, states, x = initial_state(values, overrides_of(arguments, "initial", model.program))
     by = targets(wrt, model.program, states)
     if measured.count < len(by):
-        raise UsageError(f"{measured.count} measurements cannot determine {len(by)} values")
+        raise UsageError(f"{counted(measured.count, 'measurement')} cannot determine {counted(len(by), 'value')}")
     known = dict(zip(model.program.parameters, values.parameters, strict=True))
     known |= {f"initial.{name}": value for name, value in zip(states, x, strict=True)}
     start = {t.label: float(known[t.label]) for t in by}

@@ -11,6 +11,7 @@ from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.model.values import Values
+from hsdsl.names import counted
 from hsdsl.simulate.settings import OneStop
 from hsdsl.simulate.stops import show
 from hsdsl.system import Edge, HybridSystem, Mode
@@ -78,9 +79,12 @@ def _only(system: HybridSystem) -> tuple[Mode, Edge]:
     edges = mode.edges
     for wrong, reason in (
         (others, f"there are {len(system.modes)} modes"),
-        (len(mode.states) != 2, f"mode {mode.name} has {len(mode.states)} states, not a position and its velocity"),
+        (
+            len(mode.states) != 2,
+            f"mode {mode.name} has {counted(len(mode.states), 'state')}, not a position and its velocity",
+        ),
         (mode.walls, f"mode {mode.name} has a wall, {', '.join(wall.text for wall in mode.walls[:1])}"),
-        (len(edges) != 1, f"mode {mode.name} has {len(edges)} transitions"),
+        (len(edges) != 1, f"mode {mode.name} has {counted(len(edges), 'transition')}"),
         (any(e.condition is not None for e in edges), f"transition {', '.join(e.name for e in edges)} has an `if`"),
     ):
         if wrong:

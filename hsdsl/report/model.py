@@ -7,7 +7,7 @@ from html import escape
 
 from hsdsl.elaborate.functions import named_functions
 from hsdsl.expression.scope import state
-from hsdsl.names import called, shown, visible_lines, without_memory
+from hsdsl.names import called, counted, shown, visible_lines, without_memory
 from hsdsl.program import Program
 from hsdsl.report import mode_graph
 from hsdsl.report.mathml import Mathematics
@@ -81,7 +81,7 @@ def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _shared(system: HybridSystem, math: Mathematics) -> str:
     """Inputs, and definitions of the whole model."""
-    inputs = [f"{_said(given.name)} is an input of {len(given.times)} samples" for given in system.inputs]
+    inputs = [f"{_said(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
     return _list([*inputs, *_definitions(system, None, math)])
 
 

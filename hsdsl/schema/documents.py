@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag, model_validator
 
+from hsdsl.names import closest
 from hsdsl.schema.fields import (
     AnyKey,
     ArgumentName,
@@ -48,8 +49,16 @@ def _list_or_not(value: Any) -> str:
     return "<list>" if isinstance(value, list) else "<expression>"
 
 
+NAMES_OF_FILES = ("csv", "data", "path", "filename", "filepath", "source")  # in other tools
+
+
 def _kind_of_input(value: Any) -> str:
-    return ("<file>" if "file" in value else "<samples>") if isinstance(value, dict) else "<expression>"
+    if not isinstance(value, dict):
+        return "<expression>"
+    fields = ("file", "times", "values")
+    keys = list(map(str, cast("dict[Any, Any]", value)))
+    meant = {closest(key, (*fields, *NAMES_OF_FILES)) if key not in fields else key for key in keys}
+    return "<file>" if meant & {"file", *NAMES_OF_FILES} and not meant & {"times", "values"} else "<samples>"
 
 
 AsExpression = Annotated[Expression, Tag("<expression>")]

@@ -9,6 +9,7 @@ from hsdsl.names import is_identifier, shown
 from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, child, children, keys
 
 _NESTED = ("state", "states", "values", "x0", "variables", "continuous")
+_CALL = re.compile(r"\s*([^\W\d]\w*)\s*\(([^()]*)\)\s*")
 _LONGEST = 100  # names that are looked at
 _SURFACES = ("when", "guard", "event", "trigger", "on", "condition")  # `when` and its names in other tools
 _COMPARED = re.compile("[<>=]")
@@ -21,7 +22,9 @@ _NAMED_AFTER = re.compile(r"d_?(\w+?)(?:_?dt)?|(\w+?)_?dot|(\w+)_(?:prime|p|d)")
 
 def translate_idioms(root: Node, findings: Findings) -> None:
     """Change the nodes that have such an idiom; the faults go to ``findings``."""
-    initial, modes = child(root, "initial"), child(root, "modes")
+    initial, modes, functions = (child(root, name) for name in ("initial", "modes", "functions"))
+    if isinstance(functions, Mapping):
+        _called(functions, findings)
     transitions = [edge for mode in children(modes) for edge in children(child(mode, "transitions"))]
     for transition in transitions:
         if isinstance(transition, Mapping) and "direction" in transition.entries:
@@ -72,6 +75,24 @@ def _dotted_names(flow: Mapping, known: set[str], reset: set[str], findings: Fin
             hint = f"write {shown(name)}: its value is the derivative of the state"
             findings.add(key.place.diagnostic("HS205", message, hint))
             flow.rename(str(key), name)
+
+
+def _called(functions: Mapping, findings: Findings) -> None:
+    """Take the function ``clip(z, lo): EXPRESSION`` for ``clip: {of: [z, lo], is: EXPRESSION}``."""
+    for key, value in list(functions):
+        match = _CALL.fullmatch(key) if len(key) < _LONGEST else None
+        name, *arguments = (part.strip() for part in (match[1], *match[2].split(","))) if match else ("",)
+        body = value if isinstance(value, Scalar) else child(value, "is")
+        if not name or not all(map(is_identifier, arguments)):
+            continue
+        text = shown(body.value) if isinstance(body, Scalar) else "..."
+        hint = f"write {name}: {{of: [{', '.join(arguments)}], is: {text}}}"
+        findings.add(key.place.diagnostic("HS205", f"'{shown(key)}' cannot be a name", hint))
+        listed = Sequence(tuple(Scalar(each, True, key.place) for each in arguments), key.place)
+        entries: dict[str, tuple[Key, Node]] = {"of": (Key.at("of", key.place), listed)}
+        if body is not None:
+            entries["is"] = (Key.at("is", key.place), body)
+        functions.rename(str(key), name, Mapping(entries, value.place))
 
 
 def _direction(transition: Mapping, findings: Findings) -> None:

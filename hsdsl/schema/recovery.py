@@ -7,6 +7,7 @@ from hsdsl.source import Key, Mapping, Node, NodePath, Scalar, Sequence, SourceR
 
 _LISTS_OF_MAPPINGS = (("transitions",), ("states",), ("reference",), ("scene",))
 _CONTAINERS = ("parameters", "functions", "inputs", "let", "modes", "outputs", "flow", "initial", "experiment")
+_LISTS_OF_NAMES = ("of", "unknowns")
 _OF_AN_INPUT = ("times", "values", "file")  # an input that lacks one is dropped as a whole
 _INDISPENSABLE = ("modes", "initial", "experiment")
 
@@ -36,6 +37,8 @@ def recover(root: Node, path: NodePath, fault: str, meant: str | None, target: N
         case "HS203" if isinstance(last, int) and path[-2:-1] in _LISTS_OF_MAPPINGS and isinstance(parent, Sequence):
             object.__setattr__(parent, "items", parent.items[:last] + parent.items[last + 1 :])
             return True
+        case "HS203" if last in _LISTS_OF_NAMES and isinstance(parent, Mapping):
+            return _listed(parent, str(last))
         case "HS121" | "HS203" | "HS205" if last not in _CONTAINERS and path[-2:-1] != ("modes",):
             return _replaced(parent, last, None)
         case "HS204":
@@ -101,6 +104,14 @@ def _filled(parent: Node | None, key: str) -> bool:
         value = Scalar("1", True, parent.place) if key == "hsdsl" else absent(parent.place)
         parent.entries[key] = (Key.at(key, parent.place), value)
     return True
+
+
+def _listed(parent: Mapping, key: str) -> bool:
+    """Take ``of: x, y`` for ``of: [x, y]``."""
+    name, value = parent.entries[key]
+    names = value.value.replace(",", " ").split() if isinstance(value, Scalar) else []
+    parent.entries[key] = (name, Sequence(tuple(Scalar(each, True, value.place) for each in names), value.place))
+    return bool(names)
 
 
 def _replaced(parent: Node | None, step: int | str, text: str | None) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 
 from hsdsl.names import closest
-from hsdsl.schema.documents import keys_of
+from hsdsl.schema.documents import NAMES_OF_FILES, keys_of
 from hsdsl.source import Key, Mapping, Node, NodePath, Sequence, child, is_empty, keys
 
 _OF_OTHERS = {
@@ -29,6 +29,9 @@ _OF_OTHERS = {
     "method": "integrator solver algorithm",
     "scale": "scales nominal nominals",
     "experiment": "simulation settings options config run",
+    "file": " ".join(NAMES_OF_FILES),
+    "of": "args arguments params parameters inputs variables vars",
+    "is": "expr expression body formula value returns return",
     "title": "name",
     "about": "description comment doc",
     "value": "default val number",
@@ -40,9 +43,25 @@ for _key, _others in _OF_OTHERS.items():
 _NOT_NEEDED = {
     "states": "the states are the keys of `flow`, and `initial` gives their values",
     "variables": "the states are the keys of `flow`, and `initial` gives their values",
+    "column": "leave it out: the column has the name of the input",
     "from": "leave it out: a transition is in the mode that it leaves",
     "<<": "mappings are not merged in YAML 1.2",
     "terminal": "leave it out, and let `to` name a mode with final: true",
+}
+_OF_MODELS = {  # keys of the whole file in other tools
+    "species": "a species is a state, a key of `flow`; `initial` gives its value",
+    "compartments": "give the size of a compartment under `parameters`",
+    "reactions": "write the rate of each reaction under `let` of a mode, and what it changes in `flow`",
+    "events": "an event is a transition of a mode: {event: A < 1, reset: {A: 2}}",
+    "rules": "write assignment rules under `let`, and rate rules in `flow`",
+    "assignmentRules": "write them under `let`",
+    "rateRules": "write them in `flow` of a mode",
+    "algebraicRules": "write them under `solve`, where they are linear",
+    "functionDefinitions": "write them under `functions`: {f: {of: [x], is: x**2}}",
+    "initialAssignments": "write them under `initial`: they may be expressions",
+    "equations": "write differential equations in `flow` of a mode, and linear ones under `solve`",
+    "guards": "a guard is `when` of a transition",
+    "resets": "a reset is `reset` of a transition",
 }
 _ADD = {
     "hsdsl": "begin the file with hsdsl: 1",
@@ -80,7 +99,7 @@ def key_meant(key: str, fields: Iterable[str], parent: Node | None) -> str | Non
     named = [field for field in _BY_NAME.get(key, ()) if field in fields and field not in present]
     if named:
         return named[0]
-    elsewhere = key in _NOT_NEEDED or _home(key) or _is_a_mode(child(parent, key))
+    elsewhere = (key in _NOT_NEEDED and key not in fields) or _home(key) or _is_a_mode(child(parent, key))
     return None if elsewhere else closest(key, fields)
 
 
@@ -89,14 +108,19 @@ def named_elsewhere(key: str, fields: Collection[str]) -> bool:
     return any(field in fields for field in _BY_NAME.get(key, ()))
 
 
+def _not_needed(key: str, fields: Iterable[str]) -> str | None:
+    """What to write in the place of a key that no mapping has, or not the one of these fields."""
+    return _NOT_NEEDED.get(key) or (_OF_MODELS.get(key) if "hsdsl" in fields else None)
+
+
 def unknown_key_hint(key: str, meant: str | None, fields: Iterable[str], value: Node | None) -> str:
     """The hint for an unknown key."""
     if ":" in key:
         return "write a space after the colon"
     if meant is not None:
         return f"did you mean '{meant}'?"
-    if key in _NOT_NEEDED:
-        return _NOT_NEEDED[key]
+    if instead := _not_needed(key, fields):
+        return instead
     if _is_a_mode(value):
         return f"a mode belongs under `modes`: indent '{key}' like the others"
     where = dict(_HOMES).get(_home(key) or ("none",))

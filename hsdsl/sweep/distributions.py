@@ -13,7 +13,7 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
-from hsdsl.names import did_you_mean, shown
+from hsdsl.names import counted, did_you_mean, shown
 
 BLOCK = 4  # numbers that Philox makes at a time
 
@@ -90,7 +90,7 @@ def check(name: str, distribution: str, arguments: Sequence[float]) -> None:
         raise UsageError(f"--vary {name}: there is no distribution '{shown(distribution)}'", hint)
     form = f"{distribution}({', '.join(known.arguments)})"
     if len(arguments) != len(known.arguments):
-        raise UsageError(f"--vary {name}: expected {form}, got {len(arguments)} numbers")
+        raise UsageError(f"--vary {name}: expected {form}, got {counted(len(arguments), 'number')}")
     if not known.fits(*arguments):
         raise UsageError(f"--vary {name}: {form} needs {known.needs}, got {', '.join(f'{a:g}' for a in arguments)}")
 

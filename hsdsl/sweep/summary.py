@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.execution import Array
-from hsdsl.names import called, visible
+from hsdsl.names import called, counted, visible
 from hsdsl.sweep.manifest import Manifest
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def summary(sweep: Sweep) -> str:
 def _described(manifest: Manifest) -> Iterator[str]:
     variation = manifest.variation
     for grid in variation.grids:
-        yield f"{grid.name}: {len(grid.values)} values from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
+        yield f"{grid.name}: {counted(len(grid.values), 'value')} from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
     for each in variation.draws:
         yield f"{each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
     if variation.draws:

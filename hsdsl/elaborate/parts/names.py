@@ -21,7 +21,7 @@ from hsdsl.expression import ExpressionError, parse, selection, syntax
 from hsdsl.expression.plain import RANGES
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
-from hsdsl.names import SINCE, did_you_mean
+from hsdsl.names import SINCE, counted, did_you_mean
 from hsdsl.schema import PartModeDocument
 from hsdsl.source import Key, Scalar
 
@@ -178,7 +178,7 @@ class Board:
         several = self.roster.counted[base]
         given = {str(key): scalar for key, scalar in several[0].given.at_ends.items()}
         if attribute not in given:
-            message = f"there is no {base}[{number}]: '{base}' has {len(several)} instances"
+            message = f"there is no {base}[{number}]: '{base}' has {counted(len(several), 'instance')}"
             return Refusal("HS111", message, f"give its value under `at_ends` of '{base}': {{{attribute}: ...}}")
         key = ("at_ends", base, number, attribute)
         return self.evaluated(key, given[attribute], Names(self, index=number), f"{base}[{number}].{attribute}")
