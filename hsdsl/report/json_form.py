@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -15,6 +17,8 @@ from hsdsl.execution import Execution, Transition
 
 STAGES = ("load", "compile", "simulate")
 WIDTH = 100
+_AS_THEY_ARE = frozenset((type(None), str, bool, int))
+_encoded = json.JSONEncoder().encode
 
 
 def as_json(execution: Execution) -> dict[str, Any]:
@@ -54,19 +58,23 @@ def plain(value: Any) -> Any:
     TypeError
         For a value of any other kind.
     """
+    if type(value) in _AS_THEY_ARE:
+        return value
+    if type(value) is float:
+        return value if math.isfinite(value) else None
     match value:
         case np.generic() | np.ndarray():
             return plain(cast(Any, value).tolist())
-        case None | str() | bool() | int():
+        case str() | int():
             return value
+        case dict() | Mapping():
+            return {str(key): plain(item) for key, item in cast("Mapping[Any, Any]", value).items()}
+        case list() | tuple():
+            return [plain(item) for item in cast("list[Any]", value)]
         case Fraction():
             return float(value)
         case os.PathLike():
             return os.fspath(cast("os.PathLike[str]", value))
-        case Mapping():
-            return {str(key): plain(item) for key, item in cast("Mapping[Any, Any]", value).items()}
-        case list() | tuple():
-            return [plain(item) for item in cast("list[Any]", value)]
         case _ if isinstance(value, float) or decimals.is_multiprecision(value):
             return value if decimals.is_finite(value) else None
         case _:
@@ -80,31 +88,39 @@ def dumps(value: Any) -> str:
     needs. A list or object that fits on a line is written on one.
     """
     ready = plain(value)
-    return _written(ready, decimals.bits(_leaves(ready)), "\n", WIDTH)
+    return _written(ready, decimals.bits(_multiprecision(ready)), "\n", WIDTH)
 
 
-def _leaves(value: Any) -> Iterator[Any]:
-    if not isinstance(value, (dict, list)):
-        yield value
-        return
-    for _, item in _items(value):
-        yield from _leaves(item)
+def _multiprecision(value: Any) -> Iterator[Any]:
+    """The numbers of a value that are not floats, and what else is neither plain nor a list or object."""
+    many: Iterable[Any] = cast("dict[str, Any]", value).values() if isinstance(value, dict) else value
+    for item in many if isinstance(value, (dict, list)) else (value,):
+        kind: type[Any] = type(item)
+        if kind is dict or kind is list:
+            yield from _multiprecision(item)
+        elif kind is not float and kind not in _AS_THEY_ARE:
+            yield item
 
 
-def _items(value: Any) -> list[tuple[str, Any]]:
-    if isinstance(value, dict):
-        return [(json.dumps(key) + ": ", item) for key, item in cast("dict[str, Any]", value).items()]
-    return [("", item) for item in value]
+@lru_cache
+def _key(name: str) -> str:
+    return _encoded(name) + ": "
 
 
 def _written(value: Any, precision: int, newline: str, room: int) -> str:
     """Write a value; one that is longer than ``room`` on several lines."""
     if not isinstance(value, (dict, list)):
         number = isinstance(value, float) or decimals.is_multiprecision(value)
-        return decimals.text(value, precision) if number else json.dumps(value)
-    opening, closing = "{}" if isinstance(value, dict) else "[]"
+        return decimals.text(value, precision) if number else _encoded(value)
     inner = newline + "  "
-    parts = [key + _written(item, precision, inner, WIDTH - len(inner + key)) for key, item in _items(value)]
+    room_inside = WIDTH - len(inner)
+    if isinstance(value, dict):
+        opening, closing = "{}"
+        named = [(_key(name), item) for name, item in cast("dict[str, Any]", value).items()]
+        parts = [key + _written(item, precision, inner, room_inside - len(key)) for key, item in named]
+    else:
+        opening, closing = "[]"
+        parts = [_written(item, precision, inner, room_inside) for item in cast("list[Any]", value)]
     line = opening + ", ".join(parts) + closing
     if len(line) <= room and "\n" not in line:
         return line
