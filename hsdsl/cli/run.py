@@ -118,7 +118,7 @@ def _answer(
 
 
 def _text(execution: Execution, estimated: Any) -> str:
-    from hsdsl.report import summary
+    from hsdsl.report.summary import summary
 
     return summary(execution) + ("" if estimated is None else f"\n{estimated.sentence}")
 

@@ -18,6 +18,7 @@ from hsdsl.execution import Execution, Transition
 STAGES = ("load", "compile", "simulate")
 WIDTH = 100
 _AS_THEY_ARE = frozenset((type(None), str, bool, int))
+_KNOWN = float, str, int, type(None)
 _encoded = json.JSONEncoder().encode
 
 
@@ -95,10 +96,9 @@ def _multiprecision(value: Any) -> Iterator[Any]:
     """The numbers of a value that are not floats, and what else is neither plain nor a list or object."""
     many: Iterable[Any] = cast("dict[str, Any]", value).values() if isinstance(value, dict) else value
     for item in many if isinstance(value, (dict, list)) else (value,):
-        kind: type[Any] = type(item)
-        if kind is dict or kind is list:
+        if isinstance(item, (dict, list)):
             yield from _multiprecision(item)
-        elif kind is not float and kind not in _AS_THEY_ARE:
+        elif not isinstance(item, _KNOWN):
             yield item
 
 

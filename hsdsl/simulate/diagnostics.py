@@ -12,6 +12,7 @@ from hsdsl.execution import Stop
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 
+FREE = 16  # transitions within the relaxation that cost no time; so many are remembered
 LEFT_OUT = "no requested output and no guard, condition or domain depends on them"
 TWO_STEP = (
     "the theorem says nothing of the scheme paoli-schatzman",
@@ -29,12 +30,12 @@ class Diagnostics:
     doubts: list[str] = field(default_factory=list[str])
     _noted: set[object] = field(default_factory=set[object])
 
-    def crowded(self, free: int, t: Number) -> None:
+    def crowded(self, t: Number) -> None:
         """More transitions than cost no time fell within the relaxation."""
         if "crowded" not in self._noted:
             self._noted.add("crowded")
             self.departures.append(
-                f"more than {free} transitions within the relaxation, from t = {show(t)} on in strips"
+                f"more than {FREE} transitions within the relaxation, from t = {show(t)} on in strips"
             )
 
     def in_contact(self, edge: str, start: Number, end: Number, still: bool) -> None:

@@ -15,7 +15,7 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, in_touch, releases
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
-from hsdsl.simulate.diagnostics import slides
+from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.relaxed import Event, go_on, sizes, standing_on
 from hsdsl.simulate.root_isolation import stays_below
@@ -25,7 +25,7 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import FREE, close_tail, contraction
+from hsdsl.simulate.zeno import close_tail, contraction
 
 MOST_CORRECTIONS = 8
 
@@ -202,7 +202,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
         return stop
     outcome, resumed = reset(here, crossing, event.scale, run), t
     if crowded(run, t):
-        run.diagnostics.crowded(FREE, t)
+        run.diagnostics.crowded(t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
             run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)

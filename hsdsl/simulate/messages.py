@@ -10,7 +10,6 @@ from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.simulate import stops
 from hsdsl.simulate.diagnostics import Diagnostics, slides
-from hsdsl.simulate.located import FREE
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.standstill import Standstill
 from hsdsl.simulate.surfaces import StepFailure
@@ -26,7 +25,7 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
     if kind == "unsettled":
         return diagnostics.unsettled(mode.name, k, time)
     if kind == "crowded":
-        return diagnostics.crowded(FREE, time)
+        return diagnostics.crowded(time)
     if kind == "in contact":
         return diagnostics.in_contact(mode.edges[k].name, time, other, bool(count))
     if kind == "replaced":

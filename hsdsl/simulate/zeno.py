@@ -13,10 +13,10 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.contact import contact_at, in_contact, keeps, presses, releases
+from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
 
-FREE = 16  # transitions within the relaxation that cost no time; so many are remembered
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point

@@ -7,7 +7,7 @@ import pytest
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.report import summary
+from hsdsl.report.summary import summary
 
 TEXT = """
 hsdsl: 1

@@ -10,7 +10,7 @@ import yaml
 
 import hsdsl
 from hsdsl.model import automatic
-from hsdsl.report import summary
+from hsdsl.report.summary import summary
 from hsdsl.store import load
 
 MODELS = Path(__file__).parents[2] / "models"

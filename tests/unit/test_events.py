@@ -13,8 +13,9 @@ import hsdsl.store
 from hsdsl import UsageError
 from hsdsl.elaborate.events import as_written
 from hsdsl.plot.view import View
-from hsdsl.report import mode_graph, summary
+from hsdsl.report import mode_graph
 from hsdsl.report.model import model_html
+from hsdsl.report.summary import summary
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 ENGINES = ["python", *(["c"] if COMPILER else [])]

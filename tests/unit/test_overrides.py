@@ -13,7 +13,8 @@ from engines import COMPILER
 import hsdsl
 from hsdsl.cli import main
 from hsdsl.model.distances import distance_of_runs as distance
-from hsdsl.report import as_json, dumps, summary
+from hsdsl.report import as_json, dumps
+from hsdsl.report.summary import summary
 from hsdsl.store import load
 
 MODEL = """hsdsl: 1

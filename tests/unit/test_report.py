@@ -17,6 +17,7 @@ from hsdsl import decimals, parts, report
 from hsdsl.execution import Verdict
 from hsdsl.report.alike import condensed
 from hsdsl.report.html import html
+from hsdsl.report.summary import summary
 
 FIFTY = decimals.context_of(50)
 
@@ -151,12 +152,12 @@ def test_every_reason_is_in_json():
     )
     each = [reason for reason in report.as_json(run)["verdict"]["reasons"] if "turns back" in reason]
     assert len(each) > 4
-    whole = " ".join(report.summary(run).split())
+    whole = " ".join(summary(run).split())
     assert whole.count("turns back") == 1 and f"{len(each)} times between t = 0 and " in whole
 
 
 def test_summary_to_the_letter():
-    assert report.summary(hand_made.bouncing_ball(wait=0.125, bounces=2)).splitlines() == [
+    assert summary(hand_made.bouncing_ball(wait=0.125, bounces=2)).splitlines() == [
         "Bouncing ball",
         "models/hand-made.yaml",
         "relaxed midpoint, until 5.25, step 0.001, relaxation 1e-06, engine python",
@@ -175,7 +176,7 @@ def test_summary_to_the_letter():
 
 
 def _shown(run, **options):
-    return report.summary(run, **options).splitlines()
+    return summary(run, **options).splitlines()
 
 
 def test_summary_of_modes_of_different_size_says_what_appears_and_what_is_dropped():
@@ -215,7 +216,7 @@ MADE = [hand_made.bouncing_ball, hand_made.modes_of_different_size, hand_made.bl
 @pytest.mark.parametrize("width", [None, 60, 80])
 def test_summary_fits_its_width_in_ascii(make, width):
     verdict = Verdict("left", ("tangency at t = 1 " * 9, "another reason that is long " * 5))
-    text = report.summary(replace(make(), verdict=verdict), width=width)
+    text = summary(replace(make(), verdict=verdict), width=width)
     assert max(len(line) for line in text.splitlines()) <= (width or 100)
     assert text.isascii()
 

@@ -21,8 +21,8 @@ from hsdsl.diagnose import as_annotation, render
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.execution import Stop, Transition, Verdict
 from hsdsl.names import shown, visible, visible_lines
-from hsdsl.report import summary
 from hsdsl.report.html import html
+from hsdsl.report.summary import summary
 
 HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]")
 HOSTILE = [

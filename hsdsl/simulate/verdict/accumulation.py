@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import accumulate, pairwise
 
-from hsdsl.simulate.located import FREE
+from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.run_view import RunView
 
