@@ -22,7 +22,7 @@ from hsdsl.export import files_of, source_of
 # a product and a sum in one instruction round once: how deep a relaxed step ends in a strip may turn on that
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_max_isa=AVX")
 jax: Any = pytest.importorskip("jax")
-from export.jax_modules import SETTINGS, assert_same, imported  # noqa: E402
+from export.jax_modules import SETTINGS, assert_same, imported, jitted  # noqa: E402
 
 jnp = jax.numpy
 ROOT = Path(__file__).parents[2]
@@ -77,7 +77,7 @@ def hostile(path: Path) -> Path:
 
 
 def ran(module: Any, **arguments: Any) -> Any:
-    return jax.jit(lambda: module.simulate(transitions=512, **arguments))()
+    return jitted(lambda: module.simulate(transitions=512, **arguments))()
 
 
 def differences(function: Any, at: Any, by: float) -> np.ndarray:
@@ -94,7 +94,7 @@ def test_impacts_of_many_balls_and_their_derivatives(tmp_path: Path) -> None:
         return found, jnp.stack([found.times[0], found.times[1], *found.x])
 
     batch = jnp.stack([module.parameters({"e": e}) for e in np.linspace(0.5, 0.9, 5)])
-    slopes, found = jax.jit(jax.vmap(jax.jacfwd(lambda p: both(p)[::-1], has_aux=True)))(batch)
+    slopes, found = jitted(jax.vmap(jax.jacfwd(lambda p: both(p)[::-1], has_aux=True)))(batch)
     for i, e in enumerate(np.linspace(0.5, 0.9, 5)):
         run = model.simulate(until=4, parameters={"e": float(e)}, **SETTINGS[0])
         assert_same(module, jax.tree.map(lambda a, i=i: a[i], found), run)
@@ -205,8 +205,8 @@ def test_derivatives_through_impacts_are_differences(name: str, settings: Any, b
     def ends(p: Any, x: Any) -> Any:
         return module.simulate(p, x).x
 
-    plain = jax.jit(ends)
-    by_p, by_x = jax.jit(jax.jacfwd(ends, (0, 1)))(p, x)
+    plain = jitted(ends)
+    by_p, by_x = jitted(jax.jacfwd(ends, (0, 1)))(p, x)
     for slopes, wanted in (
         (by_p, differences(lambda p: plain(p, x), p, by)),
         (by_x, differences(lambda x: plain(p, x), x, by)),
@@ -221,7 +221,7 @@ def test_reverse_mode_gives_the_derivatives_of_the_limit(scheme: str, tmp_path: 
     module = imported(hsdsl.load(MODELS / "bouncing-ball.yaml"), tmp_path, scheme=scheme, **settings)
     p = module.parameters()
     rounds = int(ran(module).rounds)
-    slopes = jax.jit(jax.grad(lambda p: module.simulate(p, rounds=rounds).x[0]))(p)
+    slopes = jitted(jax.grad(lambda p: module.simulate(p, rounds=rounds).x[0]))(p)
     g, e, h, t = 9.81, 0.8, 10.0, 4.0
     fall = np.sqrt(2 * h / g)  # the second flight is over at fall (1 + 2 e), the third begins at speed e**2 g fall
 
@@ -241,8 +241,8 @@ def test_derivatives_by_samples_of_an_input(tmp_path: Path) -> None:
     def ends(p: Any) -> Any:
         return module.simulate(p).x
 
-    slopes = jax.jit(jax.jacfwd(ends))(module.parameters())
-    wanted = differences(jax.jit(ends), module.parameters(), 1e-6)
+    slopes = jitted(jax.jacfwd(ends))(module.parameters())
+    wanted = differences(jitted(ends), module.parameters(), 1e-6)
     assert np.abs(slopes - wanted).max() <= 1e-6
 
 
@@ -252,7 +252,7 @@ def test_ten_thousand_oscillators(tmp_path: Path) -> None:
     model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
     module = imported(model, tmp_path, **settings)
     starts = module.initial() + jnp.stack([jnp.linspace(-1, 1, 10_000), jnp.zeros(10_000)], axis=1)
-    found = jax.jit(jax.vmap(lambda x: module.simulate(x0=x, transitions=4)))(starts)
+    found = jitted(jax.vmap(lambda x: module.simulate(x0=x, transitions=4)))(starts)
     for i in (0, 1234, 9999):
         run = model.simulate(initial={"x": float(starts[i, 0])}, **settings)
         assert_same(module, jax.tree.map(lambda a, i=i: a[i], found), run)

@@ -9,7 +9,7 @@ from jax import lax
 
 from .functions import chosen, frozen, keeping, when
 from .lane import STEP, ZENO, contraction, noticed, sampled, scales_here, stopped
-from .model import Bound
+from .model import Bound, noise_of
 from .steps import at
 from .surfaces import UNIT, ties
 
@@ -34,23 +34,25 @@ def keeps(model, bound, lane, k, t, x):
     """Whether edge k is possible and leaves the state where it is."""
     noise = SAME_UNITS * UNIT * scales_here(model, lane)
     still = (jnp.abs(after_reset(model, bound, lane.mode, k, t, x) - x) <= noise).all()
-    return still & bound.conditions(lane.mode, t, x)[k]
+    return still & bound.facts(lane.mode, t, x).conditions[k]
 
 
 def is_tangent(model, bound, lane, k, t, x):
     """Whether the flow is tangent to surface k, to round-off."""
     rows = jax.jacfwd(lambda x: bound.flow(lane.mode, t, x))(x)
     sizes = jnp.abs(bound.flow(lane.mode, t, x)) + jnp.abs(rows) @ scales_here(model, lane)
-    gradient = bound.gradients(lane.mode, t, x)[k]
+    facts = bound.facts(lane.mode, t, x)
+    gradient = facts.gradients[k]
     size = jnp.abs(gradient[0]) + jnp.abs(gradient[1:]) @ sizes
-    return jnp.abs(bound.rates(lane.mode, t, x)[k]) <= ZERO_UNITS * UNIT * size
+    return jnp.abs(facts.rates[k]) <= ZERO_UNITS * UNIT * size
 
 
 def presses(model, bound, lane, k, t, x):
     """Whether a state's flow presses on the guard of edge k, and its reset keeps the state."""
     contact = model.of(model.contact, lane.mode)[k]
     held = jnp.maximum(contact, 0)
-    inside = bound.surfaces(held, t, x)[k] < -bound.noise(held, t, x, jnp.zeros_like(x))[k]
+    facts = bound.facts(held, t, x)
+    inside = (facts.values < -noise_of(facts, t, x, 0.0))[k]
     first = jnp.asarray(model.push_order)[held] == 1
     on = (contact >= 0) & keeps(model, bound, lane, k, t, x) & inside
     return on & (first | is_tangent(model, bound, lane, k, t, x))
@@ -92,7 +94,7 @@ def let_go(model, config, p, lane, event):
     after = UNIT * config.until * 2.0 ** jnp.arange(DOUBLINGS)
     after = jnp.where(after <= ties(config, t), after, 0.0)
     slope = bound.flow(lane.mode, t, x)
-    holds = jax.vmap(lambda s: bound.conditions(owner, t + s, x + s * slope)[lane.held])(after)
+    holds = jax.vmap(lambda s: bound.facts(owner, t + s, x + s * slope).conditions[lane.held])(after)
     own = event.k == lane.held
     late = jnp.where(own, 0.0, after[jnp.argmax(~holds)])
     frees = own | ~holds.all()
@@ -125,8 +127,9 @@ def onto_guard(bound, lane, k, t, x, scales):
     """A point near a guard taken to it, each state in proportion to its scale."""
 
     def correct(_, x):
-        r, gradient = bound.surfaces(lane.mode, t, x)[k], bound.gradients(lane.mode, t, x)[k, 1:]
-        near = jnp.abs(r) <= bound.noise(lane.mode, t, x, jnp.zeros_like(x))[k]
+        facts = bound.facts(lane.mode, t, x)
+        r, gradient = facts.values[k], facts.gradients[k, 1:]
+        near = jnp.abs(r) <= noise_of(facts, t, x, 0.0)[k]
         weights = gradient * scales * scales
         across = gradient @ weights
         return jnp.where(near | ~(across > 0), x, x - r / jnp.where(across > 0, across, 1.0) * weights)
@@ -158,10 +161,10 @@ def close_tail(model, config, p, lane, record, mask):
     left, end = jnp.where(near, left, 0.0), jnp.where(near, end, still.t)  # elsewhere derivatives must exist, too
     q = limit_of(model, p, lane, k, end, left, near)
     limit = frozen(q)
-    r, noise = bound.surfaces(lane.mode, end, limit), bound.noise(lane.mode, end, limit, still.scale)
-    first = bound.surfaces(lane.mode, still.t, still.x)
-    before = bound.noise(lane.mode, still.t, still.x, jnp.where(still.active[:, None], still.scale, 0.0))
-    others = (r > noise) & ~(first > before) & (jnp.arange(model.M) != k)
+    facts, first = bound.facts(lane.mode, end, limit), bound.facts(lane.mode, still.t, still.x)
+    r, noise = facts.values, noise_of(facts, end, limit, still.scale)
+    before = noise_of(first, still.t, still.x, jnp.where(still.active[:, None], still.scale, 0.0))
+    others = (r > noise) & ~(first.values > before) & (jnp.arange(model.M) != k)
     near = near & (jnp.abs(r[k]) <= noise[k]) & keeps(model, bound, still, k, end, limit)
     none = near & (model.of(model.contact, lane.mode)[k] < 0)
     pressed = when(near, lambda: presses(model, bound, still, k, end, limit), jnp.asarray(False))

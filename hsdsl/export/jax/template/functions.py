@@ -156,6 +156,23 @@ def keeping(value, source):
     return jax.lax.stop_gradient(value) + (source - jax.lax.stop_gradient(source))
 
 
+def with_derivatives_of(source):
+    """A function (numbers, arguments) that is its first argument, with the derivatives of ``source(*arguments)``.
+
+    The source is computed only where derivatives are.
+    """
+
+    @jax.custom_jvp
+    def call(numbers, arguments):
+        return numbers
+
+    @call.defjvp
+    def _(primals, tangents):
+        return primals[0], jax.jvp(source, primals[1], tangents[1])[1]
+
+    return call
+
+
 def chosen(mask, ours, theirs):
     """Fields of one structure where ``mask`` holds, of the other elsewhere."""
     return jax.tree.map(lambda a, b: jnp.where(mask, a, b), ours, theirs)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from .functions import INF, NAN, frozen
 
-STEP, CROSS, STUCK, BOUNDARY, ENTER, DONE = range(6)  # what a lane does next
+STEP, CROSS, STUCK, BOUNDARY, END, ENTER, FIRE, DONE = range(8)  # what a lane does next
 RUNNING, UNTIL, FINAL, LEFT_DOMAIN, ZENO, LIMIT, NOT_FINITE, UNDERFLOW, STEPS = range(9)  # how it ended
 STOPS = (
     "running", "until", "final", "left_domain", "zeno", "transition_limit", "not_finite", "step_underflow", "steps"

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -43,10 +44,7 @@ class Routines:
 
     flow: Any
     surfaces: Any
-    magnitudes: Any
-    gradients: Any
-    rates: Any
-    conditions: Any
+    facts: Any
     outputs: Any
     reset: Any
     spread: Any
@@ -55,18 +53,15 @@ class Routines:
 class Model:
     """Modes, edges, a timeline, and tables of them; M surfaces in the mode with most, W states."""
 
-    def __init__(self, modes, edges, states, width, outputs, method, timeline):
+    def __init__(self, modes, edges, states, width, outputs, method, timeline, surfaces=1):
         self.modes, self.edges, self.states, self.outputs = modes, edges, states, outputs
         self.method, self.timeline = method, timeline
         self.W, self.S = max(width, 1), max(len(states), 1)
-        self.M = max(1, *(len(mode.edges) + mode.walls for mode in modes))
+        self.M = max(surfaces, *(len(mode.edges) + mode.walls for mode in modes))
         self.routines = Routines(
             with_derivatives([mode.flow for mode in modes]),
             with_derivatives([mode.surfaces for mode in modes]),
-            *(
-                plainly([getattr(mode, name) for mode in modes])
-                for name in ("magnitudes", "gradients", "rates", "conditions")
-            ),
+            plainly([mode.facts for mode in modes]),
             with_derivatives([mode.outputs for mode in modes]),
             with_derivatives([edge.reset for edge in edges] or [lambda p, t, x: x]),
             plainly([edge.spread for edge in edges] or [lambda p, t, x, s: s]),
@@ -105,6 +100,13 @@ class Model:
         for k in range(walls):
             self.of_owner[j, own + k], self.in_contact[j, edges + k] = edges + k, own + k
 
+    @cached_property
+    def free(self):
+        """The same without motions along guards, which the relaxed scheme has not."""
+        own = [mode for j, mode in enumerate(self.modes) if mode.owner == j]
+        modes = tuple(replace(mode, contacts=(-1,) * len(mode.contacts)) for mode in own)
+        return Model(modes, self.edges, self.states, self.W, self.outputs, self.method, self.timeline, self.M)
+
     @property
     def transparent(self):
         """Whether a state may be beyond a surface without having crossed it."""
@@ -138,27 +140,22 @@ class Bound:
         """Values of the surfaces, M numbers, -1 behind those of the mode."""
         return self.routines.surfaces(mode, self.p, t, x)
 
-    def gradients(self, mode, t, x):
-        """Gradients of the surfaces in (t, x), M rows of 1 + W numbers."""
-        return self.routines.gradients(mode, self.p, t, x)
+    def facts(self, mode, t, x):
+        """The `Facts` of a point, or those of many (rows)."""
+        if jnp.ndim(t) == 0:
+            return self.routines.facts(mode, self.p, t, x)
+        return jax.vmap(lambda t, x: self.routines.facts(mode, self.p, t, x))(t, x)
 
-    def rates(self, mode, t, x):
-        """Rates of the surfaces along the flow, M numbers."""
-        return self.routines.rates(mode, self.p, t, x)
 
-    def conditions(self, mode, t, x):
-        """Whether the `if` of each edge holds; true of walls, M of them."""
-        return self.routines.conditions(mode, self.p, t, x)
+def noise_of(facts, t, x, scale):
+    """Round-off of each surface at a point, whose numbers were computed from those of sizes (M, W) or (W)."""
+    gradient = facts.gradients
+    known = jnp.isfinite(gradient.sum(axis=-1))
+    sizes = jnp.maximum(jnp.abs(x)[..., None, :], scale)
+    terms = jnp.abs(gradient[..., 0]) * jnp.abs(t)[..., None] + (jnp.abs(gradient[..., 1:]) * sizes).sum(axis=-1)
+    return 32 * 2.0**-53 * (facts.magnitudes + jnp.where(known, terms, 0.0))
 
-    def noise(self, mode, t, x, scale):
-        """Round-off of each surface at a point, whose numbers were computed from those of sizes (M, W) or (W)."""
-        gradient = self.gradients(mode, t, x)
-        known = jnp.isfinite(gradient.sum(axis=-1))
-        sizes = jnp.maximum(jnp.abs(x), scale)
-        terms = jnp.abs(gradient[:, 0]) * jnp.abs(t) + (jnp.abs(gradient[:, 1:]) * sizes).sum(axis=-1)
-        return 32 * 2.0**-53 * (self.routines.magnitudes(mode, self.p, t, x) + jnp.where(known, terms, 0.0))
 
-    def norm(self, mode, t, x):
-        """Sizes of the gradients."""
-        gradient = self.gradients(mode, t, x)
-        return jnp.sqrt((gradient * gradient).sum(axis=-1))
+def norm_of(facts):
+    """Sizes of the gradients."""
+    return jnp.sqrt((facts.gradients * facts.gradients).sum(axis=-1))

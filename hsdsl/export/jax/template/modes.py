@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
@@ -35,11 +36,20 @@ class Mode:
     push_order: int
     flow: Callable
     surfaces: Callable
-    magnitudes: Callable
-    gradients: Callable
-    rates: Callable
-    conditions: Callable
+    facts: Callable
     outputs: Callable
+
+
+class Facts(NamedTuple):
+    """Surfaces at a point: values, -1 behind those of the mode; rates along the flow; gradients in (t, x), M rows of
+    1 + W numbers; magnitudes of terms; whether the `if` of each edge holds, true of walls.
+    """
+
+    values: Any
+    rates: Any
+    gradients: Any
+    magnitudes: Any
+    conditions: Any
 
 
 def mode_of(
@@ -60,6 +70,14 @@ def mode_of(
         holds = [jnp.stack([part(p, t, x)[0] for part in parts]).all() for parts in conditions]
         return jnp.stack(holds + [jnp.asarray(True)] * (count - len(holds)))
 
+    def values(p, t, x):
+        return padded(surfaces(p, t, x), count, -1.0)
+
+    def facts(p, t, x):
+        along = padded([rate(p, t, x)[0] for rate in rates], count)
+        terms = padded(magnitudes(p, t, x), count)
+        return Facts(values(p, t, x), along, all_gradients(p, t, x), terms, all_conditions(p, t, x))
+
     return Mode(
         name,
         states,
@@ -68,11 +86,8 @@ def mode_of(
         len(rates) - len(edges),
         *contact,
         lambda p, t, x: padded(flow(p, t, x), width),
-        lambda p, t, x: padded(surfaces(p, t, x), count, -1.0),
-        lambda p, t, x: padded(magnitudes(p, t, x), count),
-        all_gradients,
-        lambda p, t, x: padded([rate(p, t, x)[0] for rate in rates], count),
-        all_conditions,
+        values,
+        facts,
         lambda p, t, x: padded(outputs(p, t, x), results),
     )
 

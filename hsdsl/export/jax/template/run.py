@@ -13,13 +13,15 @@ import numpy as np
 from jax import lax
 
 from .contact import let_go
-from .entry import boundary, enter
+from .entry import at_the_end, boundary, enter, held_on
+from .functions import frozen
 from .lane import RUNNING, STEP, STEPS, STOPS, start
 from .located import located_crossing
 from .model import Bound, Model
 from .relaxed import relaxed_crossing
-from .transitions import either, stuck, transit
-from .trials import advance
+from .transitions import decided, ended, transit
+from .trials import advance, along_step
+from .verdicts import followed
 
 ROUND = 16  # trial steps between two looks at what they found
 MOST_ROUNDS = 10_000_000
@@ -80,15 +82,19 @@ class Run(NamedTuple):
 
 def look(model, config, p, lane, record):
     """Do what steps have led to: transitions, ends, entries."""
-    crossed = relaxed_crossing if config.scheme == "relaxed" else located_crossing
-    lane, record, event = crossed(model, config, p, lane, record)
-    lane, other = stuck(model, config, p, lane)
-    lane, record, third = boundary(model, config, p, lane, record)
-    event = either(event, either(other, third))
-    if model.holds and config.scheme == "located":
+    crossed, before = relaxed_crossing if config.scheme == "relaxed" else located_crossing, lane
+    lane, crossing = crossed(model, config, p, at_the_end(model, p, lane))
+    event = decided(model, config, p, lane, crossing)
+    if len(config.times):
+        ends, until = crossing.mask | crossing.leaves, jnp.where(crossing.leaves, crossing.left, event.t)
+        made = followed(model, p, before, crossing.trial, frozen(before.trial), ends)
+        record = along_step(config, before, record, made, ends, until)
+    lane, touches = boundary(model, p, ended(lane, event), crossing.here)
+    if model.holds:
         lane, event = let_go(model, config, p, lane, event)
     lane, record = transit(model, config, p, lane, record, event)
-    return enter(model, config, p, lane, record)
+    lane, flows = enter(model, config, p, lane)
+    return held_on(model, config, p, lane, record, flows, touches) if config.scheme == "located" else (lane, record)
 
 
 def one_round(model, config, p, state):
@@ -173,8 +179,9 @@ class Experiment:
         if self.fixed:
             kept = np.array([name in self.fixed for name in self.names])
             p = jnp.where(kept, self.parameters(), p)
-        return run(self.model, self.settings(scheme, step, tolerance, relaxation, transitions, times), p,
-                   jnp.int32(self.start_mode), x0, rounds)  # fmt: skip
+        config = self.settings(scheme, step, tolerance, relaxation, transitions, times)
+        model = self.model if config.scheme == "located" else self.model.free
+        return run(model, config, p, jnp.int32(self.start_mode), x0, rounds)
 
     def settings(self, scheme, step, tolerance, relaxation, transitions, times):
         """The settings of a run."""

@@ -9,20 +9,22 @@ from jax import lax
 
 from .functions import INF
 from .lane import TIE
+from .model import noise_of
 from .steps import at
 
 SCAN = 8  # parts in which a step is searched
 UNIT = 2.0**-53
 
 
-def along(bound, mode, t, h, x, piece, shares):
-    """Values of all surfaces at some shares of a step (rows)."""
-    return jax.vmap(lambda s: bound.surfaces(mode, t + s * h, at(x, piece, s)))(shares)
+def each_at(bound, mode, t, h, x, pieces, shares):
+    """The value of each surface at a share of its own, on a piece that is one for all or one for each."""
+    states = states_at(x, pieces, shares)
+    return jnp.diagonal(jax.vmap(lambda s, x: bound.surfaces(mode, t + s * h, x))(shares, states))
 
 
-def each_at(bound, mode, t, h, x, piece, shares):
-    """The value of each surface at a share of its own."""
-    return jnp.diagonal(along(bound, mode, t, h, x, piece, shares))
+def states_at(x, pieces, shares):
+    """Points at shares of one interpolant, or each of its own."""
+    return jax.vmap(lambda piece, s: at(x, piece, s), (None if pieces.ndim == 2 else 0, 0))(pieces, shares)
 
 
 def ties(config, t):
@@ -30,25 +32,24 @@ def ties(config, t):
     return TIE * jnp.maximum(config.until, jnp.abs(t))
 
 
-def standing(model, bound, lane, t, x, since):
+def standing(model, lane, facts, t, x, since):
     """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true."""
-    mode = lane.mode
-    r = bound.surfaces(mode, t, x)
-    rate = bound.rates(mode, t, x)
-    noise = bound.noise(mode, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
-    near = jnp.abs(r) <= jnp.maximum(noise, rate * since)
-    return near & (rate > 0) & bound.conditions(mode, t, x) & model.of(model.is_edge, mode)
+    noise = noise_of(facts, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
+    near = jnp.abs(facts.values) <= jnp.maximum(noise, facts.rates * since)
+    return near & (facts.rates > 0) & facts.conditions & model.of(model.is_edge, lane.mode)
 
 
-def choose(model, config, bound, lane, found, times, states):
+def choose(model, config, lane, found, facts, times, states):
     """Choose which crossing goes: the number of the first one, that of the edge, and whether others are tied.
 
     The earliest goes; of tied ones, and of those whose guard its point is on, the highest priority, then the first.
+    ``facts`` are those at the times and states (rows).
     """
     first = jnp.argmin(jnp.where(found, times, INF))
     since = ties(config, times[first])
     tied = found & (times - times[first] <= since)
-    tied = tied | standing(model, bound, lane, times[first], states[first], since)
+    here = jax.tree.map(lambda rows: rows[first], facts)
+    tied = tied | standing(model, lane, here, times[first], states[first], since)
     priority = model.of(model.priority, lane.mode)
     edge = jnp.argmax(jnp.where(tied, priority, jnp.iinfo(jnp.int32).min))
     return first, edge, tied.sum() > 1

@@ -1,15 +1,19 @@
 # pyright: basic
-"""Transitions: where they go from, with derivatives; how a run waits, is reset and recorded; runs that are stuck."""
+"""Transitions: where they go from, with derivatives; how a run waits, is reset and recorded."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
-from .functions import NAN, chosen, frozen, keeping
+from .functions import INF, NAN, chosen, frozen, keeping, with_derivatives_of
 from .lane import (
+    END,
     ENTER,
+    FIRE,
     FREE,
     INWARD,
     LIMIT,
@@ -27,6 +31,31 @@ from .model import Bound
 from .surfaces import choose, standing, ties
 
 
+class Crossing(NamedTuple):
+    """Crossings in a step where ``mask`` holds: which surfaces, and where each, M of them.
+
+    ``here`` and ``facts`` are those of the run's own state and of the crossings. A strip is entered at ``landed``, this
+    ``depth``. The ``trial`` has them; it ``leaves`` the domain at the time ``left``. ``sizes(first, state)`` are those
+    of a crossing; ``point(bound, lane, length, share)`` is its time and state.
+    """
+
+    mask: Any
+    found: Any
+    shares: Any
+    times: Any
+    states: Any
+    here: Any
+    facts: Any
+    landed: Any
+    depth: Any
+    length: Any
+    trial: Any
+    leaves: Any
+    left: Any
+    sizes: Callable
+    point: Callable
+
+
 class Event(NamedTuple):
     """Where ``mask`` holds: edge k of the mode goes from (t, x); a step into a strip ended at ``landed``, this deep."""
 
@@ -41,15 +70,15 @@ class Event(NamedTuple):
 
 
 def corrected(bound, lane, k, t, x, time, state):
-    """The time and state of a crossing of surface k, with their derivatives.
+    """The time and state of a crossing of surface k at (t, x), for their derivatives.
 
     (time, state) is a point with the same numbers, on the trajectory at a share of a step that does not depend on
     anything; the crossing moves along the flow as the surface's value there says.
     """
-    rate = frozen(bound.rates(lane.mode, t, x)[k])
+    rate = bound.facts(lane.mode, t, x).rates[k]
     r = bound.surfaces(lane.mode, time, state)[k]
-    late = -(r - frozen(r)) / jnp.where(rate == 0, jnp.inf, rate)
-    return keeping(t, time + late), keeping(x, state + frozen(bound.flow(lane.mode, t, x)) * late)
+    late = -(r - frozen(r)) / frozen(jnp.where(rate == 0, INF, rate))
+    return time + late, state + frozen(bound.flow(lane.mode, t, x)) * late
 
 
 def sizes_of(lane, x, z):
@@ -63,36 +92,51 @@ def passed_over(lane, mask):
     return lane._replace(clear=lane.clear | mask, phase=jnp.where(mask, STEP, lane.phase))
 
 
-def at_once(model, config, p, lane, mask, found):
-    """The event of guards that a state is on."""
-    bound = Bound(model, p, lane.segment)
-    places, count = jnp.broadcast_to(frozen(lane.x), (model.M, model.W)), jnp.full(model.M, frozen(lane.t))
-    first, k, tied = choose(model, config, Bound(model, frozen(p), lane.segment), frozen(lane), found, count, places)
-    t, x = corrected(bound, lane, first, frozen(lane.t), frozen(lane.x), lane.t, lane.x)
-    sizes = sizes_of(lane, frozen(lane.x), frozen(lane.x))
-    return Event(mask, k, t, x, frozen(lane.t), jnp.asarray(0.0), sizes, tied)
+def facts_here_and_at(bound, lane, found, times, states):
+    """The `Facts` of a run's own state, and those at crossings (rows), in one evaluation."""
+    times, states = jnp.where(found, times, lane.t), jnp.where(found[:, None], states, lane.x)
+    both = bound.facts(lane.mode, jnp.append(lane.t, times), jnp.concatenate([lane.x[None], states]))
+    return jax.tree.map(lambda rows: rows[0], both), jax.tree.map(lambda rows: rows[1:], both)
 
 
-def stuck(model, config, p, lane):
-    """A run that no step leads on: a guard that it is on goes, or it ends with the reason."""
-    mask, still = lane.phase == STUCK, frozen(lane)
-    bound = Bound(model, frozen(p), lane.segment)
+def decided(model, config, p, lane, crossing):
+    """The event of a crossing, of guards that a state is on where no step leads on or the run ends, or on entry."""
+    still, goes, fires = frozen(lane), crossing.mask, lane.phase == FIRE
     may = (lane.failure == VALUE) | ((config.scheme == "relaxed") & (lane.failure >= 1) & (lane.failure <= INWARD))
-    found = standing(model, bound, still, still.t, still.x, 1e-12 * still.t) & may
-    event = at_once(model, config, p, lane, mask & found.any(), found)
+    may = jnp.where(lane.phase == STUCK, may, lane.phase == END)
+    on = may & standing(model, still, crossing.here, still.t, still.x, 1e-12 * still.t)
+    found, times = jnp.where(goes, crossing.found, on), jnp.where(goes, crossing.times, still.t)
+    states = jnp.where(goes, crossing.states, still.x)
+    facts = jax.tree.map(lambda ours, own: jnp.where(goes, ours, own), crossing.facts, crossing.here)
+    first, k, tied = choose(model, config, still, found, facts, times, states)
+
+    def point(p, lane, t, x, first, length, share):
+        bound = Bound(model, p, lane.segment)
+        return corrected(bound, lane, first, t, x, *crossing.point(bound, lane, length, share))
+
+    length, share = jnp.where(goes, crossing.length, 0.0), jnp.where(goes, crossing.shares[first], 0.0)
+    there = times[first], states[first]
+    t, x = with_derivatives_of(point)(there, (p, lane, *there, first, length, share))
+    t, x = jnp.where(fires, lane.t, t), jnp.where(fires, lane.x, x)
+    sizes = jnp.where(goes, crossing.sizes(first, there[1]), sizes_of(lane, still.x, still.x))
+    sizes = jnp.where(fires, frozen(jnp.maximum(jnp.abs(lane.x), lane.scale)), sizes)
+    landed = jnp.where(goes, crossing.landed, jnp.where(lane.phase == END, INF, still.t))
+    depth = jnp.where(goes, jnp.where(found[k], crossing.depth[k], crossing.depth[first]), 0.0)
+    depth = jnp.where(fires, config.relaxation, depth)
+    return Event(goes | on.any() | fires, jnp.where(fires, lane.blocked, k), t, x, landed, depth, sizes, tied & ~fires)
+
+
+def ended(lane, event):
+    """End a run that no step leads on, or that is at its end, where nothing goes; each with its reason."""
     reasons = jnp.asarray([7, 3, 7, 7, 7, 6, 7, 7])  # by failure: a wall, no value, else no step is short enough
-    return stopped(lane, mask & ~found.any(), reasons[lane.failure]), event
-
-
-def either(one, other):
-    """The event of one of two, of which at most one is an event."""
-    return chosen(one.mask, one, other)
+    lane = stopped(lane, (lane.phase == END) & ~event.mask, UNTIL)
+    return stopped(lane, (lane.phase == STUCK) & ~event.mask, reasons[lane.failure])
 
 
 def transit(model, config, p, lane, record, event):
     """Make a transition: wait in the strip, reset, and enter the target next."""
-    bound = Bound(model, p, lane.segment)
-    edge = model.of(model.edge, lane.mode)[event.k]
+    bound, entry, before = Bound(model, p, lane.segment), lane.phase == FIRE, lane
+    edge = model.of(model.edge, lane.mode)[event.k].astype(jnp.int32)
     mask = event.mask
     over = mask & (lane.count >= config.max_transitions)
     lane, mask = stopped(lane._replace(t=jnp.where(over, event.t, lane.t)), over, LIMIT), mask & ~over
@@ -103,36 +147,49 @@ def transit(model, config, p, lane, record, event):
     if config.scheme == "relaxed":
         resumed = event.landed + (config.relaxation - event.depth)
     else:
-        resumed = event.t + jnp.where(crowded(config, lane, event.t), config.relaxation, 0.0)
+        resumed = event.t + jnp.where(crowded(config, lane, event.t) & ~entry, config.relaxation, 0.0)
     waits = resumed > event.t
     late = waits & (resumed > config.until + ties(config, config.until))
     resumed = keeping(jnp.minimum(resumed, jnp.where(waits, config.until, resumed)), event.t)
     bad = ~jnp.isfinite(after).all() & ~late
     record = recorded(
         record, lane, mask & (late | ~bad), event.t, jnp.where(late, NAN, resumed), edge, x,
-        jnp.where(late, NAN, after), jnp.asarray(False),
+        jnp.where(late, NAN, after), entry,
     )  # fmt: skip
     record = sampled(
         record, config, mask & waits, lane.mode, event.t, jnp.minimum(resumed, config.until),
         lambda times: jnp.broadcast_to(x, (len(times), model.W)),
     )  # fmt: skip
     stops = mask & (late | bad)
-    ended = stopped(lane, stops, jnp.where(late, UNTIL, NOT_FINITE))
-    ended = ended._replace(t=jnp.where(late, config.until, event.t), x=x, count=lane.count + jnp.where(late, 1, 0))
-    made = lane._replace(
-        phase=jnp.int32(ENTER), t=resumed, x=after, mode=jnp.asarray(model.target, jnp.int32)[edge],
-        scale=scale, since=since_of(config, lane, event), inside=jnp.zeros_like(lane.inside),
-        reset_at=frozen(event.t), held=jnp.full_like(lane.held, -1), made=jnp.asarray(True),
-        flowed=event.t > lane.entered_t, edge=edge.astype(jnp.int32),
-        slope=frozen(bound.flow(lane.mode, event.t, x)), mode_before=model.of(model.owner, lane.mode).astype(jnp.int32),
-        times=jnp.concatenate([lane.times[1:], frozen(event.t)[None]]),
-        waits=jnp.concatenate([lane.waits[1:], frozen(resumed - event.t)[None]]),
-        loops=jnp.concatenate([lane.loops[1:], edge.astype(jnp.int32)[None]]), count=lane.count + 1,
-        trial=lane.h, clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
-        visited=lane.visited._replace(room=jnp.int32(0)),
+    halted = stopped(lane, stops, jnp.where(late, UNTIL, NOT_FINITE))
+    halted = halted._replace(
+        t=jnp.where(late, config.until, event.t), x=jnp.where(before.phase == END, lane.x, x),
+        count=lane.count + jnp.where(late, 1, 0),
     )  # fmt: skip
-    lane = chosen(stops, ended, lane)
-    return chosen(mask & ~stops, made, lane), record
+    made = entered_next(model, config, bound, lane, event, edge, x, after, scale, resumed, entry)
+    return chosen(mask & ~stops, made, chosen(stops, halted, lane)), record
+
+
+def entered_next(model, config, bound, lane, event, edge, x, after, scale, resumed, entry):
+    """A run after a reset; one that a guard made on entry keeps what it knows of the flow before."""
+
+    def kept(old, new):
+        return jnp.where(entry, old, new)
+
+    relaxed, last = config.scheme == "relaxed", lane.visited.room
+    slope = frozen(bound.flow(lane.mode, event.t, x)) if relaxed else lane.slope  # only the relaxed scheme reads it
+    owner = model.of(model.owner, lane.mode).astype(jnp.int32)
+    return lane._replace(
+        phase=jnp.int32(ENTER), t=resumed, x=after, mode=jnp.asarray(model.target, jnp.int32)[edge], scale=scale,
+        since=kept(lane.since, since_of(config, lane, event)), inside=jnp.zeros_like(lane.inside),
+        reset_at=kept(NAN, frozen(event.t)), held=jnp.full_like(lane.held, -1), made=kept(lane.made, True),
+        flowed=kept(lane.flowed, event.t > lane.entered_t), edge=edge, slope=kept(lane.slope, slope),
+        mode_before=kept(lane.mode_before, owner), times=jnp.append(lane.times[1:], frozen(event.t)),
+        waits=jnp.append(lane.waits[1:], frozen(resumed - event.t)),
+        loops=jnp.append(lane.loops[1:], kept(-1, edge).astype(jnp.int32)), count=lane.count + 1, trial=lane.h,
+        clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
+        visited=lane.visited._replace(room=kept(last, 0).astype(jnp.int32)),
+    )  # fmt: skip
 
 
 def crowded(config, lane, t):

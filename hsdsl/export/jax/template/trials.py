@@ -21,7 +21,7 @@ from .lane import BOUNDARY, CREEPING, CROSS, STEP, STUCK, WRONG, noticed, sample
 from .model import Bound
 from .steps import at
 from .surfaces import UNIT
-from .verdicts import attempted, located_verdict, relaxed_verdict, scaled, terms_of
+from .verdicts import attempted, followed, located_verdict, relaxed_verdict, terms_of
 
 
 def advance(model, config, p, lane, record):
@@ -31,7 +31,7 @@ def advance(model, config, p, lane, record):
     bound = Bound(model, frozen(p), still.segment)
     trial = attempted(model, bound, still, length)
     verdict_of = relaxed_verdict if config.scheme == "relaxed" else located_verdict
-    learnt, verdict = verdict_of(model, config, bound, still, trial)
+    learnt, verdict, ends = verdict_of(model, config, bound, still, trial)
     crosses = verdict.crosses & ~lane.clear
     counts = here & ~verdict.wrong & ~verdict.failed & ~crosses
     lane = lane._replace(
@@ -40,7 +40,7 @@ def advance(model, config, p, lane, record):
     )
     lane = lane._replace(phase=jnp.where(here & crosses, CROSS, lane.phase))
     lane = shortened(config, lane, verdict, trial, here & (verdict.wrong | verdict.failed))
-    return counted(model, config, p, lane, record, trial, verdict.ratio, counts)
+    return counted(model, config, p, lane, record, trial, ends, verdict.ratio, counts)
 
 
 def shortened(config, lane, verdict, trial, mask):
@@ -66,46 +66,48 @@ def located_or(config, mask):
     return True if config.scheme == "located" else mask
 
 
-def counted(model, config, p, lane, record, tried, ratio, mask):
+def counted(model, config, p, lane, record, tried, ends, ratio, mask):
     """Make the step that counts where ``mask`` holds: what was ``tried`` says how the run goes on from it."""
-    still, bound = frozen(lane), Bound(model, frozen(p), frozen(lane.segment))
-    values = bound.surfaces(lane.mode, tried.t1, tried.z)
-    noise = bound.noise(lane.mode, tried.t1, tried.z, scaled(still))
-    after = lane
+    bound, values, after = Bound(model, frozen(p), lane.segment), ends.last.values, lane
     if config.tolerance is not None:
         after = accepted(config, after, tried.h, ratio, lane.halvings == 0)
-    after = stalled(config, bound, after, tried, values)
-    # elsewhere a step of no length is made, which has derivatives
-    trial = attempted(model, Bound(model, p, lane.segment), lane, jnp.where(mask, still.trial, 0.0))
-    length = jnp.where(trial.h > 0, trial.h, 1.0)
-    record = sampled(
-        record, config, mask, lane.mode, trial.t, trial.t1,
-        lambda times: jax.vmap(lambda time: at(trial.x, trial.piece, (time - trial.t) / length))(times),
-    )  # fmt: skip
-    ends = tried.at_limit & (bound.last | bound.next_jumps | lane.active.any() | (lane.held >= 0))
+    after = stalled(config, after, tried, ends)
+    made = followed(model, p, lane, tried, frozen(lane.trial), mask)
+    record = along_step(config, lane, record, made, mask, made.t1)
+    closes = tried.at_limit & (bound.last | bound.next_jumps | lane.active.any() | (lane.held >= 0))
     after = noticed(model, after, tried.z)._replace(
-        t=trial.t1,
-        x=trial.z,
+        t=made.t1,
+        x=made.z,
         terms=terms_of(model.method, tried.x, tried.h, tried.stages),
-        active=lane.active & (jnp.abs(values) <= noise),
-        emerging=lane.emerging & (values > 0) & (bound.rates(lane.mode, tried.t1, tried.z) < 0),
+        active=lane.active & (jnp.abs(values) <= ends.last_noise),
+        emerging=lane.emerging & (values > 0) & (ends.last.rates < 0),
         trial=after.h,
         halvings=jnp.zeros_like(lane.halvings),
         clear=jnp.asarray(False),
-        phase=jnp.where(after.phase == STUCK, STUCK, jnp.where(ends, BOUNDARY, STEP)),
-        segment=jnp.where(tried.at_limit & ~ends, lane.segment + 1, lane.segment),
+        phase=jnp.where(after.phase == STUCK, STUCK, jnp.where(closes, BOUNDARY, STEP)),
+        segment=jnp.where(tried.at_limit & ~closes, lane.segment + 1, lane.segment),
     )
     return chosen(mask, after, lane), record
 
 
-def stalled(config, bound, lane, trial, values):
+def along_step(config, lane, record, made, mask, end):
+    """Sample a step until some time."""
+    if not len(config.times):
+        return record
+    length = jnp.where(made.h > 0, made.h, 1.0)
+    return sampled(
+        record, config, mask, lane.mode, made.t, end,
+        lambda times: jax.vmap(lambda time: at(made.x, made.piece, (time - made.t) / length))(times),
+    )  # fmt: skip
+
+
+def stalled(config, lane, trial, ends):
     """Count steps in a row that had to be cut short; a run that creeps, or closes in on something, is stuck."""
     cut_short = lane.halvings > 0
     fresh = trial.t != lane.reached
     idle, creeping = jnp.where(fresh, 0, lane.idle), jnp.where(fresh, 0, lane.creeping)
     small = trial.h <= IDLE_UNITS * UNIT * jnp.maximum(trial.t, lane.h)
-    before = bound.surfaces(lane.mode, trial.t, trial.x)
-    same = (lane.blocked >= 0) & (values == before)[lane.blocked]
+    same = (lane.blocked >= 0) & (ends.last.values == ends.first.values)[lane.blocked]
     idle = jnp.where(small | same, idle + 1, 0)
     creeping = jnp.where(lane.halvings >= CREEPING_HALVINGS, creeping + 1, 0)
     gives_up = (idle > MOST_IDLE) | (small & (trial.z == trial.x).all())

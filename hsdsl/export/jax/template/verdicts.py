@@ -12,10 +12,11 @@ import jax
 import jax.numpy as jnp
 
 from .control import cut, error_ratio
-from .functions import frozen
+from .functions import chosen, frozen, with_derivatives_of
 from .lane import DEEP, FLAT, VALUE, WALL
+from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, piece_of, secant, slope_at, step
-from .surfaces import SCAN, along
+from .surfaces import SCAN
 
 
 class Trial(NamedTuple):
@@ -62,6 +63,29 @@ def attempted(model, bound, lane, h):
     return Trial(lane.t, h, t1, lane.x, z, stages, end, ends, piece, at_limit)
 
 
+class Made(NamedTuple):
+    """A step from (t, x) to (t1, z) and its interpolant, with derivatives."""
+
+    t: Any
+    h: Any
+    t1: Any
+    x: Any
+    z: Any
+    piece: Any
+
+
+def followed(model, p, lane, trial, length, mask):
+    """The step of a trial of this length, with derivatives; where ``mask`` fails one of no length, which has them."""
+
+    def again(p, lane, length):
+        made = attempted(model, Bound(model, p, lane.segment), lane, length)
+        return Made(made.t, made.h, made.t1, made.x, made.z, made.piece)
+
+    ours = Made(trial.t, trial.h, trial.t1, trial.x, trial.z, trial.piece)
+    none = Made(trial.t, jnp.zeros_like(trial.h), trial.t, trial.x, trial.x, jnp.zeros_like(trial.piece))
+    return with_derivatives_of(again)(chosen(mask, ours, none), (p, lane, jnp.where(mask, length, 0.0)))
+
+
 def terms_of(method, x, h, stages):
     """The sizes of the terms that the end of a step of length h from x is computed from."""
     largest = jnp.abs(jnp.stack(stages)).max(axis=0)
@@ -73,105 +97,113 @@ def scaled(lane):
     return jnp.where(lane.active[:, None], lane.scale, 0.0)
 
 
-def judged(model, config, bound, lane, trial):
+class Ends(NamedTuple):
+    """The `Facts` at both ends of a trial, their round-off, and the `Facts` and times and states at some shares."""
+
+    first: Any
+    last: Any
+    first_noise: Any
+    last_noise: Any
+    shares: Any
+    times: Any
+    states: Any
+
+
+def looked_at(bound, lane, trial, count):
+    """Surfaces at the ends of a trial and at ``count`` multiples of a part of it, in one evaluation."""
+    shares = jnp.arange(count) / SCAN
+    states = jax.vmap(lambda s: at(trial.x, trial.piece, s))(shares)
+    times = jnp.concatenate([trial.t + shares * trial.h, jnp.stack([trial.t, trial.t1])])
+    places = jnp.concatenate([states.reshape(count, len(trial.x)), jnp.stack([trial.x, trial.z])])
+    facts = bound.facts(lane.mode, times, places)
+    first, last = (jax.tree.map(lambda rows, i=i: rows[i], facts) for i in (count, count + 1))
+    return Ends(
+        first, last, noise_of(first, trial.t, trial.x, scaled(lane)), noise_of(last, trial.t1, trial.z, scaled(lane)),
+        jax.tree.map(lambda rows: rows[:count], facts), times[:count], states,
+    )  # fmt: skip
+
+
+def judged(model, config, lane, trial, ends):
     """The verdict of the relaxed scheme before crossings are looked for."""
-    mode, t1, z = lane.mode, trial.t1, trial.z
-    values = bound.surfaces(mode, t1, z)
-    noise = bound.noise(mode, t1, z, scaled(lane))
+    mode, values, noise = lane.mode, ends.last.values, ends.last_noise
     beyond = (values > 0) & ~(values <= noise)
     wall = beyond & model.of(model.is_wall, mode) & ~lane.emerging
     plain = beyond & model.of(model.is_edge, mode) & ~model.of(model.conditional, mode) & ~lane.emerging
-    norm = bound.norm(mode, t1, z)
+    norm = norm_of(ends.last)
     flat, deep = plain & ~(norm > 0), plain & ~(values <= config.relaxation * norm + noise)
     crosses = beyond & model.of(model.is_edge, mode)
-    if model.transparent:
-        crosses = crosses & ~passed_before(model, bound, lane, trial)
-    finite = jnp.isfinite(z.sum() + values.sum()) & (trial.ends | crosses.any())
+    if model.transparent:  # a conditional surface that a step begins beyond and stays beyond was passed before
+        outside = ends.shares.values[0] > ends.first_noise
+        crosses = crosses & ~((ends.shares.values > 0).all(axis=0) & outside & model.of(model.conditional, mode))
+    finite = jnp.isfinite(trial.z.sum() + values.sum()) & (trial.ends | crosses.any())
     bad = wall | flat | deep
     blocked = jnp.argmax(bad)
     kind = jnp.where(wall[blocked], WALL, jnp.where(flat[blocked], FLAT, DEEP))
     return finite, bad.any(), kind, blocked, crosses.any()
 
 
-def passed_before(model, bound, lane, trial):
-    """Conditional surfaces that a step begins beyond and stays beyond."""
-    shares = jnp.arange(SCAN) / SCAN
-    values = along(bound, lane.mode, trial.t, trial.h, trial.x, trial.piece, shares)
-    outside = values[0] > bound.noise(lane.mode, trial.t, trial.x, scaled(lane))
-    return (values > 0).all(axis=0) & outside & model.of(model.conditional, lane.mode)
-
-
-def excursion(model, bound, lane, trial):
+def excursion(lane, trial, ends):
     """Surfaces that an adaptive step went beyond and came back from."""
-    mode, shares = lane.mode, jnp.arange(SCAN) / SCAN
 
-    def rate(t, x, flow):
-        gradient = bound.gradients(mode, t, x)
-        return gradient[:, 0] + gradient[:, 1:] @ flow
+    def rate(facts, flow):
+        return facts.gradients[:, 0] + facts.gradients[:, 1:] @ flow
 
-    out, back = rate(trial.t, trial.x, trial.stages[0]), rate(trial.t1, trial.z, trial.end)
-
-    def beyond(s):
-        t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
-        r, noise = bound.surfaces(mode, t, x), bound.noise(mode, t, x, scaled(lane))
-        return (r > noise) & bound.conditions(mode, t, x)
-
-    seen = jax.vmap(beyond)(shares)
-    first = bound.surfaces(mode, trial.t, trial.x) > bound.noise(mode, trial.t, trial.x, scaled(lane))
+    out, back = rate(ends.first, trial.stages[0]), rate(ends.last, trial.end)
+    noise = noise_of(ends.shares, ends.times, ends.states, scaled(lane))
+    seen = (ends.shares.values > noise) & ends.shares.conditions
+    first = ends.first.values > ends.first_noise
     return (out > 0) & (back <= 0) & seen[1:].any(axis=0) & ~first
 
 
 def relaxed_verdict(model, config, bound, lane, trial):
-    """The verdict of the relaxed scheme, and the run with what its step control learns."""
-    finite, bad, kind, blocked, crosses = judged(model, config, bound, lane, trial)
+    """The verdict of the relaxed scheme, the run with what its step control learns, and what it looked at."""
+    shares = SCAN if model.transparent or config.tolerance is not None else 0
+    ends = looked_at(bound, lane, trial, shares)
+    finite, bad, kind, blocked, crosses = judged(model, config, lane, trial, ends)
     failed = ~finite | bad
     wrong, ratio = jnp.asarray(False), jnp.asarray(0.0)
     if config.tolerance is not None:
         error = error_of(model.method, trial.h, trial.stages, trial.end)
         lane, ratio = error_ratio(model, config, lane, motion(bound, lane), trial.h, error, trial.z)
         wrong = ~failed & trial.ends & ~(ratio <= 1)
-        away = excursion(model, bound, lane, trial)
+        away = excursion(lane, trial, ends)
         back = away.any() & ~failed & ~wrong & ~crosses
         kind, blocked = jnp.where(back, DEEP, kind), jnp.where(back, jnp.argmax(away), blocked)
         failed = failed | back
     kind = jnp.where(finite, kind, VALUE)
-    return lane, Verdict(wrong, failed, kind, jnp.where(finite, blocked, -1), crosses & ~failed & ~wrong, ratio)
+    verdict = Verdict(wrong, failed, kind, jnp.where(finite, blocked, -1), crosses & ~failed & ~wrong, ratio)
+    return lane, verdict, ends
 
 
-def looked_along(model, bound, lane, trial):
+def looked_along(bound, lane, trial):
     """Surfaces and their slopes by the share at the ends of the parts of a step, and what counts as above."""
-    mode, shares = lane.mode, jnp.arange(SCAN + 1) / SCAN
-
-    def look(s):
-        t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
-        gradient = bound.gradients(mode, t, x)
-        return bound.surfaces(mode, t, x), gradient[:, 0] * trial.h + gradient[:, 1:] @ slope_at(trial.piece, s)
-
-    values, slopes = jax.vmap(look)(shares)
-    first = bound.noise(mode, trial.t, trial.x, scaled(lane))
-    last = bound.noise(mode, trial.t1, trial.z, scaled(lane))
-    return values, slopes, first, jnp.maximum(first, last)
+    ends = looked_at(bound, lane, trial, SCAN + 1)
+    gradients = ends.shares.gradients
+    moved = jax.vmap(lambda s: slope_at(trial.piece, s))(jnp.arange(SCAN + 1) / SCAN)
+    slopes = gradients[..., 0] * trial.h + (gradients[..., 1:] @ moved[..., None])[..., 0]
+    return ends, slopes, jnp.maximum(ends.first_noise, ends.last_noise)
 
 
-def rising(lane, values, slopes, first, level, outside=None):
+def rising(lane, values, slopes, first, level):
     """For each part of a step and each surface whether it may rise above its level there.
 
     It does where it ends above, or has a crest inside. A state on a surface begins at zero; one beyond a surface has to
-    come back first.
+    come back first. A part begins beyond where the one before ended above, or began beyond and stayed positive: as a
+    carry in a sum of two numbers, whose digits are the parts.
     """
-    values = values - jnp.where(lane.active, values[0], 0.0)
-    outside = ~lane.active & (values[0] > first) if outside is None else outside
-    rows = []
-    for i in range(SCAN):
-        above = values[i + 1] > level
-        rows.append(~outside & (above | ((slopes[i] > 0) & (slopes[i + 1] < 0))))
-        outside = jnp.where(outside, values[i + 1] > 0, above)
-    return jnp.stack(rows)
+    begins = ~lane.active & (values[0] > first)
+    values = (values - jnp.where(lane.active, values[0], 0.0))[1:]
+    place = jnp.arange(SCAN)[:, None]
+    stays, above = (jnp.left_shift(rows.astype(int), place).sum(axis=0) for rows in (values > 0, values > level))
+    total = stays + above + begins
+    outside = jnp.right_shift(total ^ stays ^ above, place) % 2 == 1
+    return ~outside & ((values > level) | ((slopes[:-1] > 0) & (slopes[1:] < 0)))
 
 
 def located_verdict(model, config, bound, lane, trial):
-    """The verdict of the located scheme, and the run with what its step control learns."""
-    values, slopes, first, level = looked_along(model, bound, lane, trial)
+    """The verdict of the located scheme, the run with what its step control learns, and what it looked at."""
+    ends, slopes, level = looked_along(bound, lane, trial)
+    values = ends.shares.values
     finite = trial.ends & jnp.isfinite(trial.z.sum() + values.sum())
     wrong, ratio = jnp.asarray(False), jnp.asarray(0.0)
     if config.tolerance is not None:
@@ -179,5 +211,5 @@ def located_verdict(model, config, bound, lane, trial):
         lane, ratio = error_ratio(model, config, lane, motion(bound, lane), trial.h, error, trial.z)
         wrong = finite & ~(ratio <= 1)
     own = model.of(model.is_edge | model.is_wall, lane.mode)
-    crosses = (rising(lane, values, slopes, first, level) & own).any()
-    return lane, Verdict(wrong, ~finite, jnp.asarray(VALUE), jnp.asarray(-1), crosses & finite & ~wrong, ratio)
+    crosses = (rising(lane, values, slopes, ends.first_noise, level) & own).any()
+    return lane, Verdict(wrong, ~finite, jnp.asarray(VALUE), jnp.asarray(-1), crosses & finite & ~wrong, ratio), ends
