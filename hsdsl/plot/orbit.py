@@ -44,6 +44,7 @@ def plot_orbit(
 
 def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) -> None:
     """Draw the first two states against each other, or one over time."""
+    first: tuple[float, float] | None = None
     before: tuple[float, float] | None = None
     for arc in run.arcs:
         start, end = float(run.times[arc.first]), min(float(run.times[arc.last]), period)
@@ -60,12 +61,19 @@ def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) 
         x, y = columns if len(columns) == 2 else (times, columns[0])
         axis.plot(x, y, color=PALETTE[0])
         if before is not None:
-            axis.plot([before[0], x[0]], [before[1], y[0]], ":", color=PALETTE[1])
+            _draw_jump(axis, before, (float(x[0]), float(y[0])))
         before = float(x[-1]), float(y[-1])
+        first = first or (float(x[0]), float(y[0]))
         if end >= period:
             break
+    if first is not None and before is not None:  # the jump of the section closes the orbit
+        _draw_jump(axis, before, first if len(states) > 1 else (before[0], first[1]))
     axis.set_xlabel(states[0] if len(states) > 1 else "time t", parse_math=False)
     axis.set_ylabel(states[1] if len(states) > 1 else states[0], parse_math=False)
+
+
+def _draw_jump(axis: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+    axis.plot([start[0], end[0]], [start[1], end[1]], ":", color=PALETTE[1])
 
 
 def draw_circle(axis: Axes, multipliers: Array) -> None:

@@ -12,11 +12,12 @@ import hand_made
 import numpy as np
 import pytest
 from matplotlib import colors
+from matplotlib.figure import Figure
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.execution import Stop
-from hsdsl.plot import View, plot
+from hsdsl.plot import View, orbit, plot
 from hsdsl.plot.animation import FPS, MOST, frame_times
 from hsdsl.plot.curves import curves
 from hsdsl.plot.figure import picture
@@ -311,3 +312,14 @@ def test_a_branch_says_which_lines_are_stable(tmp_path, monkeypatch):
     points = [(0.1 * k, float(k), k not in (4, 5, 6)) for k in range(12)]
     branch.plot_branch(tmp_path / "b.png", "c", "x", points, [("fold", 0.3, 3.0)], "title")
     assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["stable", "unstable", "fold"]
+
+
+@pytest.mark.parametrize(("states", "jump"), [(["s", "w"], [(1, 0), (0, 0)]), (["s"], [(1, 1), (1, 0)])])
+def test_an_orbit_is_closed_by_the_jump_of_its_section(states, jump):
+    """A timer over one period: s rises to 1 and is set to 0, w is 0."""
+    text = "hsdsl: 1\nmodes: {m: {flow: {s: 1, w: 0}, transitions: [{when: s >= 1, to: m, reset: {s: 0}}]}}"
+    run = hsdsl.loads(f"{text}\ninitial: {{mode: m, s: 0, w: 0}}\nexperiment: {{until: 1}}\n").simulate()
+    axis = Figure().subplots()
+    orbit._draw_run(axis, run, states, 1.0)
+    (dotted,) = (line for line in axis.lines if line.get_linestyle() == ":")
+    assert np.asarray(dotted.get_xydata()) == pytest.approx(np.array(jump, float), abs=1e-12)
