@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from hsdsl.elaborate.symbols import KINDS, SymbolTable
-from hsdsl.names import did_you_mean, shown
+from hsdsl.names import closest, did_you_mean, shown
 from hsdsl.parts import Part
 from hsdsl.schema import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
 from hsdsl.source import ABSENT, Key
@@ -108,12 +108,13 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
             _check_names(symbols, name, kind)
     for key, given in document.system.items():
         label = given.automaton.value
+        if label not in document.automata and label != ABSENT:
+            message = f"there is no automaton '{shown(label)}'"
+            symbols.report(given.automaton.place, "HS350", message, did_you_mean(label, document.automata))
+            label = closest(label, map(str, document.automata)) or label  # so what it means is looked at, too
         kind = document.automata.get(label)  # pyright: ignore[reportArgumentType]
         if not isinstance(kind, AutomatonDocument):
             roster.broken |= {str(key), ANY}
-            if kind is None and label != ABSENT:
-                message = f"there is no automaton '{shown(label)}'"
-                symbols.report(given.automaton.place, "HS350", message, did_you_mean(label, document.automata))
             continue
         taken = symbols.names.get(str(key))
         if taken is not None:
