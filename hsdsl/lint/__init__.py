@@ -16,6 +16,7 @@ from hsdsl.errors import Diagnostic
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
+from hsdsl.lint.automata import automata_of
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.ignores import Ignored, sift
 from hsdsl.lint.parts import findings_of_parts
@@ -65,14 +66,21 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     found: list[Diagnostic] = []
     if subject.system.parts:
         found += [_diagnostic(subject, code, finding) for code, finding in findings_of_parts(subject, codes)]
-        codes_of_modes: tuple[str, ...] = ()
+        looks = [(part, code) for part in automata_of(subject) for code in codes if code in part.codes]
     else:
-        codes_of_modes = tuple(codes)
+        looks = [(subject, code) for code in codes]
+    places = set[tuple[object, ...]]()
     with deep_stack():
-        for code in codes_of_modes:
-            found += _findings(subject, code, min(seconds / PARTS, end - time.process_time()))
+        for looked_at, code in looks:
+            made = _findings(looked_at, code, min(seconds / PARTS, end - time.process_time()))
+            found += [one for one in made if _place(one) not in places]
+            places |= set(map(_place, made))  # what another instance of an automaton has as well is said once
     findings, ignored = sift(subject, found, codes)
     return Report(subject.system, findings, ignored)
+
+
+def _place(found: Diagnostic) -> tuple[object, ...]:
+    return found.code, found.span, found.message if found.code == UNDECIDED else ""
 
 
 def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:

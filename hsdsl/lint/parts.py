@@ -1,6 +1,6 @@
 """What lint finds in a system of parts: names that nothing uses, and modes that no instance can be in.
 
-Each automaton is looked at in the whole file. The rules on the mathematics of modes do not look at parts.
+Each automaton is looked at in the whole file. Rules on the mathematics of modes are those of `hsdsl.lint.automata`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hsdsl.source import Key, Mapping, Node, Scalar, Sequence, children
 CODES = ("HS401", "HS402", "HS403", "HS406")
 _WORD = re.compile(r"[^\W\d]\w*")
 _UNUSED = "remove it, or use it"
-_UNKNOWN = "the rules on flows, guards and resets do not look at systems of parts"
+_UNKNOWN = "some rules do not look at systems of parts, and some only at automata that use nothing of others"
 
 
 def findings_of_parts(subject: Subject, codes: abc.Sequence[str]) -> Iterator[tuple[str, Finding]]:

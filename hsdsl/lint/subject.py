@@ -11,6 +11,7 @@ from typing import Any
 from hsdsl import schema
 from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.elaborate import Elaboration
+from hsdsl.errors import Span
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
@@ -32,6 +33,11 @@ class EdgePart:
     index: int
     path: tuple[str | int, ...]
 
+    @property
+    def target_span(self) -> Span:
+        """Where the mode it leads to is written, or the surface of one that stays."""
+        return (self.document.when if self.document.target is None else self.document.to).place.span
+
 
 @dataclass(frozen=True)
 class ModePart:
@@ -43,12 +49,17 @@ class ModePart:
     edges: tuple[EdgePart, ...]
 
 
-def _edges(mode: Mode, key: str, document: schema.ModeDocument) -> tuple[EdgePart, ...]:
-    """The transitions of a mode but its events, which several edges are made of."""
+def edge_parts(mode: Mode, key: str, document: schema.ModeDocument) -> tuple[EdgePart, ...]:
+    """The transitions of a mode that have a surface: neither events nor those that fire together with others."""
     edges = [edge for edge in mode.edges if not edge.of_event]
-    places = [(i, written) for i, written in enumerate(document.transitions) if written.event is None]
+    places = [(i, written) for i, written in enumerate(document.transitions) if _has_surface(written)]
     pairs = zip(edges, places, strict=True)
     return tuple(EdgePart(edge, written, i, ("modes", str(key), "transitions", i)) for edge, (i, written) in pairs)
+
+
+def _has_surface(written: schema.TransitionDocument) -> bool:
+    on = written.on if isinstance(written, schema.PartTransitionDocument) else None
+    return written.event is None and on is None
 
 
 class Subject:
@@ -68,7 +79,7 @@ class Subject:
     def modes(self) -> tuple[ModePart, ...]:
         """Every mode, in file order."""
         pairs = zip(self.system.modes, self.document.modes.items(), strict=False)  # those of events come last
-        return tuple(ModePart(mode, document, key, _edges(mode, key, document)) for mode, (key, document) in pairs)
+        return tuple(ModePart(mode, document, key, edge_parts(mode, key, document)) for mode, (key, document) in pairs)
 
     @property
     def edges(self) -> Iterator[tuple[ModePart, EdgePart]]:

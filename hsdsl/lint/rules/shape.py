@@ -42,7 +42,7 @@ def missing_reset(subject: Subject) -> Iterator[Finding]:
     for part, edge in subject.edges:
         if edge.edge.target == part.mode.name and edge.edge.reset == tuple(map(symbol, part.mode.states)):
             message = f"this transition leads back to '{part.key}' and changes nothing, so it fires again at once"
-            yield Finding(edge.document.to.place.span, message, "write what it does under `reset`")
+            yield Finding(edge.target_span, message, "write what it does under `reset`")
 
 
 def dead_end(subject: Subject) -> Iterator[Finding]:

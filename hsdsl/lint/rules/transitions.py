@@ -44,7 +44,7 @@ def _find_beyond(dynamics: Dynamics, mode: Mode, edge: EdgePart, alike: Alike) -
         then = _next(ModePoint(dynamics, mode, answer.point), edge)
         message = f"the reset of '{edge.edge.name}' {lands} beyond {beyond}: {where}{then}"
         decided, severity = (proof.decided, "warning") if always else (answer.decided, "note")
-        finding = Finding(edge.document.to.place.span, message, None, decided, severity=severity)
+        finding = Finding(edge.target_span, message, None, decided, severity=severity)
         alike.add((carried, edge.edge.surface.residual), finding)
 
 
@@ -96,7 +96,7 @@ def _find_on_guard(dynamics: Dynamics, mode: Mode, edge: EdgePart, landing: Land
     about = [residual, landing.rate, landing.bend if own else None]
     message = f"the reset of '{name}' lands on {on}, and {at(dynamics, mode, answer, about)} {then}"
     decided = "sampled" if "sampled" in (landing.decided, answer.decided) else "symbolic"
-    alike.add(kind, Finding(edge.document.to.place.span, message, None, decided))
+    alike.add(kind, Finding(edge.target_span, message, None, decided))
 
 
 def _stays(here: ModePoint, edge: EdgePart, landing: Landing, order: int) -> bool:
@@ -156,7 +156,7 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
                 f"once '{edge.edge.name}' has fired, it fires again at once, for ever: its reset leaves all as it was"
             )
             hint = "write event: instead of when: to make it once each time, or reset a state that ends it"
-            yield Finding(edge.document.to.place.span, message, hint)
+            yield Finding(edge.target_span, message, hint)
             continue
         for answer in _followed_at_once(subject.dynamics, part.mode, edge.edge):
             here = ModePoint(subject.dynamics, part.mode, answer.point)
@@ -187,7 +187,7 @@ def _cycle_finding(dynamics: Dynamics, mode: Mode, edge: EdgePart, answer: Answe
     follow = "follow each other" if len(edges) > 1 else "follows itself"
     message = f"once '{edge.edge.name}' has fired {where}, {names} {follow} at one instant without end"
     hint = "give them different levels" if len(edges) > 1 else "let its reset lead inside the domain"
-    return Finding(edge.document.to.place.span, message, hint, "sampled")
+    return Finding(edge.target_span, message, hint, "sampled")
 
 
 def _followed_at_once(dynamics: Dynamics, mode: Mode, edge: Edge) -> Iterator[Answer]:

@@ -1,0 +1,83 @@
+"""Rules on automata of systems: what holds in every scope is found, and nothing that others may change."""
+
+from __future__ import annotations
+
+import pytest
+
+from hsdsl.lint import lint
+
+MODEL = """
+hsdsl: 1
+parameters: {g: 9.81}
+automata:
+  ball:
+    parameters: {c: 1/2}
+    modes:
+      fly:
+        flow: {h: v, v: -g}
+        transitions:
+          - {name: bounce, when: h <= 0, reset: {v: -c*v}}
+          - {name: same, when: h <= 0, to: rest}
+          - {name: odd, when: v >= 3, to: rest}
+      rest: {flow: {h: 0}, transitions: [{name: back, when: h >= 1, to: fly, reset: {v: 0}}]}
+  room:
+    inputs: [u]
+    modes:
+      on:
+        flow: {T: 3 - T + u, n: 1}
+        transitions:
+          - {name: off, when: T >= 2, to: off}
+          - {name: never, when: n <= -1, to: off}
+          - {name: maybe, when: T <= 1, if: 2 > 3, to: off}
+      off: {flow: {T: -T, n: 1}, transitions: [{name: cold, when: T >= 2.5, to: on}]}
+system:
+  b: {automaton: ball, initial: {mode: fly, h: 1, v: 0}}
+  r: {automaton: room, initial: {mode: on, T: 0, n: 0}, inputs: {u: b.h}}
+  s: {automaton: room, initial: {mode: on, T: 0, n: 0}, inputs: {u: 2*b.h}}
+experiment: {until: 1}
+"""
+
+
+def found(tmp_path, text: str) -> list[tuple[str, str]]:
+    (tmp_path / "m.yaml").write_text(text)
+    return [(one.code, one.message.split("'")[1] if "'" in one.message else "") for one in
+            lint(tmp_path / "m.yaml").findings if one.severity != "note"]  # fmt: skip
+
+
+def test_what_holds_of_each_automaton(tmp_path):
+    """Shadowed and overlapping guards of the ball, which is alone; what no flow of a room crosses."""
+    assert sorted(found(tmp_path, MODEL)) == [
+        ("HS427", "b.bounce"),
+        ("HS428", ""),
+        ("HS501", "b.back"),
+        ("HS501", "r.cold"),
+        ("HS501", "r.maybe"),
+        ("HS501", "r.never"),
+        ("HS508", "b.bounce"),
+    ]
+
+
+BOUNCE, OFF = "bounce, when: h <= 0, reset: {v: -c*v", "off: {flow: {T: -T, n: 1}"
+OTHERS = {  # what makes a guard one that may fire
+    "others set its state": (BOUNCE, BOUNCE + ", r.n: -2"),
+    "the flow depends on others": (OFF, "off: {flow: {T: u - T, n: 1 - u}"),
+    "it joins others": (OFF + ", transitions: [", OFF + ", transitions: [{on: b.bounce, reset: {T: 5}}, "),
+    "its level depends on others": ("when: T >= 2.5, to", "when: T >= b.h, to"),
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_what_others_may_change_is_no_finding(tmp_path, what):
+    old, new = OTHERS[what]
+    assert old in MODEL
+    kept = "never" if "set its" in what else "cold"
+    assert ("HS501", f"r.{kept}") in found(tmp_path, MODEL)
+    assert ("HS501", f"r.{kept}") not in found(tmp_path, MODEL.replace(old, new))
+
+
+def test_events_of_parts_are_looked_past(tmp_path):
+    text = MODEL.replace("name: odd, when: v >= 3", "name: odd, event: v >= 3").replace(
+        "name: same, when", "name: same, event"
+    )
+    codes = found(tmp_path, text)
+    assert ("HS501", "b.odd") not in codes and ("HS427", "b.bounce") not in codes
