@@ -1,5 +1,6 @@
 /* Taylor's method for the forced oscillator with stop, with the model written into its recurrences: what a person might
-   write who wants this one answer fast. All impacts in a step are isolated (Bernstein form); samples go to `out`. */
+   write who wants this one answer fast. All impacts in a step are isolated (Bernstein form); samples go to `out`. An
+   impact slower than `rest` while the force presses ends the flight: the mass is held until the force lets go. */
 
 #include <math.h>
 
@@ -70,20 +71,32 @@ static double first_rise(const double *c, int n) {
   return 2.0;
 }
 
+/* When f cos(u t) falls through a force, behind t. */
+static double release(double f, double u, double force, double t) {
+  const double turn = 2 * acos(-1.0), phase = acos(force / f), end = (floor(u * t / turn) * turn + phase) / u;
+  return end > t ? end : end + turn / u;
+}
+
 /* Returns the number of impacts. */
-int taylor(double a, double c, double f, double w, double x, double v, double tolerance, double until, int samples,
-           const double *times, double *out) {
-  const double stop = 14.0, u = 2.5, stiffness = w * w, damping = 2 * a;
+int taylor(double a, double c, double f, double w, double u, double stop, double x, double v, double rest,
+           double tolerance, double until, int samples, const double *times, double *out) {
+  const double stiffness = w * w, damping = 2 * a;
   const int n = (int)ceil(3 - 0.5 * log(tolerance));
   double t = 0.0;
-  int next = 0, impacts = 0, standing = 0;
+  int next = 0, impacts = 0, standing = x == stop, landed = standing, released = 0;
   while (t < until) {
+    if (landed && fabs(v) <= rest && f * cos(u * t) > stiffness * stop) {
+      t = fmin(release(f, u, stiffness * stop, t), until), v = 0.0;
+      for (; next < samples && times[next] <= t; next++) out[next] = stop;
+      landed = 0, released = 1;
+      continue;
+    }
     double X[MOST + 2], V[MOST + 2], C[MOST + 2], S[MOST + 2], P[MOST + 1];
     X[0] = x, V[0] = v, C[0] = cos(u * t), S[0] = sin(u * t);
     for (int k = 0; k <= n; k++) {
       const double share = 1.0 / (k + 1);
       X[k + 1] = V[k] * share;
-      V[k + 1] = (f * C[k] - damping * V[k] - stiffness * X[k]) * share;
+      V[k + 1] = released && k == 0 ? 0.0 : (f * C[k] - damping * V[k] - stiffness * X[k]) * share;
       C[k + 1] = -u * S[k] * share;
       S[k + 1] = u * C[k] * share;
     }
@@ -104,7 +117,7 @@ int taylor(double a, double c, double f, double w, double x, double v, double to
     }
     double y = V[n], z = X[n];
     for (int k = n - 1; k >= 0; k--) y = V[k] + length * y, z = X[k] + length * z;
-    t = end, standing = s <= 1;
+    t = end, standing = landed = s <= 1, released = 0;
     if (standing)
       x = stop, v = -c * y, impacts++;
     else
