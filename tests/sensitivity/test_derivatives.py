@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 import yaml
+from engines import needs_compiler
 
 import hsdsl
 from hsdsl import UsageError
@@ -147,6 +148,14 @@ def test_implicit_steps_of_derivatives_share_factors(monkeypatch: pytest.MonkeyP
     assert sum(each.derived for each in made) <= 2 * len(found.execution.arcs)
     assert sum(each.factorings for each in made) < steps / 3
     assert sum(each.iterations for each in made) < 2 * steps
+
+
+@needs_compiler
+def test_engines_agree_on_derivatives() -> None:
+    """To the last bit: compiled series sum products that share a factor in one loop."""
+    model, wrt = hsdsl.load("models/gallery/lorenz-section.yaml"), "sigma,rho,initial.y"
+    python, compiled = (model.sensitivity(wrt, until=0.2, engine=engine).execution for engine in ("python", "c"))
+    assert np.array_equal(python.values, compiled.values, equal_nan=True)
 
 
 def test_oscillator() -> None:

@@ -7,10 +7,11 @@ each coefficient is written by pieces (`pieces`), which the functions of motions
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
 from hsdsl.backends.c.printer import expression
+from hsdsl.backends.c.shared import Shared, shared
 from hsdsl.backends.tape import Language, coefficient_of, value_of
 from hsdsl.program import Tape
 
@@ -88,7 +89,7 @@ def flow_lines(tape: Tape, dimension: int) -> str:
     own = range(first, first + tape.needed)
     values = [f"l{i}[0] = {value(i)};" for i in states] + _straight(_values(tape, own, first, value))
     values += [f"hs_real w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
-    coefficients = _straight(_coefficients(tape, own, first, newest))
+    coefficients = _straight(_coefficients(tape, own, first, newest), shared(tape, own, first))
     coefficients += [f"const hs_real u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
     coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
     return _filled(_FLOW, values, coefficients)
@@ -136,9 +137,15 @@ def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> 
     return _CALLS.format(calls=f"(k ? {coefficients_text} : {values_text}) || {states_text}"), parts
 
 
-def _straight(texts: list[tuple[int, str]]) -> list[str]:
-    """The statements for lines that are variables too, ``v``."""
-    return [part for i, text in texts for part in (f"const hs_real v{i} = {text};", f"l{i}[@] = v{i};")]
+def _straight(texts: list[tuple[int, str]], groups: Sequence[Shared] = ()) -> list[str]:
+    """The statements for lines that are variables too, ``v``; those of products that share a factor together."""
+    loops = {group.products[0]: group.loop() for group in groups}
+    summed = {i for group in groups for i in group.products}
+    found: list[str] = []
+    for i, text in texts:
+        found += loops.get(i, [])
+        found += [f"const hs_real v{i} = {f'low{i} + high{i}' if i in summed else text};", f"l{i}[@] = v{i};"]
+    return found
 
 
 def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
