@@ -18,7 +18,7 @@ import numpy as np
 HEADERS = ("hs.h", "hs_simulate.h", "hs_screen.h")
 FOLDER = Path(__file__).parent / "c"
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-ENUMERATION = re.compile(r"typedef enum \{([^}]*)\} (\w+);")
+ENUMERATION = re.compile(r"typedef enum \{([^}=]*)\} (\w+);")  # those that count from 0
 STRUCTURE = re.compile(r"typedef struct(?: \w+)? \{([^}]*)\} (\w+);")
 CALLBACK = re.compile(r"int \(\*(\w+)\)\(([^)]*)\)")
 DECLARATOR = re.compile(r"(\**)(?:const )?(\**)(\w+)((?:\[\d+\])*)")
