@@ -13,12 +13,20 @@ static void fill_binomials(hs_real *row, int most) {
     for (int k = 0; k <= n; k++) row[k] = k == 0 || k == n ? 1.0 : (row - n)[k - 1] + (row - n)[k];
 }
 
-/* Bernstein coefficients on [0, 1] of a polynomial. */
+/* Bernstein coefficients on [0, 1] of a polynomial: n times each has the one before added to it, of which the first
+   more stay each time. Two such passes are made in one. */
 HS_INLINE void fill_bernstein(const hs_run *run, const hs_real *c, int n, hs_real *b) {
   const hs_real *choose = binomials(run, n);
   for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
-  for (int k = 1; k <= n; k++)
-    for (int i = n; i >= k; i--) b[i] = b[i] + b[i - 1];
+  for (int k = 1; k <= n; k += 2) {
+    hs_real before = b[k], once = before + b[k - 1];
+    b[k] = once;
+    for (int i = k + 1; i <= n; i++) {
+      const hs_real own = b[i], sum = own + before;
+      b[i] = sum + once;
+      before = own, once = sum;
+    }
+  }
 }
 
 /* Those of a polynomial of the step's curves, made once for each. */
