@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -23,6 +24,21 @@ VERBS = (
     "stability", "complete", "export", "import", "schema", "doctor",
 )  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
+_UNKNOWN = re.compile(r"No such (?:option|command):? '?([\w-]+)")
+_OF_OTHERS = {
+    "run": "simulate sim solve start",
+    "validate": "check verify parse",
+    "plot": "draw show view",
+    "export": "convert codegen generate compile build",
+    "--until": "--t_end --t-end --tend --end --time --duration --tmax --stop --stop-time --horizon",
+    "--set": "--param --params --parameter --parameters --override --initial --init --define -D -p",
+    "--out": "--output --save --outfile --csv -o",
+    "--plot": "--figure --fig --show --png",
+    "--tolerance": "--tol --rtol --atol --reltol --abstol",
+    "--step": "--dt --stepsize --step-size -h",
+    "--method": "--solver --integrator",
+    "--vary": "--sweep --grid --range",
+}
 SETTINGS = {"help_option_names": ["--help", "-h"], "show_default": True}
 
 
@@ -122,7 +138,19 @@ def _report(error: Any, words: list[str]) -> int:
     else:
         error.message = visible(error.message) if words else error.message  # else the help text
         error.show(sys.stderr)
+        if meant := _meant(error):
+            print(f"  hint: write {meant}", file=sys.stderr)
     return error.exit_code
+
+
+def _meant(error: Any) -> str | None:
+    """The command or option that has another name in other tools."""
+    name = _UNKNOWN.search(error.message)
+    options = {each for option in getattr(getattr(error.ctx, "command", None), "params", ()) for each in option.opts}
+    known = {*VERBS, *options}
+    return next(
+        (own for own, others in _OF_OTHERS.items() if name and name[1] in others.split() and own in known), None
+    )
 
 
 def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:

@@ -19,7 +19,7 @@ from hsdsl.schema.shapes import KINDS
 from hsdsl.schema.spelling import correct_spelling
 from hsdsl.schema.suggestions import key_meant, missing_key_hint, part_of_transition, path_meant, unknown_key_hint
 from hsdsl.schema.value_suggestions import assigned, undifferentiated
-from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange, descend, keys
+from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange, child, descend, keys
 
 _MOST_READINGS = 8
 _TAGS = "|".join(("expression", "mapping", "list", "samples", "file", *KINDS))  # of a union; no key in the file
@@ -134,7 +134,17 @@ def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:
     message, hint, last = context["message"], context.get("hint"), _untagged(path)[-1]
     if code == "HS121" and isinstance(last, str):
         message, hint = f"'{shown(last)}' has no value", f"write {shown(last)}: and {hint}"
+    if code == "HS203" and (each := _by_modes(root, _untagged(path))):
+        hint = each
     return place.diagnostic(code, message, hint)
+
+
+def _by_modes(root: Node, path: NodePath) -> str | None:
+    """The hint for a value of the whole file that is given mode by mode."""
+    value, modes = descend(root, path), keys(child(root, "modes"))
+    if len(path) != 2 or path[0] not in ("outputs", "let") or not keys(value) or not {*keys(value)} <= {*modes}:
+        return None
+    return f"give it in each mode, as {path[0]}: {{{shown(str(path[1]))}: ...}} below {shown(keys(value)[0])}"
 
 
 def _unknown_key(root: Node, path: NodePath) -> Diagnostic:

@@ -130,6 +130,10 @@ def _of(name: str, value: Any, number: NumberOf) -> Grid | Draw:
 
 def _grid(name: str, text: str, number: NumberOf) -> Grid:
     where = f"--vary {name}"
+    if text.startswith(("[", "(", "{")) and text[1:-1].count(","):
+        raise UsageError(
+            f"{where}: expected values with commas alone, got '{shown(text)}'", f"--vary {name}={text[1:-1]}"
+        )
     if ":" not in text:
         return _checked(Grid(name, tuple(number(part.strip(), where) for part in text.split(","))))
     parts = [part.strip() for part in text.split(":")]

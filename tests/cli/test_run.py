@@ -139,6 +139,23 @@ def test_wrong_usage(command, model, name):
     assert answer.code == 2 and words in answer.err and answer.out == ""
 
 
+HABITS = {
+    ("simulate", "m.yaml"): "write run",
+    ("run", "m.yaml", "--t_end", "3"): "write --until",
+    ("run", "m.yaml", "--param", "c=3"): "write --set",
+    ("sweep", "m.yaml", "--vary", "c=[1,2]", "--out", "x"): "--vary c=1,2",
+}
+
+
+@pytest.mark.parametrize("words", HABITS)
+def test_habits_of_other_tools_are_answered(command, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.yaml").write_text(BALL)
+    answer = command(*words)
+    assert answer.code == 2 and f"hint: {HABITS[words]}" in answer.err
+    assert "hint" not in command("lint", "m.yaml", "--t_end", "3").err  # it has no end of a run
+
+
 def test_unreadable_file(command, tmp_path):
     for path in (tmp_path / "none.yaml", tmp_path):
         answer = command("run", path)
