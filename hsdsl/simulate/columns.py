@@ -87,6 +87,11 @@ class Gathered:
         return self._arrays[name]
 
     @property
+    def notes(self) -> int:
+        """How many notes there are."""
+        return len(self._arrays["note"])
+
+    @property
     def where(self) -> Where:
         """Where they are."""
         of = self._arrays
@@ -153,6 +158,11 @@ class Packed:
         if name in ("before", "after"):
             return raw.reshape(k, shape.width)
         return raw.reshape(n, shape.degree, self._width) if name == "coefficients" else raw
+
+    @property
+    def notes(self) -> int:
+        """How many notes there are."""
+        return self._counts.notes
 
     @property
     def where(self) -> Where:

@@ -134,7 +134,7 @@ class CompiledRun:
     def diagnostics(self) -> Diagnostics:
         """What the run has noted; most runs note nothing."""
         diagnostics = Diagnostics()
-        if self._columns is not None:
+        if self._columns is not None and self._columns.notes:
             self._note(self._columns["note"], diagnostics)
         return diagnostics
 

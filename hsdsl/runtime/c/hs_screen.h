@@ -80,7 +80,7 @@ typedef enum {
 } hs_doubt;
 
 /* What needs a closer look at a transition; and that tied ones commute. */
-typedef enum { LOOK_AT_CROSSING = 1, LOOK_AT_RESET = 2, COMMUTES = 4 } hs_look_at;
+enum { HS_LOOK_AT_CROSSING = 1, HS_LOOK_AT_RESET = 2, HS_COMMUTES = 4 };
 
 typedef struct {
   const hs_model *model;
@@ -93,7 +93,7 @@ typedef struct {
   double until, relaxation, tolerance;
   int32_t taylor;           /* whether pieces are Taylor polynomials */
   double *workspace;        /* hs_screen_room() numbers */
-  int32_t *crossing;        /* (transition): an hs_look_at, or 0 */
+  int32_t *crossing;        /* (transition): HS_LOOK_AT_... and HS_COMMUTES */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
   int32_t marks;            /* those of `crossing` together */

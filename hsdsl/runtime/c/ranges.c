@@ -152,7 +152,7 @@ static hs_disc disc_reciprocal(hs_disc a) {
 
 /* Of the powers of z in sqrt(c + z) and log(c + z) all coefficients but the first are those of sqrt(c - z) and
    -log(c - z) up to their sign, so a change is largest at z = -r. sin(c + z) - sin(c) = sin(c) (cos(z) - 1)
-   + cos(c) sin(z), and |cos(z) - 1| <= cosh(r) - 1, |sin(z)| <= sinh(r). tanh is 1 - 2/(1 + exp(2 z)). */
+   + cos(c) sin(z), and |cos(z) - 1| <= cosh(r) - 1, |sin(z)| <= sinh(r), which e = exp(r) - 1 gives. tanh is 1 - 2/(1 + exp(2 z)). */
 static hs_disc disc_of(const hs_operation *o, hs_disc a, hs_disc b) {
   const double c = a.centre, r = a.radius;
   switch (o->kind) {
@@ -169,8 +169,12 @@ static hs_disc disc_of(const hs_operation *o, hs_disc a, hs_disc b) {
   case HS_SQRT: return r < c ? disc(sqrt(c), sqrt(c) - sqrt(c - r)) : anywhere;
   case HS_EXP: return disc(exp(c), exp(c) * expm1(r));
   case HS_LOG: return r < c ? disc(log(c), -log1p(-r / c)) : anywhere;
-  case HS_SIN: return disc(sin(c), fabs(sin(c)) * (cosh(r) - 1) + fabs(cos(c)) * sinh(r));
-  case HS_COS: return disc(cos(c), fabs(cos(c)) * (cosh(r) - 1) + fabs(sin(c)) * sinh(r));
+  case HS_SIN:
+  case HS_COS: {
+    const double more = expm1(r), rise = more * more / (2 * (1 + more)), turn = (more + more / (1 + more)) / 2;
+    const double here = o->kind == HS_SIN ? sin(c) : cos(c), across = o->kind == HS_SIN ? cos(c) : sin(c);
+    return disc(here, fabs(here) * rise + fabs(across) * turn);
+  }
   case HS_TANH: {
     const hs_disc grown = disc(1 + exp(2 * c), exp(2 * c) * expm1(2 * r)), part = disc_reciprocal(grown);
     return disc(1 - 2 * part.centre, 2 * part.radius);

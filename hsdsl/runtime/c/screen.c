@@ -72,10 +72,10 @@ static void look_at_all(hs_view *v) {
   if (undecided_end(v)) s->doubts |= DOUBT(HS_ENDING);
   for (int64_t j = 0; j < s->run.transitions; j++) {
     if (made[j].alternatives) {
-      if (any_order(v, j)) s->crossing[j] |= COMMUTES;
+      if (any_order(v, j)) s->crossing[j] |= HS_COMMUTES;
       else s->doubts |= DOUBT(HS_CHOICE);
     }
-    if (jumps_close(v, &made[j])) s->crossing[j] |= LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
+    if (jumps_close(v, &made[j])) s->crossing[j] |= HS_LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
     s->marks |= s->crossing[j];
   }
   for (int i = 0; i < s->model->modes; i++) {

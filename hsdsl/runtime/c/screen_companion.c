@@ -82,7 +82,10 @@ static int accompany(hs_view *v) {
       if ((h > 0 || jumps) && expand_companion(&c)) return 0;
       if (h > 0) companion_at(&c, h, c.y);
       else copy(c.y, c.x, c.table->dimension);
-      for (int i = 0; i < c.table->dimension; i++) measured[i] = fabs(x[i] - c.y[i]);
+      for (int i = 0; i < c.table->dimension; i++) {
+        measured[i] = fabs(x[i] - c.y[i]);
+        if (!hs_finite(measured[i])) return 0;
+      }
       if (jumps && (jump != followed++ || !companion_jumps(v, &c, jump, h, measured))) return 0;
       if (jumps || !(h > 0)) continue;
       copy(c.x, c.y, c.table->dimension);

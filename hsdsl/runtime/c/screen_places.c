@@ -3,13 +3,6 @@
 
 #include "screen_view.h"
 
-/* Round-off of a surface at a point, of which the gradient is known. */
-static double noise_of(const hs_view *v, double magnitude, double t, const double *x) {
-  for (int i = 0; i < v->row->count; i++)
-    magnitude += fabs(v->gradient[i]) * fabs(v->row->place[i] ? x[v->row->place[i] - 1] : t);
-  return ROUNDOFF_UNITS * HS_UNIT * magnitude;
-}
-
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
 static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
   const hs_sparse *const row = v->row = &v->table->gradients[k];
@@ -124,7 +117,7 @@ static void look_at_crossing(hs_view *v, int64_t j, int flown) {
     int flat = 1;
     for (int i = 0; i < v->row->count; i++) flat &= v->gradient[i] == 0.0;
     if (flat || !(found.rate > rate_noise(v)) || v->table->edge[made->edge].conditional)
-      s->crossing[j] |= LOOK_AT_CROSSING;
+      s->crossing[j] |= HS_LOOK_AT_CROSSING;
     if (flown) {
       const double begin = s->run.times[row], middle = begin + (s->run.times[v->last] - begin) / 2;
       bind(v, v->mode, segment_at(s->timeline, middle));
@@ -140,7 +133,7 @@ static void look_at_crossing(hs_view *v, int64_t j, int flown) {
   }
   const double depth = bend > 0 ? found.rate * found.rate / (2 * bend) : INFINITY;
   const double margin = found.shift > 0 ? depth / found.shift : INFINITY;
-  if (!(margin >= SAFE)) s->crossing[j] |= LOOK_AT_CROSSING;
+  if (!(margin >= SAFE)) s->crossing[j] |= HS_LOOK_AT_CROSSING;
   s->slowest = hs_min(s->slowest, found.rate);
   s->least = hs_min(s->least, margin);
 }

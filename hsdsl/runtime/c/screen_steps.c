@@ -211,8 +211,8 @@ static void enclose_in_discs(hs_view *v, int64_t row, double size) {
   const int d = s->run.degree, w = s->run.width;
   v->disc[0] = disc(s->run.times[row], size * (s->run.times[row + 1] - s->run.times[row]));
   for (int i = 0; i < v->n; i++) {
-    double radius = 0.0;
-    for (int k = d - 1; k >= 0; k--) radius = size * (fabs(c[k * w + i]) + radius);
+    double radius = 0.0, power = size;
+    for (int k = 0; k < d; k++, power *= size) radius += fabs(c[k * w + i]) * power;
     v->disc[1 + i] = disc(x[i], radius);
   }
   disc_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->disc);

@@ -5,16 +5,6 @@
 #define SAME 1e-9  /* relative to the largest size that a state has in the run: one point */
 #define LONGEST 64 /* transitions at one instant */
 
-static double noise_of(const hs_view *v, double magnitude, double t, const double *x);
-
-/* The point at which transitions go, and the time within which other surfaces are reached together with it. */
-typedef struct {
-  int mode;
-  double t;
-  const double *x;
-  double since;
-} hs_tied;
-
 /* Where a transition leads, with those that follow at once. */
 typedef struct {
   int mode, dimension;

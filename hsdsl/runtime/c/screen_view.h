@@ -53,6 +53,14 @@ typedef struct {
   double value, rate, noise, shift;
 } hs_judged;
 
+/* The point at which transitions go, and the time within which other surfaces are reached together with it. */
+typedef struct {
+  int mode;
+  double t;
+  const double *x;
+  double since;
+} hs_tied;
+
 static const double *recorded_piece(const hs_record *run, int64_t row) {
   return run->pieces + row * run->degree * run->width;
 }
@@ -119,5 +127,12 @@ static double late_by(const hs_view *v, double t) {
 }
 
 static double resumed(const hs_transition *made) { return made->resumed == made->resumed ? made->resumed : made->time; }
+
+/* Round-off of a surface at a point, of which the gradient is known. */
+static double noise_of(const hs_view *v, double magnitude, double t, const double *x) {
+  for (int i = 0; i < v->row->count; i++)
+    magnitude += fabs(v->gradient[i]) * fabs(v->row->place[i] ? x[v->row->place[i] - 1] : t);
+  return ROUNDOFF_UNITS * HS_UNIT * magnitude;
+}
 
 #endif

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -81,11 +82,6 @@ def is_compiled(run: Execution) -> bool:
     return run.__dict__.get("_of") is not None
 
 
-def empty(rows: int, width: int, transitions: int) -> Companion:
-    """Give memory for what is found."""
-    return Companion(np.empty((rows, width)), np.empty(transitions + 1))
-
-
 def order_of(method: Any) -> int:
     """The order of the companion's series, which have one coefficient more."""
     return method.order + MORE - 1
@@ -143,6 +139,8 @@ class _Follower:
                 self.x, self.t = y, times[row] + shift
 
     def _enter(self, row: int, x: Any, y: State) -> None:
+        if not all(map(isfinite, y)):
+            raise _Lost
         away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
         self.apart[row, : len(y)] = np.fmax(self.apart[row, : len(y)], away)
 

@@ -18,7 +18,7 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.companion import ENDED, empty, is_compiled, order_of
+from hsdsl.simulate.verdict.companion import ENDED, Companion, is_compiled, order_of
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
@@ -43,35 +43,48 @@ class Screen:
         record = _record(run.columns)
         method = problem.settings.method
         assert method is not None
-        if finer is None:
-            self.companion = found = empty(record.rows, record.width, record.transitions)
-            held = {"measured": found.apart.ctypes.data, "late": found.late.ctypes.data, "order": order_of(method)}
-        else:
-            held = {"finer": _record(finer.columns)}
         self.table = table = structures.Screen(
             model=ctypes.addressof(model.table),
             timeline=plan.timeline,
             formulas=ctypes.addressof(formulas.table),
             run=record,
-            **held,
             until=problem.settings.until,
             relaxation=problem.settings.relaxation,
             tolerance=problem.settings.tolerance,
             taylor=method.kind == "taylor",
         )
-        rows, arcs, made = table.run.rows, table.run.arcs, table.run.transitions
+        if finer is None:
+            table.order = order_of(method)
+        else:
+            table.finer = _record(finer.columns)
+        self._lay(record, finer is None)
+        runtime().hs_look(ctypes.addressof(table))
+        self._first = run.columns
+        self._modes: tuple[ModeProgram, ...] = problem.program.modes
+
+    def _lay(self, record: Any, accompanied: bool) -> None:
+        """Give the table memory for what it finds: columns of marks, then what a companion is apart, and scratch."""
+        table, rows, arcs, made = self.table, record.rows, record.arcs, record.transitions
         self._ends = 0, made, made + arcs, made + 2 * arcs, made + 2 * arcs + rows, made + 2 * (arcs + rows)
-        self._marks = np.empty(self._ends[-1], np.int32)
-        start = self._marks.ctypes.data
+        self._sizes = (self._ends[-1] + 1) // 2, rows * record.width, made + 1
+        room = runtime().hs_screen_room(ctypes.addressof(table))
+        self._memory = np.empty(sum(self._sizes if accompanied else self._sizes[:1]) + room)
+        start = self._memory.ctypes.data
         table.crossing, table.landing, table.ending, table.turning, table.changing = (
             start + 4 * end for end in self._ends[:-1]
         )
-        library = runtime()
-        workspace = np.empty(library.hs_screen_room(ctypes.addressof(table)))
-        table.workspace = workspace.ctypes.data
-        library.hs_look(ctypes.addressof(table))
-        self._first = run.columns
-        self._modes: tuple[ModeProgram, ...] = problem.program.modes
+        table.workspace = start + 8 * self._sizes[0]
+        if accompanied:
+            table.measured = table.workspace
+            table.late = table.measured + 8 * self._sizes[1]
+            table.workspace = table.late + 8 * self._sizes[2]
+
+    @property
+    def companion(self) -> Companion:
+        """How far the run is from its companion; only of a run that is held against one."""
+        first, apart, late = self._sizes
+        of_rows, rest = np.split(self._memory[first : first + apart + late], [apart])
+        return Companion(of_rows.reshape(self.table.run.rows, self.table.run.width), rest)
 
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
@@ -82,7 +95,8 @@ class Screen:
     def marked(self, name: str) -> Array:
         """The marks of a column by transition, arc or row."""
         place = ("crossing", "landing", "ending", "turning", "changing").index(name)
-        return self._marks[self._ends[place] : self._ends[place + 1]]
+        marks = self._memory[: self._sizes[0]].view(np.int32)
+        return marks[self._ends[place] : self._ends[place + 1]]
 
     @cached_property
     def first_rows(self) -> Array:
@@ -129,7 +143,7 @@ def screened(problem: Problem, run: Execution, finer: Execution | None) -> Scree
     other: Any = finer and finer.__dict__["_of"]
     if run.stop.reason not in ENDED or (finer and finer.stop.reason != run.stop.reason):
         return None
-    if one.columns.made.notes or (other and other.columns.made.notes):
+    if one.columns.notes or (other and other.columns.notes):
         return None
     screen = Screen(problem, one, other)
     return None if screen.doubts("parted", "accumulation") else screen
