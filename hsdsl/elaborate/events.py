@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
-from math import prod
+from itertools import pairwise
 from typing import Any
 
 from hsdsl.expression.scope import symbol
@@ -107,7 +107,7 @@ class _Event:
     @property
     def full(self) -> Any:
         """1 where as many executions wait as can, else 0."""
-        return prod((slot.waits for slot in self.slots), start=ONE) if self.slots else ZERO
+        return self.slots[-1].waits if self.slots else ZERO
 
     @cached_property
     def symbols(self) -> frozenset[Any]:
@@ -316,9 +316,9 @@ def _edges(event: _Event, highest: Any | None) -> Iterator[Draft]:
         due = event.symbol("due")
         if highest is not None and not event.slots:
             due *= below(event.priority - highest, ZERO, ZERO, ONE)
-        yield _when_due(fires, event, due * (1 - event.full)), event, None
+        yield _when_due(fires, event, due - event.full), event, None
         if event.slots:
-            yield _when_due(_overflowing(fires, event), event, due * event.full), None, None
+            yield _when_due(_overflowing(fires, event), event, due + event.full - 1), None, None
     for slot in event.slots:
         made = _executes(event, slot)
         yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
@@ -331,7 +331,7 @@ def _edges(event: _Event, highest: Any | None) -> Iterator[Draft]:
 
 
 def _when_due(edge: Edge, event: _Event, truth: Any) -> Edge:
-    """An edge that goes where a number is 1."""
+    """An edge that goes where a number is 1, and not where it is 0 or less."""
     surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
     return replace(edge, surface=surface, condition=None, condition_text=None)
 
@@ -347,16 +347,16 @@ def _text(event: _Event) -> str:
 
 
 def _waits(event: _Event) -> Values:
-    """The values where an event is triggered: the first execution that does not wait yet waits."""
+    """The values where an event is triggered: the first slot that is free gets the execution that waits."""
     delay = maximum(event.delay, ZERO) if event.delay != 0 else ZERO
     given = dict(zip(event.edge.target_states, event.edge.reset, strict=True))
-    values, before = Values(), ONE  # 1 where all slots before wait
+    values, before = Values(), ONE  # 1 where the slot before is taken
     for slot in event.slots:
         taken = before * (1 - slot.waits) if len(event.slots) > 1 else ONE
         new = {slot.at.name: TIME + delay} | {name: given[state] for state, name in slot.values.items()}
         values |= {slot.waits.name: ONE if taken == 1 else maximum(slot.waits, before)}
         values |= _chosen(event, taken, new, {name: symbol(name) for name in new})
-        before *= slot.waits
+        before = slot.waits
     return values
 
 
@@ -374,12 +374,15 @@ def _staying(event: _Event, name: str, values: Values) -> Edge:
 
 
 def _executes(event: _Event, slot: _Slot) -> Edge:
-    """The edge that gives the states, after the delay, the values that were stored."""
+    """The edge that gives the states, after the delay, the values that were stored; later slots move up."""
     edge, waiting = replace(event.edge, event=None), slot.waits.name
     values = dict(zip(edge.target_states, edge.reset, strict=True))
     values |= {state: symbol(name) for state, name in slot.values.items()}
     if edge.target == event.mode.name:
-        values[waiting] = ZERO
+        rest = event.slots[event.slots.index(slot) :]
+        for one, following in pairwise(rest):
+            values |= dict(zip(one.states, map(symbol, following.states), strict=True))
+        values[rest[-1].waits.name] = ZERO
     surface = event.surface(TIME, slot.at, f"t >= {slot.at.name}")
     states, reset = tuple(values), tuple(values.values())
     edge = replace(edge, surface=surface, condition=at_least(slot.waits, HALF), target_states=states, reset=reset)
