@@ -19,6 +19,7 @@ from typing import Literal
 from hsdsl.parts import Part
 from hsdsl.sparsity import Elimination, elimination
 
+LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
 JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
 Hold = Literal["zero", "linear"]
 
@@ -107,8 +108,9 @@ class EdgeProgram:
     ``conditional`` says whether it has an `if`, and ``condition_text`` how that is written.
     ``changes`` are the states of the target that the reset gives a value, by number, and ``change_texts`` how that is
     written; the others keep theirs, which is so only where the mode has the same states as the target.
-    ``contact`` is the number, among `Program.flows`, of the motion along its guard; None where there is none.
-    ``releases`` says that the edge ends such a motion, ``of_event`` that it is part of an event.
+    ``contact`` is the number of the motion along its guard in the mode; None where there is none. ``push_order`` is the
+    derivative of the guard along the flow that presses then. ``releases`` is the contact that an edge of
+    `ModeProgram.held` ends; ``of_event`` says that the edge is part of an event.
     """
 
     name: str
@@ -122,7 +124,8 @@ class EdgeProgram:
     change_texts: tuple[str, ...]
     condition_text: str = ""
     contact: int | None = None
-    releases: bool = False
+    push_order: int = 0
+    releases: int | None = None
     of_event: bool = False
 
     @property
@@ -183,7 +186,7 @@ class ModeProgram:
     ``diagnosis`` has one routine ``expression_K`` for each of ``expressions`` (flows, surfaces, conditions as a person
     knows them), to tell which of them has no finite value.
 
-    ``push_order`` is given for a motion along a guard: the derivative of the guard along the flow that pushes.
+    ``held`` is the number, among `Program.flows`, of this mode where guards hold the state.
     ``slides`` names the two modes between which a mode of a completion slides.
     """
 
@@ -200,7 +203,7 @@ class ModeProgram:
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines
-    push_order: int = 0
+    held: int | None = None
     slides: tuple[str, ...] = ()
 
     @cached_property
@@ -232,8 +235,9 @@ class Program:
     of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
     of its slope. A switch depends on earlier ones only.
 
-    ``contacts`` are motions along guards of modes: each has the name, states and walls of its mode and, in the place of
-    the edge that it is in contact with, one that releases it.
+    ``contacts`` are modes with motion along their guards. Such a mode takes one more number of ``contact_count`` for
+    each of its contacts, ``d_i``: 0 without, 1 where the surface of its edge is the push on the guard, negative, and 2
+    where the flow is constrained, too. Edges behind those of the mode are where an `if` may end a contact.
 
     A system of parts has one mode, whose last states are the numbers of the modes of ``parts`` (`hsdsl.parts`).
 
@@ -268,8 +272,13 @@ class Program:
 
     @property
     def flows(self) -> tuple[ModeProgram, ...]:
-        """The modes, then the motions along guards: what a kernel has routines for."""
+        """The modes, then those with motion along guards: what a kernel has routines for."""
         return self.modes + self.contacts
+
+    @property
+    def contact_count(self) -> int:
+        """How many contacts the mode with most has."""
+        return max((sum(edge.contact is not None for edge in mode.edges) for mode in self.modes), default=0)
 
     @property
     def all_states(self) -> tuple[str, ...]:

@@ -1,12 +1,14 @@
 """Completions of a system: flows for states that its own flows and resets hold on a guard.
 
-`contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions.
+`contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions;
+`nearby` what it depends on, and `overlay` those of all edges of a mode in one.
 `sliding` is motion on a surface that two modes press on.
 """
 
 from __future__ import annotations
 
-from hsdsl.completion.contact import Contact, contact, contacts
+from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.overlay import Overlay, overlay
 from hsdsl.completion.sliding import Sliding, slidings, with_sliding
 
-__all__ = ["Contact", "Sliding", "contact", "contacts", "slidings", "with_sliding"]
+__all__ = ["Contact", "Overlay", "Sliding", "contact", "overlay", "slidings", "with_sliding"]

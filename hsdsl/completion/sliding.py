@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from hsdsl.completion.contact import along, cancelled, zero_surface
+from hsdsl.completion.contact import zero_surface
+from hsdsl.completion.nearby import along, cancelled
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, HybridSystem, Mode

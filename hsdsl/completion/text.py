@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import sympy as sp
 
-from hsdsl.completion.contact import LONG, Contact, cancelled, contact
+from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.nearby import LONG, cancelled
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import Sliding, slidings
 from hsdsl.expression.scope import symbol
@@ -76,7 +77,7 @@ class _Writer:
 
     def add_contact(self, mode: Mode, found: Contact) -> tuple[Mode, str]:
         """Add the transition into a motion along a guard; return its mode and the name of that."""
-        (k,) = found.edges
+        k = found.edge
         edge = mode.edges[k]
         label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
         name = self._free(re.sub(r"\W", "_", label))
@@ -161,7 +162,7 @@ def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple
 
     It is on the guard, or beyond it by a depth: where the `if` ends, the guard is one that the state has passed.
     """
-    r = mode.edges[found.edges[-1]].surface.residual
+    r = mode.edges[found.edge].surface.residual
     off = (r if found.order == 2 else sp.S.Zero) - depth
     slopes = [sp.diff(r, symbol(name)) for name in mode.states]
     size = sum(slope**2 for slope in slopes)

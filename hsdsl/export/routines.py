@@ -52,10 +52,11 @@ def _names_a_parameter(part: ast.stmt) -> bool:
 
 
 def data_names(program: Program) -> list[str]:
-    """Names of the numbers that a mode is bound to: parameters, the line of each input's segment, switches."""
+    """Names of the numbers that a mode is bound to: parameters, lines of segments of inputs, switches, contacts."""
     names = [f"p{i}" for i in range(len(program.parameters))]
     names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
-    return names + [f"k{i}" for i in range(len(program.switches))]
+    names += [f"k{i}" for i in range(len(program.switches))]
+    return names + [f"d{i}" for i in range(program.contact_count)]
 
 
 def parameters_in(*nodes: ast.AST) -> set[int]:

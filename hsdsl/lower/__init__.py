@@ -13,7 +13,7 @@ import sympy as sp
 
 from hsdsl import limits
 from hsdsl import program as lowered
-from hsdsl.completion import contacts
+from hsdsl.completion import Overlay, overlay
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
@@ -90,32 +90,33 @@ def _lower(system: HybridSystem) -> lowered.Program:
 
 
 def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
-    """The modes, and the motions along their guards."""
+    """The modes, and those with motion along their guards."""
     modes: list[lowered.ModeProgram] = []
     held: list[lowered.ModeProgram] = []
     for mode in system.modes:
-        found = contacts(mode, numbered(system.parts))
-        numbers = {few: len(system.modes) + len(held) + i for i, few in enumerate(found)}
-        modes.append(_contact(frozenset(), 0, mode, names, indices, numbers))
-        held += [_contact(few, c.order, c.mode, names, indices, numbers, len(mode.edges)) for few, c in found.items()]
+        program = LoweredMode(mode, names).program(indices)
+        if found := overlay(mode, numbered(system.parts)):
+            program = replace(program, held=len(system.modes) + len(held), edges=_with_contacts(program.edges, found))
+            whole = lowered_overlay(found, names).program(indices)
+            pairs = zip(whole.edges, found.releases, strict=True)
+            held.append(replace(whole, edges=tuple(replace(edge, releases=number) for edge, number in pairs)))
+        modes.append(program)
     return tuple(modes), tuple(held)
 
 
-def _contact(
-    few: frozenset[int], order: int, mode: Mode, names: Names, indices: dict[str, int],
-    numbers: dict[frozenset[int], int], own: int | None = None,
-) -> lowered.ModeProgram:  # fmt: skip
-    """A mode, or a motion along the guards of a ``few`` of its edges; where each further contact leads, by number."""
-    program = LoweredMode(mode, names).program(indices)
-    edges = tuple(
-        replace(
-            edge,
-            contact=None if k in few else numbers.get(few | {k}),
-            releases=k in few or (own is not None and k >= own),
-        )
-        for k, edge in enumerate(program.edges)
-    )
-    return replace(program, edges=edges, push_order=order)
+def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tuple[lowered.EdgeProgram, ...]:
+    """A mode's edges with what a run knows of motion along their guards."""
+    whole = list(edges)
+    for i, motion in enumerate(found.contacts):
+        whole[motion.edge] = replace(edges[motion.edge], contact=i, push_order=motion.order)
+    return tuple(whole)
+
+
+def lowered_overlay(found: Overlay, names: Names) -> LoweredMode:
+    """A mode with motion along its guards over numbered symbols."""
+    flags = tuple(symbol(f"d{i}") for i in range(len(found.flags)))
+    shared = names.shared | dict(zip(found.flags, flags, strict=True))
+    return LoweredMode(found.mode, replace(names, data=(*names.data, *flags), shared=shared))
 
 
 def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> lowered.Routines:

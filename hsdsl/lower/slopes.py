@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hsdsl.completion import contacts
+from hsdsl.completion import overlay
 from hsdsl.expression.stack import deep_stack
-from hsdsl.lower import LoweredMode, number
+from hsdsl.lower import LoweredMode, lowered_overlay, number
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.lower.switches import with_switches
@@ -30,13 +30,13 @@ class Slopes:
 
 
 def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
-    """The slopes of each mode, then of the motions along guards: in the order of `Program.flows`."""
+    """The slopes of each mode, then of those with motion along guards: in the order of `Program.flows`."""
     with deep_stack():
         whole, switches = with_switches(system)
         names = number(whole, switches.symbols)
-        held = (motion.mode for mode in whole.modes for motion in contacts(mode, numbered(whole.parts)).values())
-        flows = (*whole.modes, *held)
-        return tuple(_slopes(LoweredMode(mode, names)) for mode in flows)
+        held = (found for mode in whole.modes if (found := overlay(mode, numbered(whole.parts))))
+        flows = (*(LoweredMode(mode, names) for mode in whole.modes), *(lowered_overlay(each, names) for each in held))
+        return tuple(map(_slopes, flows))
 
 
 def _slopes(mode: LoweredMode) -> Slopes:

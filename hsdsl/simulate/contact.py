@@ -1,18 +1,20 @@
-"""Motion along a guard: a state that its own reset keeps while the flow pushes it out (M11).
+"""Motion along guards: a state that its own resets keep while the flow pushes it out (M11).
 
 At such a point q the reset is the identity, the target is the same mode, and the flow leaves the domain. The execution
-follows the constrained flow of the edge's contact (`hsdsl.completion.contact`), at rest where that is zero, until the
-flow no longer pushes out. Other surfaces are crossed as along any flow.
+follows the constrained flow (`hsdsl.completion.overlay`), at rest where that is zero, until the flow no longer pushes
+out. Other surfaces are crossed as along any flow.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
+from hsdsl.integrators.linear import Vector
 from hsdsl.integrators.stepper import State
-from hsdsl.program import EdgeProgram
+from hsdsl.program import HELD, LOOKED_AT
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.scales import flow_sizes
@@ -23,33 +25,58 @@ ZERO_UNITS = 16  # of round-off: a rate that counts as zero
 
 
 def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
-    """Return the place as one in contact with every guard that holds the state; a stop where they hold it together."""
-    if not here.surfaces.active or here.mode.states != here.arc.states:
+    """Return the place as one in contact with the guards that hold the state; a stop where these have no one motion."""
+    if not here.surfaces.active or here.mode.held is None or here.mode.states != here.arc.states:
         return here
-    held, edges = here, here.mode.edges
-    for k in sorted(here.surfaces.active):
-        if k < len(edges) and presses(run, here, k):
-            contact = held.mode.edges[k].contact
-            if contact is None:
-                return run.diagnostics.accumulates(edges[k].name, here.t, here.t)
-            held = in_contact(run, held, k, contact)
-    return held
+    kept = keeping(run, here, sorted(here.surfaces.active))
+    holding = pressing(run, here, kept) if kept else []
+    if holding is None:
+        return run.diagnostics.coupled(here.mode.edges[kept[0]].name, here.t)
+    return in_contact(run, here, holding) if holding else here
 
 
-def presses(run: Run, here: ModeState, k: int) -> bool:
-    """Whether the flow presses on the guard of edge k, and its reset keeps the state there."""
-    contact = here.mode.edges[k].contact
-    if contact is None or run.settings.completion == "none":
-        return False
+def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
+    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there."""
+    edges, sizes, found = here.mode.edges, Vector(), list[int]()
+    for k in surfaces if run.settings.completion != "none" else ():
+        if not k < len(edges) or edges[k].contact is None:
+            continue
+        try:
+            if not keeps(run, here, k):
+                continue
+            if edges[k].push_order == 2:
+                sizes = sizes or flow_sizes(run, here, here.kernel.flow(here.t, *here.x))
+                if not is_tangent(run, here, k, sizes):
+                    continue
+        except DOMAIN_ERRORS:
+            continue
+        found.append(k)
+    return found
+
+
+def pressing(run: Run, here: ModeState, kept: list[int]) -> list[int] | None:
+    """Those of some guards that hold the state together; None where that is not one choice.
+
+    The flow that the others leave presses on each that holds, and on none of those that do not.
+    """
+    holding: list[int] | None = kept
+    for _ in range(len(kept) + 2):
+        before, holding = holding, pushes(run, here, holding, kept)
+        if holding is None or holding == before or len(kept) == 1:
+            return holding
+    return None
+
+
+def pushes(run: Run, here: ModeState, holding: list[int], kept: list[int]) -> list[int] | None:
+    """Those of some guards that the flow presses on while those ``holding`` hold it; None without such a flow."""
+    looked = in_contact(run, here, holding, kept)
     try:
-        if not keeps(run, here, k):
-            return False
-        held = in_contact(run, here, k, contact)
-        if not held.kernel.surfaces(here.t, *here.x)[k] < -held.surfaces.roundoff_bound(k, here.t, here.x):
-            return False
-        return held.mode.push_order == 1 or is_tangent(run, here, k)
+        r = looked.kernel.surfaces(here.t, *here.x)
+        if any(r[k] != r[k] for k in kept):
+            return None
+        return [k for k in kept if r[k] < -looked.surfaces.roundoff_bound(k, here.t, here.x)]
     except DOMAIN_ERRORS:
-        return False
+        return []
 
 
 def keeps(run: Run, here: ModeState, k: int) -> bool:
@@ -61,22 +88,31 @@ def keeps(run: Run, here: ModeState, k: int) -> bool:
     return still and bool(kernel.conditions[k](t, *x)[0])
 
 
-def is_tangent(run: Run, here: ModeState, k: int) -> bool:
-    """Whether the flow is tangent to surface k, to round-off."""
+def is_tangent(run: Run, here: ModeState, k: int, sizes: Vector) -> bool:
+    """Whether the flow, of these sizes, is tangent to surface k, to round-off."""
     t, x = here.t, here.x
-    slope, gradient = here.kernel.flow(t, *x), here.kernel.gradients[k](t, *x)
-    sizes = flow_sizes(run, here, slope)
+    gradient = here.kernel.gradients[k](t, *x)
     size = total((abs(g) * f for g, f in zip(gradient[1:], sizes, strict=True)), abs(gradient[0]))
     return abs(here.kernel.rates[k](t, *x)[0]) <= ZERO_UNITS * run.arithmetic.unit * size
 
 
-def in_contact(run: Run, here: ModeState, k: int, contact: int) -> ModeState:
-    """The place with the routines of a contact of edge k; the arc goes on."""
-    program, kernel = run.program.flows[contact], run.kernel.bind(contact, here.segment.data)
-    edges, more = len(here.mode.edges), len(program.edges) - len(here.mode.edges)
-    active = {j if j < edges else j + more for j in here.surfaces.active if j != k}
-    surfaces = Surfaces(kernel, program.edges, here.surfaces.scale, run.arithmetic, active)
-    return replace(here, flow=contact, mode=program, kernel=kernel, surfaces=surfaces)
+def in_contact(run: Run, here: ModeState, holding: Sequence[int], looked_at: Sequence[int] = ()) -> ModeState:
+    """The place with the routines of contacts of some edges of its mode; the arc goes on."""
+    number, edges = here.mode.held, here.mode.edges
+    assert number is not None
+    levels = dict.fromkeys(looked_at, LOOKED_AT) | dict.fromkeys(holding, HELD)
+    numbers = [run.arithmetic.zero] * sum(edge.contact is not None for edge in edges)
+    for k, level in levels.items():
+        place = edges[k].contact
+        assert place is not None
+        numbers[place] = run.arithmetic.zero + level
+    segment = replace(here.segment, data=(*here.segment.data, *numbers))
+    program, kernel = run.program.flows[number], run.kernel.bind(number, segment.data)
+    more = len(program.edges) - len(edges)
+    active = {j if j < len(edges) else j + more for j in here.surfaces.active if j not in levels}
+    touched = frozenset(place for k in holding if (place := edges[k].contact) is not None)
+    surfaces = Surfaces(kernel, program.edges, here.surfaces.scale, run.arithmetic, active, touched=touched)
+    return replace(here, flow=number, mode=program, kernel=kernel, surfaces=surfaces, segment=segment)
 
 
 def after_contact(here: ModeState, held: ModeState, t: Number, x: State) -> ModeState:
@@ -84,14 +120,16 @@ def after_contact(here: ModeState, held: ModeState, t: Number, x: State) -> Mode
     edges, more = len(here.mode.edges), len(held.mode.edges) - len(here.mode.edges)
     here.surfaces.active.clear()
     here.surfaces.emerging.clear()
-    here.surfaces.active.update({j if j < edges else j - more for j in held.surfaces.active if not releases(held, j)})
+    here.surfaces.active.update(
+        {j if j < edges else j - more for j in held.surfaces.active if not held.surfaces.releases(j)}
+    )
     here.surfaces.active.update(in_touch(here, held))
     return here.moved(t, x)
 
 
 def in_touch(here: ModeState, held: ModeState) -> list[int]:
     """The edges of a mode that a place is in contact with."""
-    return [k for k in range(len(here.mode.edges)) if releases(held, k)]
+    return [k for k, edge in enumerate(here.mode.edges) if edge.contact in held.surfaces.touched]
 
 
 def condition_ends(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> tuple[Number, State] | None:
@@ -108,9 +146,3 @@ def condition_ends(run: Run, here: ModeState, held: ModeState, t: Number, x: Sta
     except DOMAIN_ERRORS:
         return later
     return None
-
-
-def releases(held: ModeState, k: int) -> bool:
-    """Whether surface k ends a contact."""
-    edges: tuple[EdgeProgram, ...] = held.mode.edges
-    return k < len(edges) and edges[k].releases

@@ -59,6 +59,15 @@ class Diagnostics:
         self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
         return Stop("zeno", t, sentence)
 
+    def coupled(self, edge: str, t: Number) -> Stop:
+        """Guards hold the state together, and the forces that do so are not one choice: the run stops at t."""
+        sentence = (
+            f"several guards hold the state at t = {show(t)}, that of {edge} among them, and their forces on each "
+            "other are not one choice"
+        )
+        self.departures.append(sentence)
+        return Stop("zeno", t, sentence)
+
     def unsettled(self, mode: str, k: int, t: Number) -> None:
         """A crossing was found on a piece of a surface that is no polynomial."""
         if (mode, k) not in self._noted:

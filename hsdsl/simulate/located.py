@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, in_touch, releases
+from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, in_touch
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
@@ -66,8 +66,8 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
         if isinstance(outcome, Stop):
             return outcome
         crossing, edges = outcome.crossing, here.mode.edges
-        if not releases(held, crossing.edge):
-            ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if releases(held, k)}
+        if not held.surfaces.releases(crossing.edge):
+            ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
             return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name not in ends))
         t, x = crossing.time, crossing.state
         let_go = (t, x) if crossing.edge < len(edges) else condition_ends(run, here, held, t, x)

@@ -32,6 +32,8 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
         return diagnostics.replaced(mode.edges[k].name, count, time, other)
     if kind == "slides":
         return slides(program.modes[count].edges[k].name, program.modes[count], mode, time)
+    if kind == "coupled":
+        return diagnostics.coupled(mode.edges[k].name, time)
     return diagnostics.accumulates(mode.edges[k].name, time, other)
 
 

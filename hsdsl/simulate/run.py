@@ -25,7 +25,7 @@ from hsdsl.simulate.surfaces import Crossing, Surfaces
 class ModeState:
     """Mode and its number, input segment, time and state of a run, ready to flow.
 
-    ``flow`` is the number of what flows, among `Program.flows`: the mode itself, or a motion along one of its guards,
+    ``flow`` is the number of what flows, among `Program.flows`: the mode itself, or that with motion along its guards,
     whose ``mode``, ``kernel`` and ``surfaces`` these are then.
     """
 

@@ -117,7 +117,7 @@ class Surfaces:
 
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
     ``active``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
-    state while it waited in a strip, and that the flow leads back through.
+    state while it waited in a strip, and that the flow leads back through. ``touched`` are the contacts that hold it.
     """
 
     kernel: ModeKernel
@@ -126,6 +126,11 @@ class Surfaces:
     arithmetic: Arithmetic
     active: set[int] = field(default_factory=set[int])
     emerging: set[int] = field(default_factory=set[int])
+    touched: frozenset[int] = frozenset()
+
+    def releases(self, k: int) -> bool:
+        """Whether surface k ends a contact that holds the state."""
+        return k < len(self.edges) and self.edges[k].releases in self.touched
 
     def roundoff_bound(self, k: int, t: Number, x: State, entry: bool = False) -> Number:
         """Round-off of surface k at a point; where its gradient has no value only the sides count."""
@@ -203,7 +208,7 @@ class Surfaces:
         """
         found: list[int] = []
         for k in range(len(self.edges)):
-            if self.edges[k].releases:
+            if self.releases(k):
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]

@@ -12,7 +12,7 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import contact_at, in_contact, keeps, presses, releases
+from hsdsl.simulate.contact import contact_at, in_contact, in_touch, keeping, keeps, pushes
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
@@ -58,14 +58,16 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         held = contact_at(run, here)
         if isinstance(held, Stop):
             return held
-        if releases(held, k):
+        if held.surfaces.releases(k):
             return here
         q = limit_of(run, here, held, k, end)
         if q is None or not keeps(run, limit := here.moved(end, q), k):
             return here
-        if held.mode.edges[k].contact is None or run.settings.completion == "none":
+        if edge.contact is None or run.settings.completion == "none":
             return run.diagnostics.accumulates(edge.name, end, here.t)
-        if not presses(run, limit, k) or meets_another(here, limit, k):
+        if not keeping(run, limit, [k]) or not pushes(run, limit, [*in_touch(here, held), k], [k]):
+            return here
+        if meets_another(here, limit, k):
             return here
     except DOMAIN_ERRORS:
         return here
@@ -80,9 +82,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
 def limit_of(run: Run, here: ModeState, held: ModeState, k: int, end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
     q = fixed_point(here, k, here.t, here.x)
-    contact = held.mode.edges[k].contact
-    if contact is not None:
-        slope = in_contact(run, held, k, contact).kernel.flow(here.t, *q)
+    if here.mode.edges[k].contact is not None:
+        slope = in_contact(run, here, [*in_touch(here, held), k]).kernel.flow(here.t, *q)
         q = onto_guard(here, k, end, tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True)))
     q = fixed_point(here, k, end, q)
     far = abs(here.kernel.surfaces(end, *q)[k]) > here.surfaces.roundoff_bound(k, end, q, entry=True)

@@ -73,8 +73,8 @@ def model_source(program: Program) -> str:
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
-        f"{len(program.outputs)}, {len(writer.data)}, {lines(program)}, {len(writer.states)}, "
-        f"{derivatives(program)}, {factors(program)}, {table}}};\n"
+        f"{len(program.outputs)}, {len(writer.data) - program.contact_count}, {program.contact_count}, "
+        f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {table}}};\n"
     )
     return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
 
@@ -120,10 +120,11 @@ def switching_bodies(program: Program) -> dict[str, str]:
 
 
 def data_names(program: Program) -> dict[str, str]:
-    """What parameters, segments of inputs and switches are called in C."""
+    """What parameters, segments of inputs, switches and contacts are called in C."""
     names = [f"p{i}" for i in range(len(program.parameters))]
     names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
     names += [f"k{i}" for i in range(len(program.switches))]
+    names += [f"d{i}" for i in range(program.contact_count)]
     return {name: f"p[{i}]" for i, name in enumerate(names)}
 
 
@@ -173,7 +174,7 @@ class _Writer:
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
-            str(mode.push_order),
+            str(-1 if mode.held is None else mode.held),
         ]
         return f"{{{', '.join(fields)}}}"
 
@@ -236,7 +237,8 @@ class _Writer:
             f"{{{', '.join(map(str, numbers))}, {self.pointers(parts)}, "
             f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, {len(edge.changes)}, "
             f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
-            f"{-1 if edge.contact is None else edge.contact}, {int(edge.releases)}}}"
+            f"{-1 if edge.contact is None else edge.contact}, {edge.push_order}, "
+            f"{-1 if edge.releases is None else edge.releases}}}"
         )
 
     def pointers(self, names: Iterable[str]) -> str:

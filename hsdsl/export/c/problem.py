@@ -86,6 +86,7 @@ def _sizes(problem: Problem) -> str:
         "PARAMETERS": len(program.parameters),
         "INPUTS": len(program.inputs),
         "DATA": len(problem.timeline.segments[0].data),
+        "CONTACTS": program.contact_count,
         "SEGMENTS": len(problem.timeline.segments),
     }
     located = f" + {_LOCATED}" if problem.settings.scheme == "located" else ""
@@ -95,7 +96,7 @@ def _sizes(problem: Problem) -> str:
 
 _SPACE = """HS_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_EDGES, PROBLEM_LINES, PROBLEM_STATES, \\
   PROBLEM_FACTORS, PROBLEM_KIND, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
-_LOCATED = """HS_LOCATED_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_MODES, \\
+_LOCATED = """HS_LOCATED_SPACE(PROBLEM_WIDTH, PROBLEM_SURFACES, PROBLEM_MODES, (PROBLEM_DATA + PROBLEM_CONTACTS), \\
   PROBLEM_DERIVATIVES, PROBLEM_STAGES, PROBLEM_EXTRA, PROBLEM_ORDER, PROBLEM_DEGREE)"""
 
 

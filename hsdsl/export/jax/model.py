@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations
 
 from hsdsl.backends.c.source import width
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
@@ -12,7 +14,10 @@ from hsdsl.export.routines import data_names, mode_definitions
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.numbers import table_numbers
-from hsdsl.program import ModeProgram
+from hsdsl.program import HELD, Program
+
+MOST_TOGETHER = 3  # guards of a mode whose motions along several of them are there, each set for itself
+MOST_HELD = 64  # of a mode with more such guards no motion along them is there: a run stops at the end of a Zeno tail
 
 
 def model_text(source: Source, table: ButcherTableau) -> str:
@@ -31,24 +36,40 @@ def model_text(source: Source, table: ButcherTableau) -> str:
     return "\n\n".join(parts)
 
 
-def flows(source: Source) -> tuple[ModeProgram, ...]:
-    """The modes and, where a run has them, the motions along their guards."""
+@dataclass(frozen=True)
+class Motion:
+    """What flows: number ``flow`` of `Program.flows`, of the mode ``owner``, in contact with the guards of ``held``."""
+
+    owner: int
+    flow: int
+    held: frozenset[int] = frozenset()
+
+
+def motions(source: Source) -> list[Motion]:
+    """The modes and, where a run has them, their motions along a guard, along several where these are few."""
     program = source.problem.program
-    return program.modes if source.problem.settings.completion == "none" else program.flows
+    found = [Motion(i, i) for i in range(len(program.modes))]
+    for i, mode in enumerate(program.modes if source.problem.settings.completion != "none" else ()):
+        edges = [k for k, edge in enumerate(mode.edges) if edge.contact is not None]
+        most = MOST_TOGETHER if len(edges) <= MOST_TOGETHER else 1 if len(edges) <= MOST_HELD else 0
+        for count in range(1, most + 1):
+            assert mode.held is not None or not edges
+            found += [Motion(i, mode.held or 0, frozenset(few)) for few in combinations(edges, count)]
+    return found
 
 
 def _functions(source: Source) -> Iterable[str]:
     program = source.problem.program
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
-    for j, mode in enumerate(flows(source)):
+    for j, mode in enumerate(program.flows):
         for name, definition in mode_definitions(mode).items():
             spread = ", s" if name.startswith("spread") else ""
             yield function(f"mode_{j}_{name}", definition, data, f"p, t, x{spread}")
 
 
 def _tables(source: Source) -> str:
-    program, modes = source.problem.program, flows(source)
-    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in modes))
+    program, found = source.problem.program, motions(source)
+    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in program.flows))
     wide = max(1, width(program))
     states = program.all_states
     lines = [f"SIZES = {wide}, {surfaces}, {len(program.outputs)}", f"STATES = {_strings(states)}"]
@@ -61,29 +82,36 @@ def _tables(source: Source) -> str:
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
                 f"SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}),"
             )
-    texts = [_mode(j, mode, modes, states, numbers) for j, mode in enumerate(modes)]
+    texts = [_mode(motion, found, program, numbers) for motion in found]
     lines += ["MODES = (", *texts, ")", "EDGES = (", *edges, ")"]
     return "\n".join(lines) + "\n"
 
 
-def _mode(
-    j: int, mode: ModeProgram, modes: tuple[ModeProgram, ...], states: tuple[str, ...], numbers: list[tuple[int, ...]]
-) -> str:
+def _mode(motion: Motion, motions: list[Motion], program: Program, numbers: list[tuple[int, ...]]) -> str:
+    j, held, owner = motion.flow, motion.held, program.modes[motion.owner]
+    mode, states, own = program.flows[j], program.all_states, numbers[motion.owner]
     surfaces = range(len(mode.edges) + len(mode.walls))
     conditions = [
         [name for name in mode.routines.names if name.startswith(f"condition_{k}_")] for k in range(len(mode.edges))
     ]
     listed = [_names(j, [f"{kind}_{k}" for k in surfaces]) for kind in ("gradient", "rate")]
     parts = "".join(f"{_names(j, names)}, " for names in conditions)
-    owner, held = next(((i, k) for i, m in enumerate(modes) for k, e in enumerate(m.edges) if e.contact == j), (j, -1))
-    own = numbers[owner]
-    edges = own if owner == j else (*own, *(own[held] for _ in mode.edges[len(own) :]))
-    contacts = tuple(-1 if edge.contact is None or edge.contact >= len(modes) else edge.contact for edge in mode.edges)
-    contact = contacts, tuple(edge.releases for edge in mode.edges), owner, held, mode.push_order
+    places = {(each.owner, each.held): i for i, each in enumerate(motions)}
+    edge_of = {edge.contact: k for k, edge in enumerate(owner.edges) if edge.contact is not None}
+    ends = [None if edge.releases is None else edge_of[edge.releases] for edge in mode.edges]
+    edges = (*own, *(own[k] for k in ends[len(own) :] if k is not None))
+    contacts = tuple(
+        -1 if k in held or k >= len(own) else places.get((motion.owner, held | {k}), -1) for k in range(len(edges))
+    )
+    last = max(held, default=-1)
+    before = places[motion.owner, held - {last}]
+    order = 0 if last < 0 else owner.edges[last].push_order
+    contact = contacts, tuple(k in held for k in ends), before, last, order
+    flags = f", {tuple(float(HELD) if k in held else 0.0 for k in edge_of.values())}" if held else ""
     return (
         f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {edges}, {contact},\n"
         f"            SIZES, mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
-        f"            ({parts}), mode_{j}_outputs),"
+        f"            ({parts}), mode_{j}_outputs{flags}),"
     )
 
 

@@ -1,5 +1,6 @@
-/* Motion along a guard (M11): a state that its own reset keeps while the flow pushes it out. While it lasts,
-   run->here.table is the motion's, whose edges are those of the mode and then some that release it.
+/* Motion along guards (M11): a state that its own resets keep while the flow pushes it out. While it lasts,
+   run->here.table is that of the mode's motions, whose edges are those of the mode and then some that release it, and
+   run->here.p has the numbers that say which contacts hold.
    See hsdsl/simulate/contact.py. Functions return 1 or 0, or RAISED where a routine has no value. */
 
 #include "functions.h"
@@ -23,39 +24,44 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
 /* Whether edge k is possible and its reset leaves the state where it is. */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
+  const hs_edge *edge = &here->table->edge[k];
   int still = 1;
-  if (hs_changed(&here->table->edge[k], here->table->edge[k].reset, here->p, t, x, x, run->after)) return RAISED;
-  for (int s = 0; s < here->dimension; s++)
-    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
+  if (edge->reset(here->p, t, x, run->after)) return RAISED;
+  for (int i = 0; i < edge->changes; i++) {
+    const int s = edge->change[i];
+    still &= fabs(run->after[i] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
+  }
   return still ? condition(run, k, t, x) : 0;
 }
 
-/* Whether the flow is tangent to surface k, to round-off. */
+/* Whether the flow, of these sizes, is tangent to surface k, to round-off. */
 static int is_tangent(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real rate, size = 0.0;
-  if (here->table->flow(here->p, t, x, run->end) || row->values(here->p, t, x, run->gradient) ||
-      here->table->rates[k](here->p, t, x, &rate) || flow_sizes(run, t, x, run->end))
-    return RAISED;
+  if (row->values(here->p, t, x, run->gradient) || here->table->rates[k](here->p, t, x, &rate)) return RAISED;
   for (int i = 0; i < row->count; i++)
     size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
   return fabs(rate) <= ZERO_UNITS * HS_UNIT * size;
 }
 
-/* Whether the flow presses on the guard of edge k, and its reset keeps the state there. */
-static int presses(hs_run *run, hs_time t, const hs_real *x, int k) {
-  hs_mode_state *const here = &run->here;
-  const hs_mode *const own = here->table;
-  const int contact = own->edge[k].contact, active = run->active_surfaces[k];
-  if (contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) return 0;
-  const hs_mode *const held = &run->model->mode[contact];
-  hs_real r, noise;
-  here->table = held, run->active_surfaces[k] = 0;
-  const int raised = surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise);
-  here->table = own, run->active_surfaces[k] = active;
-  if (raised || !(r < -noise)) return 0;
-  return held->push_order == 1 || is_tangent(run, t, x, k) == 1;
+/* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
+   many. */
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
+  const hs_mode_state *here = &run->here;
+  int count = 0, sized = 0; /* sized: whether the flow's sizes are known, -1 where they have no value */
+  for (int k = 0; k < here->table->edges; k++) {
+    const hs_edge *edge = &here->table->edge[k];
+    if (!marks[k]) continue;
+    marks[k] = 0;
+    if (edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
+    if (edge->push_order == 2) {
+      if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
+      if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
+    }
+    marks[k] = 1, count++;
+  }
+  return count;
 }
 
 /* Number the marks of walls anew where a table has `more` edges than the one before. */
@@ -73,42 +79,105 @@ static void count_active(hs_run *run) {
   for (int j = 0; j < run->here.table->surfaces; j++) run->here.standing += run->active_surfaces[j];
 }
 
-/* Be in contact with the guard of edge k as well, by the table of this number. */
-static void in_contact(hs_run *run, int k, int contact) {
-  const hs_mode *const before = run->here.table;
-  run->here.table = &run->model->mode[contact];
-  run->active_surfaces[k] = 0;
+/* The number of a contact of the state's mode: 0, HS_LOOKED_AT or HS_HELD. */
+static hs_real *level_of(const hs_run *run, int contact) { return &run->held_p[run->model->data + contact]; }
+
+/* Bind routines to the mode's motions along guards: of those edges `kept`, the pushes are looked at, and those `held`
+   hold the state. `held` may be 0 for none. */
+static void bind_contacts(hs_run *run, const int *held, const int *kept) {
+  hs_mode_state *const here = &run->here;
+  const hs_mode *const own = &run->model->mode[here->mode];
+  if (here->p != run->held_p) run->own_p = here->p;
+  for (int i = 0; i < run->model->data; i++) run->held_p[i] = run->own_p[i];
+  for (int i = 0; i < run->model->contacts; i++) *level_of(run, i) = 0.0;
+  for (int k = 0; k < own->edges; k++)
+    if (own->edge[k].contact >= 0)
+      *level_of(run, own->edge[k].contact) = held[k] ? HS_HELD : kept[k] ? HS_LOOKED_AT : 0.0;
+  here->table = &run->model->mode[own->held];
+  here->p = run->held_p;
+}
+
+/* Bind them to the mode itself again. */
+static void bind_mode(hs_run *run) {
+  run->here.table = &run->model->mode[run->here.mode];
+  run->here.p = run->own_p;
+}
+
+/* Of the edges `kept`, mark those in `pushed` that the flow presses on while those `held` hold the state: 1 where they
+   are the same, else 0; RAISED where these have no flow together. */
+static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed) {
+  const int edges = run->here.table->edges;
+  int same = 1, apart = 0;
+  bind_contacts(run, held, kept);
+  const hs_mode *const table = run->here.table;
+  const int raised = table->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes);
+  for (int k = 0; k < edges; k++) {
+    const int active = run->active_surfaces[k];
+    pushed[k] = 0;
+    if (kept[k] && !raised) {
+      run->active_surfaces[k] = 0;
+      pushed[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 0);
+      run->active_surfaces[k] = active;
+      apart |= run->values[k] != run->values[k];
+    }
+    same &= !pushed[k] == !held[k];
+  }
+  bind_mode(run);
+  return apart ? RAISED : same;
+}
+
+/* Those of the edges `kept`, `count` of them, that hold the state together, to `held`; 0 where that is not one choice. */
+static int pressing(hs_run *run, hs_time t, const hs_real *x, const int *kept, int count, int *held, int *pushed) {
+  const int edges = run->here.table->edges;
+  for (int k = 0; k < edges; k++) held[k] = kept[k];
+  for (int i = 0; i < count + 2; i++) {
+    const int same = pushes(run, t, x, held, kept, pushed);
+    if (same == RAISED) return 0;
+    for (int k = 0; k < edges; k++) held[k] = pushed[k];
+    if (same || count == 1) return 1;
+  }
+  return 0;
+}
+
+/* Be in contact with the guards of the edges `held`. */
+static void in_contact(hs_run *run, const int *held) {
+  const hs_mode *const own = run->here.table;
+  bind_contacts(run, held, held);
+  for (int k = 0; k < own->edges; k++)
+    if (held[k]) run->active_surfaces[k] = 0;
   run->here.emerging = 0;
-  move_walls(run->active_surfaces, before, run->here.table->edges - before->edges);
+  move_walls(run->active_surfaces, own, run->here.table->edges - own->edges);
   count_active(run);
 }
 
-/* Be in contact with every guard that holds the state: GOES_ON, or a stop where they hold it together. */
+/* Be in contact with every guard that holds the state: GOES_ON, or a stop where they have no one motion. */
 static int contact_at(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const own = here->table;
-  int count = 0;
-  if (!here->standing || here->dimension != own->dimension || !here->dimension) return GOES_ON;
-  for (int k = 0; k < own->edges; k++) {
-    run->beyond[k] = run->active_surfaces[k] && presses(run, here->t, run->x, k);
-    count += run->beyond[k];
+  int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
+  if (!here->standing || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
+  for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
+  const int count = keeping(run, here->t, run->x, kept);
+  if (!count) return GOES_ON;
+  if (!pressing(run, here->t, run->x, kept, count, held, run->beyond)) {
+    for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
+    note(run, HS_COUPLED, first, 0, here->t, here->t);
+    return stopped(run, HS_ACCUMULATED, here->t);
   }
-  for (int k = 0; count && k < own->edges; k++) {
-    if (!run->beyond[k]) continue;
-    const int contact = here->table->edge[k].contact;
-    if (contact < 0) {
-      if (here->table != own) after_contact(run);
-      note(run, HS_ACCUMULATES, k, 0, here->t, here->t);
-      return stopped(run, HS_ACCUMULATED, here->t);
-    }
-    in_contact(run, k, contact);
-  }
+  for (int k = 0; k < own->edges; k++) any |= held[k];
+  if (any) in_contact(run, held);
   return GOES_ON;
+}
+
+/* Whether surface j of the present table ends a contact that holds the state. */
+static int releases(const hs_run *run, int j) {
+  const hs_mode *const table = run->here.table;
+  return j < table->edges && table->edge[j].releases >= 0 && *level_of(run, table->edge[j].releases) == HS_HELD;
 }
 
 /* Whether the state is in contact with the guard of edge k of its mode. */
 static int in_touch(const hs_run *run, int k) {
-  return k < run->model->mode[run->here.mode].edges && run->here.table->edge[k].releases;
+  return k < run->model->mode[run->here.mode].edges && releases(run, k);
 }
 
 /* End all contacts. */
@@ -116,9 +185,9 @@ static void after_contact(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   for (int k = 0; k < own->edges; k++)
-    if (held->edge[k].releases) run->active_surfaces[k] = 1;
+    if (releases(run, k)) run->active_surfaces[k] = 1;
   move_walls(run->active_surfaces, held, own->edges - held->edges);
-  here->table = own;
+  bind_mode(run);
   count_active(run);
 }
 
@@ -135,10 +204,10 @@ static int condition_ends(hs_run *run, hs_time *t) {
     *t = from + after;
     for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + after * run->end[s];
     for (int k = 0; k < own->edges && holds == 1; k++) {
-      if (!held->edge[k].releases) continue;
-      run->here.table = own;
+      if (!in_touch(run, k)) continue;
+      bind_mode(run);
       holds = condition(run, k, *t, run->z);
-      run->here.table = held;
+      run->here.table = held, run->here.p = run->held_p;
     }
     if (holds != 1) return 1;
   }

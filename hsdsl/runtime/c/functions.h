@@ -209,9 +209,12 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
 /* contact.c */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
-static int presses(hs_run *run, hs_time t, const hs_real *x, int k);
-static void in_contact(hs_run *run, int k, int contact);
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks);
+static void bind_contacts(hs_run *run, const int *held, const int *kept);
+static void bind_mode(hs_run *run);
+static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed);
 static int contact_at(hs_run *run);
+static int releases(const hs_run *run, int j);
 static int in_touch(const hs_run *run, int k);
 static void after_contact(hs_run *run);
 static int condition_ends(hs_run *run, hs_time *t);

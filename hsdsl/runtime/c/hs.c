@@ -137,6 +137,9 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
   const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
   run->jacobian = numbers(store, run->model->derivatives);
+  run->held_p = numbers(store, run->model->data + run->model->contacts);
+  run->kept = take(store, m, sizeof(int));
+  run->held = take(store, m, sizeof(int));
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
   hs_real **states[] = {&run->q, &run->other_end, 0};

@@ -57,6 +57,8 @@ typedef struct {
   const int *own;
 } hs_elimination;
 
+enum { HS_LOOKED_AT = 1, HS_HELD = 2 };
+
 typedef struct {
   int target;           /* index of the target mode */
   int target_dimension; /* number of states it is entered with */
@@ -68,8 +70,9 @@ typedef struct {
   hs_routine *spread;
   int changes;
   const int *change;
-  int contact;  /* index of the motion along its guard, behind the modes; -1 for none */
-  int releases; /* whether it ends such a motion */
+  int contact;    /* number of the motion along its guard; -1 for none */
+  int push_order; /* the derivative of the guard along the flow that presses then */
+  int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 
 typedef struct {
@@ -92,17 +95,18 @@ typedef struct {
   int affine;              /* whether every surface's gradient is the same everywhere */
   int jumps;               /* whether the flow has `sign` or `floor` */
   const int *state;        /* for each state its number among those of all modes */
-  int push_order;          /* of a motion along a guard: the derivative of the guard along the flow that pushes */
+  int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
 } hs_mode;
 
 typedef struct {
   int modes;
-  int flows;    /* the modes, then motions along their guards */
+  int flows;    /* the modes, then those with motion along their guards, which take `contacts` more numbers in `p` */
   int width;    /* states of the largest mode */
   int surfaces; /* of the mode with most */
   int edges;    /* of the mode with most */
   int outputs;
   int data; /* numbers in `p` */
+  int contacts; /* of the mode with most: for each 0 without, HS_LOOKED_AT where its surface is the push, or HS_HELD */
   int lines; /* of series, of the mode with most */
   int states; /* of all modes, by name */
   int derivatives; /* of a flow that are not zero everywhere, of the mode with most */

@@ -101,7 +101,7 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
-typedef enum { HS_CROWDED, HS_IN_CONTACT, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES } hs_notice;
+typedef enum { HS_CROWDED, HS_IN_CONTACT, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES, HS_COUPLED } hs_notice;
 
 /* A diagnostic: see hsdsl/simulate/diagnostics.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {

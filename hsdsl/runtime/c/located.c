@@ -206,7 +206,7 @@ static int follow(hs_run *run, hs_time limit) {
 static void drop_releases(hs_run *run) {
   int kept = 0;
   for (int i = 0; i < run->alternatives_count; i++)
-    if (!run->here.table->edge[run->alternatives[i]].releases) run->alternatives[kept++] = run->alternatives[i];
+    if (!releases(run, run->alternatives[i])) run->alternatives[kept++] = run->alternatives[i];
   run->alternatives_count = kept;
 }
 
@@ -226,7 +226,7 @@ static int along_guards(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
   for (;;) {
     const int outcome = follow(run, limit), end = run->chosen.edge;
-    if (outcome == LANDED && here->table->edge[end].releases) {
+    if (outcome == LANDED && releases(run, end)) {
       hs_time t = run->chosen.time;
       copy(run->x, run->chosen.state, here->dimension);
       if (in_touch(run, end)) return released(run, t);
@@ -253,13 +253,13 @@ static int located_flow(hs_run *run) {
   const hs_mode *const own = run->here.table;
   const int n = run->here.dimension, held = contact_at(run);
   if (held != GOES_ON) return held;
-  const hs_mode *const contact = run->here.table;
-  if (contact == own) return follow(run, limit);
+  if (run->here.table == own) return follow(run, limit);
   copy(run->began, run->x, n);
+  for (int k = 0; k < own->edges; k++) run->held[k] = in_touch(run, k);
   const int outcome = along_guards(run, limit);
   const int still = same_state(run->began, outcome == LANDED ? run->chosen.state : run->x, n);
   for (int k = 0; k < own->edges; k++)
-    if (contact->edge[k].releases) note(run, HS_IN_CONTACT, k, still, from, run->task->now);
+    if (run->held[k]) note(run, HS_IN_CONTACT, k, still, from, run->task->now);
   return outcome;
 }
 

@@ -185,7 +185,7 @@ static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int
   for (int k = 0; k < mode->edges; k++) {
     hs_real rate;
     found[k] = 0;
-    if (raised || mode->edge[k].releases || mode->rates[k](run->here.p, t, x, &rate)) continue;
+    if (raised || releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
     if (fabs(run->values[k]) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1)
       found[k] = 1, count++;

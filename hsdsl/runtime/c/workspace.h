@@ -11,7 +11,8 @@
 #define HS_TAKEN(count, type) (((count) * (int)sizeof(type) + (int)sizeof(double) - 1) / (int)sizeof(double))
 #define HS_NUMBERS(count) HS_TAKEN(count, hs_real)
 
-/* w: states of the largest mode; m, e: surfaces and edges of the mode with most; modes, lines, states, derivatives, factors: see hs_model.
+/* w: states of the largest mode; m, e: surfaces and edges of the mode with most; data: numbers that routines are bound
+   to, with those of contacts; modes, lines, states, derivatives, factors: see hs_model.
    kind, stages, extra, order, degree: see hs_method. */
 #define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
 #define HS_STAGES(w, all) (HS_TAKEN(all, hs_real *) + ((all)-1) * HS_NUMBERS(w))
@@ -24,15 +25,15 @@
    2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
 #define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
-#define HS_LOCATED_SPACE_OF(w, m, modes, derivatives, stages, extra, degree, most)                                 \
-  (HS_NUMBERS(derivatives) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + HS_STAGES(w, (stages) + 1 + (extra)) +     \
-   3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
+#define HS_LOCATED_SPACE_OF(w, m, modes, data, derivatives, stages, extra, degree, most)                           \
+  (HS_NUMBERS(derivatives) + HS_NUMBERS(data) + 2 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
+   HS_STAGES(w, (stages) + 1 + (extra)) + 3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
    (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
    HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
    2 * HS_NUMBERS(MOST_PARTS) + HS_NUMBERS(MOST_PARTS * (m) * ((most) + 1)) + HS_NUMBERS(MOST_PARTS * (m)) +       \
    2 * HS_TAKEN(MOST_PARTS * (m), int))
-#define HS_LOCATED_SPACE(w, m, modes, derivatives, stages, extra, order, degree) \
-  HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, derivatives, stages, extra, degree, HS_MOST_DEGREE(order, degree))
+#define HS_LOCATED_SPACE(w, m, modes, data, derivatives, stages, extra, order, degree) \
+  HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, data, derivatives, stages, extra, degree, HS_MOST_DEGREE(order, degree))
 
 /* Memory of a paused run. */
 #define HS_PAUSE_NUMBERS(w, modes, states) (5 * (w) + (states) + (modes))

@@ -70,15 +70,19 @@ static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
   return 0;
 }
 
-/* The point that a tail of edge k, with this contact, runs to at its end, to run->z: 1; 0 where it is not on the guard. */
-static int limit_of(hs_run *run, int k, int contact, hs_time end) {
+/* The point that a tail of edge k, also in contact with run->held, runs to at its end, to run->z: 1; 0 where it is not
+   on the guard. */
+static int limit_of(hs_run *run, int k, hs_time end) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
   hs_real r, noise, *const q = run->z;
   copy(q, run->x, n);
   if (fixed_point(run, k, here->t)) return RAISED;
-  if (contact >= 0) {
-    if (run->model->mode[contact].flow(here->p, here->t, q, run->end)) return RAISED;
+  if (here->table->edge[k].contact >= 0) {
+    bind_contacts(run, run->held, run->held);
+    const int raised = here->table->flow(here->p, here->t, q, run->end);
+    bind_mode(run);
+    if (raised) return RAISED;
     for (int s = 0; s < n; s++) q[s] = q[s] + (end - here->t) * run->end[s];
     if (onto_guard(run, k, end, q)) return RAISED;
   }
@@ -113,15 +117,18 @@ static int close_tail(hs_run *run, int k) {
   if (left > run->epsilon || whole > run->pause || !(end > here->t)) return GOES_ON;
   const hs_mode *const own = here->table;
   if (contact_at(run) != GOES_ON) return HS_ACCUMULATED;
-  const int contact = here->table->edge[k].contact, touches = in_touch(run, k);
+  const int touches = in_touch(run, k);
+  for (int j = 0; j < own->edges; j++) run->held[j] = j == k || in_touch(run, j), run->kept[j] = j == k;
   if (here->table != own) after_contact(run);
   hs_real *const q = run->z;
-  if (touches || limit_of(run, k, contact, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
-  if (contact < 0 || !run->task->settings.contacts) {
+  if (touches || limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
+  if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
-  if (presses(run, end, q, k) != 1 || meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
+  if (!keeping(run, end, q, run->kept)) return GOES_ON;
+  pushes(run, end, q, run->held, run->kept, run->beyond);
+  if (!run->beyond[k] || meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
   note(run, HS_REPLACED, k, run->jump - 1, end, left);
   secant(run, &run->cubic);
   append(run, end, q, &run->cubic);

@@ -24,7 +24,7 @@ static double length_of(void) { return problem_settings.largest; }
 
 const hs_mode *fmu_table(const fmu *unit) {
   const hs_mode *mode = &hs_the_model.mode[unit->now.mode];
-  return unit->now.resting < 0 ? mode : &hs_the_model.mode[mode->edge[unit->now.resting].contact];
+  return unit->now.resting < 0 ? mode : &hs_the_model.mode[mode->held];
 }
 
 int32_t fmu_segment_at(double time) {
@@ -223,9 +223,9 @@ static int rests(fmu *unit, int k, const double *p, double t, const double *befo
   memcpy(q, before, sizeof q);
   if (fixed_point(mode, k, p, t, q)) return 0;
   if (mode->edge[k].contact < 0 || !problem_settings.contacts) return -1;
-  if (hs_the_model.mode[mode->edge[k].contact].values(p, t, q, r) || !(r[k] < 0)) return 0;
-  for (int s = 0; s < mode->dimension; s++) now->state[mode->state[s]] = q[s];
   now->resting = k;
+  if (hs_the_model.mode[mode->held].values(fmu_bind(unit), t, q, r) || !(r[k] < 0)) return now->resting = -1, 0;
+  for (int s = 0; s < mode->dimension; s++) now->state[mode->state[s]] = q[s];
   return 1;
 }
 
@@ -266,7 +266,7 @@ static const char *transitions(fmu *unit, int entry) {
     const int k = first_of(unit, p, x, r, entry);
     if (k < 0) return 0;
     if (k >= mode->edges) return "left_domain";
-    if (mode->edge[k].releases) {
+    if (now->resting >= 0 && mode->edge[k].releases == hs_the_model.mode[now->mode].edge[now->resting].contact) {
       now->resting = -1;
       memset(now->outside, 0, sizeof now->outside);
       continue;

@@ -73,11 +73,14 @@ static int put_in_place(fmu *unit) {
   return 0;
 }
 
-/* Bind routines to the segment of the inputs that was entered last. */
+/* Bind routines to the segment of the inputs that was entered last, and to the guard that holds the state. */
 const double *fmu_bind(fmu *unit) {
   if (unit->now.tuned && put_in_place(unit)) return 0;
   if (!unit->bound) memcpy(unit->p, unit->run.data + unit->now.segment * PROBLEM_DATA, PROBLEM_DATA * sizeof(double));
   unit->bound = 1;
+  const int resting = unit->now.resting;
+  for (int i = 0; i < PROBLEM_CONTACTS; i++) unit->p[PROBLEM_DATA + i] = 0.0;
+  if (resting >= 0) unit->p[PROBLEM_DATA + hs_the_model.mode[unit->now.mode].edge[resting].contact] = HS_HELD;
   return unit->p;
 }
 

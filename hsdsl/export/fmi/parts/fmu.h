@@ -36,7 +36,7 @@ typedef struct {
 typedef struct {
   fmu_data now;
   int co_simulation, event_mode_used, early_return_allowed;
-  double p[PROBLEM_DATA + 1]; /* what routines are bound to, at `bound` */
+  double p[PROBLEM_DATA + PROBLEM_CONTACTS + 1]; /* what routines are bound to, at `bound` */
   int bound;
   double slopes[PROBLEM_STATES + 1]; /* where the flow had a value last */
   int64_t jumps_before;

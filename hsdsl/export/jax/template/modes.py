@@ -53,12 +53,33 @@ class Facts(NamedTuple):
 
 
 def mode_of(
-    name, states, final, edges, contact, sizes, flow, surfaces, magnitudes, gradients, rates, conditions, outputs
+    name,
+    states,
+    final,
+    edges,
+    contact,
+    sizes,
+    flow,
+    surfaces,
+    magnitudes,
+    gradients,
+    rates,
+    conditions,
+    outputs,
+    flags=(),
 ):
     """A mode of plain routines, which return a tuple each, padded to ``sizes`` (W, M, outputs).
 
-    ``contact`` has the fields of `Mode` from ``contacts`` on.
+    ``contact`` has the fields of `Mode` from ``contacts`` on, ``flags`` the numbers of contacts, which routines of
+    motions along guards take behind the others.
     """
+
+    def with_flags(routine):
+        return (lambda p, t, x: routine(jnp.concatenate([p, jnp.asarray(flags)]), t, x)) if flags else routine
+
+    flow, surfaces, magnitudes, outputs = map(with_flags, (flow, surfaces, magnitudes, outputs))
+    gradients, rates = list(map(with_flags, gradients)), list(map(with_flags, rates))
+    conditions = [list(map(with_flags, parts)) for parts in conditions]
     width, count, results = sizes
     rest = count - len(rates)
 

@@ -1,0 +1,151 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+"""What a motion along one guard depends on: the guard, its reset, the flows of their states, and a point of rest."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from hsdsl.expression.scope import symbol
+from hsdsl.functions import below
+from hsdsl.system import TIME, Edge, Mode
+
+SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
+MOST_ROUNDS = 50  # of Newton's method
+MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
+LONG = 200  # operations, from which on a term is not simplified
+Point = dict[sp.Symbol, float]
+
+
+@lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
+def symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
+    """The symbols of states."""
+    return tuple(map(symbol, states))
+
+
+@lru_cache(maxsize=16)
+def _rows(states: tuple[str, ...], flow: tuple[sp.Expr, ...]) -> dict[sp.Symbol, sp.Expr]:
+    return dict(zip(symbols(states), flow, strict=True))
+
+
+class Nearby:
+    """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
+
+    ``changed`` has the numbers of these states, ``own`` their symbols, ``moved`` what the reset adds to each. ``here``
+    is the mode of the part that the edge belongs to.
+    """
+
+    def __init__(self, mode: Mode, edge: Edge, here: dict[sp.Symbol, sp.Integer]) -> None:
+        self._here = here
+        self.states, self.edge = symbols(mode.states), edge
+        self.guard = sp.sympify(edge.surface.residual).xreplace(here)
+        self._flow = _rows(mode.states, mode.flow)
+        pairs = zip(self.states, edge.reset, strict=True)
+        self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x]
+        self.own = tuple(self.states[i] for i in self.changed)
+        self.moved = sp.Matrix([edge.reset[i].xreplace(here) - self.states[i] for i in self.changed])
+
+    def flow(self, x: sp.Symbol) -> Any:
+        """The rate of time or of a state."""
+        return sp.S.One if x == TIME else sp.sympify(self._flow[x]).xreplace(self._here)
+
+    def among(self, value: sp.Basic) -> list[Any]:
+        """The time, and the states in the order of their names, that a value depends on."""
+        return sorted((x for x in value.free_symbols if x == TIME or x in self._flow), key=lambda x: x.name)
+
+    def along(self, value: sp.Expr) -> sp.Expr:
+        """The derivative of an expression along the flow."""
+        return along(value, self.among(value), self.flow)
+
+    def flows(self) -> list[sp.Expr]:
+        """The flows that the motion depends on: of what guard and reset depend on, and of what their flows do."""
+        found = dict.fromkeys(self.among(sp.Tuple(self.guard, *self.moved)))
+        further = [y for x in found for y in self.among(sp.sympify(self.flow(x)))]
+        return [self.flow(x) for x in dict.fromkeys((*found, *further))]
+
+    def is_small(self) -> bool:
+        """Whether all of this written out is short enough to be differentiated twice as trees."""
+        return size((*self.flows(), *self.moved, self.guard)) <= MOST_NODES
+
+
+def size(expressions: Iterable[sp.Expr]) -> int:
+    """The nodes of expressions written out as trees."""
+    sizes: dict[sp.Basic, int] = {}
+
+    def nodes(expr: sp.Basic) -> int:
+        if expr not in sizes:
+            sizes[expr] = 1 + sum(map(nodes, expr.args))
+        return sizes[expr]
+
+    return sum(map(nodes, map(sp.sympify, expressions)))
+
+
+def mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integer]:
+    """The number of the mode that an edge of a part leaves; nothing where its part has one mode."""
+    residual = edge.surface.residual
+    for name in numbers:
+        number = symbol(name)
+        if edge.name.startswith(f"{name}.") and residual.has(number):
+            most = max(int(node.args[1] + 1) for node in residual.atoms(below) if node.args[0] == number)
+            return next({number: k} for k in map(sp.Integer, range(1, most + 1)) if residual.subs(number, k) != -1)
+    return {}
+
+
+def along(value: sp.Expr, among: Sequence[sp.Symbol], flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
+    """The derivative of an expression of ``among`` along a flow."""
+    return sp.Add(*(sp.diff(value, x) * flow(x) for x in among))
+
+
+def cancelled(value: sp.Expr) -> sp.Expr:
+    """The same expression, simpler where that is cheap, without SymPy's polynomials: they compile code of their own."""
+    value = sp.signsimp(sp.sympify(value))
+    if value.count_ops() > LONG:
+        return value
+    over, under = value.as_numer_denom()
+    over = sp.expand(over)
+    shorter = sp.factor_terms(over) / sp.factor_terms(under)
+    return sp.S.Zero if over == 0 else min((value, shorter), key=sp.count_ops)
+
+
+def fixed_point(near: Nearby) -> Point | None:
+    """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
+    equations, flows = [near.guard, *near.moved], near.flows()
+    free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
+    names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
+    draw = random.Random(1)
+    at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
+    slopes = sp.Matrix(equations).jacobian(free) if free else sp.zeros(len(equations), 0)
+    for _ in range(MOST_ROUNDS):
+        values = np.array([value_at(e, at) for e in equations])
+        if not np.all(np.isfinite(values)):
+            return None
+        step = np.linalg.pinv(_values_at(slopes, at), rcond=SMALL) @ values
+        for name, change in zip(free, step.tolist(), strict=True):
+            at[name] -= change
+        if not free or np.max(np.abs(step)) <= SMALL:
+            return at
+    return None
+
+
+def value_at(value: sp.Expr, at: Point) -> float:
+    """The value of an expression at a point; not-a-number where it has none."""
+    number = sp.sympify(value)
+    number = number.xreplace({name: sp.Float(at[name]) for name in number.free_symbols if name in at}).evalf()
+    return float(number) if number.is_Number and number.is_real else math.nan
+
+
+def _values_at(matrix: sp.Matrix, at: Point) -> np.ndarray:
+    return np.array([[value_at(value, at) for value in row] for row in matrix.tolist()]).reshape(matrix.shape)
+
+
+def rank(matrix: sp.Matrix, at: Point) -> int:
+    """The rank of a matrix at a point; 0 where it has no finite value."""
+    numbers = _values_at(matrix, at)
+    return int(np.linalg.matrix_rank(numbers, rtol=SMALL)) if np.all(np.isfinite(numbers)) else 0

@@ -1,0 +1,122 @@
+# SymPy's types are wider than what it takes and returns.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+"""All motions of a mode along its guards in one copy of the mode, in which numbers choose the guards in contact.
+
+Contacts of which none changes what another one depends on choose their own rows of the flow each, so any subset costs
+as much as all of them. Of the others each connected set has rows of its own (`together`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.nearby import along
+from hsdsl.completion.together import Pairs, connected_sets, flow_together, neighbours
+from hsdsl.expression.scope import symbol
+from hsdsl.functions import below
+from hsdsl.program import HELD, LOOKED_AT
+from hsdsl.system import TIME, Edge, Mode, Surface
+
+_NAN = symbol("nan")
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """A mode's motions along its guards, by the numbers of contacts.
+
+    ``mode`` has the states and walls of the mode, its edges, and then ends of `if`. ``flags`` choose: the surface of
+    the edge of a contact that is looked at, or holds, is the push on its guard, negative, along the flow that all
+    others leave; the flow is constrained by those that hold. Where more of them hold than have a flow, that is
+    not-a-number. ``releases`` has for each edge of ``mode`` the number of the contact that it ends.
+    """
+
+    mode: Mode
+    flags: tuple[sp.Symbol, ...]
+    contacts: tuple[Contact, ...]
+    releases: tuple[int | None, ...]
+
+
+def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
+    """The motions along guards of a mode, None without any; ``numbers`` are states that are modes of parts."""
+    contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers))]
+    if not contacts:
+        return None
+    flags = tuple(symbol(f"contact {i}") for i in range(len(contacts)))
+    flow, pushes = _flow_and_pushes(mode, contacts, flags)
+    chosen = flags if len(flags) > 1 else (sp.Integer(HELD),)
+    edges, releases = list(mode.edges), list[int | None]([None] * len(mode.edges))
+    for i, (found, flag) in enumerate(zip(contacts, chosen, strict=True)):
+        edges[found.edge], releases[found.edge] = _released(mode.edges[found.edge], flag, pushes[i]), i
+        edges += [replace(end, surface=_nowhere_else(end.surface, flag)) for end in found.further]
+        releases += [i] * len(found.further)
+    known = dict(zip(flags, chosen, strict=True)) if len(flags) == 1 else {}
+    whole = replace(mode, flow=tuple(row.xreplace(known) for row in flow) if known else tuple(flow), edges=tuple(edges))
+    return Overlay(whole, flags, tuple(contacts), tuple(releases))
+
+
+def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp.Symbol]):
+    """The flow with all choices, and the push of each contact."""
+    flow, near = list[sp.Expr](map(sp.sympify, mode.flow)), neighbours(contacts)
+    off = [below(flag, HELD, sp.S.One, sp.S.Zero) for flag in flags]
+    pairs: dict[int, Pairs] = {}
+    seen: set[int] = set()
+
+    def choose(few: Sequence[int], rows: dict[int, sp.Expr]) -> None:
+        beyond = set().union(*(near[k] for k in few)).difference(few)
+        other = sp.Add(*(off[k] for k in few), *(1 - off[k] for k in sorted(beyond)))
+        alone = len(few) == 1 and not beyond
+        for i, row in rows.items():
+            flow[i] = below(flags[few[0]], HELD, flow[i], row) if alone else below(other, 1, row, flow[i])
+
+    for k, found in enumerate(contacts):
+        choose((k,), found.rows)
+    for first in range(len(contacts)):
+        if first in seen or not near[first]:
+            continue
+        sets = connected_sets(near, first)
+        for few in sets or ():
+            seen |= few
+            members = sorted(few)
+            rows = flow_together([contacts[k] for k in members], pairs)
+            choose(members, rows or {i: _NAN for k in members for i in contacts[k].rows})
+        if sets is None:
+            for i in contacts[first].rows:
+                other = sp.Add(*(1 - off[j] for j in sorted(near[first])))
+                flow[i] = below(flags[first], HELD, flow[i], below(other, 1, flow[i], _NAN))
+    return flow, [_push(mode, found, flow, flag) if near[k] else found.push
+                  for k, (found, flag) in enumerate(zip(contacts, flags, strict=True))]  # fmt: skip
+
+
+def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> sp.Expr:
+    """The push on a guard along the flow that the others leave."""
+    places = dict(zip(found.near.states, flow, strict=True))
+
+    def left(x: sp.Symbol) -> sp.Expr:
+        return sp.S.One if x == TIME else places[x].xreplace({flag: sp.S.Zero})
+
+    return along(found.last, found.near.among(found.last), left)
+
+
+def _released(edge: Edge, flag: sp.Expr, push: sp.Expr) -> Edge:
+    """An edge that, in contact, is reached where the push on its guard falls through zero."""
+    was = edge.surface
+    left, right, residual = (
+        below(flag, LOOKED_AT, sp.sympify(side), other)
+        for side, other in ((was.left, -push), (was.right, sp.S.Zero), (was.residual, -push))
+    )
+    condition = edge.condition
+    if condition is not None:
+        parts = condition.args if isinstance(condition, sp.And) else (condition,)
+        condition = sp.And(*(sp.Or(sp.Gt(flag, 0), part) for part in parts))
+    condition = None if condition in (None, sp.true) else condition
+    return replace(edge, surface=Surface(left, right, residual, was.text), condition=condition)
+
+
+def _nowhere_else(surface: Surface, flag: sp.Expr) -> Surface:
+    """A surface that is reached in contact only."""
+    residual = below(flag, LOOKED_AT, sp.S.NegativeOne, surface.residual)
+    return Surface(residual, sp.S.Zero, residual, surface.text)
