@@ -1,5 +1,5 @@
 # SymPy's types are wider than what it takes and returns.
-# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false
 """Motion along a guard: the flow that ever faster transitions of one edge tend to (M11).
 
 Near a point that a reset R keeps, flow for a short time and reset, over and over, is flow projected along the

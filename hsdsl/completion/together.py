@@ -1,5 +1,5 @@
 # SymPy's types are wider than what it takes and returns.
-# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false, reportCallIssue=false
 """Flows along several guards of one mode at once, for each set of contacts that depend on each other.
 
 A contact takes u (w phi)/(w u) away of a flow phi, for one direction u of its reset and the row w of what the reset

@@ -25,12 +25,13 @@ ORDER = (  # in which pack.c puts them
 
 @dataclass(frozen=True)
 class Shape:
-    """Sizes of one model's rows: states of the largest mode, outputs, the pieces' degree, edges of any mode."""
+    """Sizes of a model's rows: states of the largest mode, outputs, the pieces' degree, edges and contacts of modes."""
 
     width: int
     outputs: int
     degree: int
     edges: int
+    contacts: int
 
     @property
     def row_bytes(self) -> int:

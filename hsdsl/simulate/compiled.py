@@ -45,7 +45,7 @@ class CompiledPlan:
         settings, program = problem.settings, problem.program
         assert settings.method is not None
         method, model = methods.method_table(settings.method), compiled.table
-        shape = Shape(model.width, model.outputs, settings.method.degree, model.edges)
+        shape = Shape(model.width, model.outputs, settings.method.degree, model.edges, model.contacts)
         self.problem, self.compiled, self.layouts = problem, compiled, StateLayouts(program, problem.states)
         scheme = settings.scheme
         key = settings.method, scheme, shape

@@ -110,7 +110,7 @@ def in_contact(run: Run, here: ModeState, holding: Sequence[int], looked_at: Seq
     program, kernel = run.program.flows[number], run.kernel.bind(number, segment.data)
     more = len(program.edges) - len(edges)
     active = {j if j < len(edges) else j + more for j in here.surfaces.active if j not in levels}
-    touched = frozenset(place for k in holding if (place := edges[k].contact) is not None)
+    touched = frozenset[int](place for k in holding if (place := edges[k].contact) is not None)
     surfaces = Surfaces(kernel, program.edges, here.surfaces.scale, run.arithmetic, active, touched=touched)
     return replace(here, flow=number, mode=program, kernel=kernel, surfaces=surfaces, segment=segment)
 
@@ -120,9 +120,8 @@ def after_contact(here: ModeState, held: ModeState, t: Number, x: State) -> Mode
     edges, more = len(here.mode.edges), len(held.mode.edges) - len(here.mode.edges)
     here.surfaces.active.clear()
     here.surfaces.emerging.clear()
-    here.surfaces.active.update(
-        {j if j < edges else j - more for j in held.surfaces.active if not held.surfaces.releases(j)}
-    )
+    kept = (j for j in held.surfaces.active if not held.surfaces.releases(j))
+    here.surfaces.active.update(j if j < edges else j - more for j in kept)
     here.surfaces.active.update(in_touch(here, held))
     return here.moved(t, x)
 

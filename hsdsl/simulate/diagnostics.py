@@ -29,6 +29,7 @@ class Diagnostics:
     departures: list[str] = field(default_factory=list[str])
     doubts: list[str] = field(default_factory=list[str])
     _noted: set[object] = field(default_factory=set[object])
+    _moved: dict[str, tuple[int, Number, Number]] = field(default_factory=dict[str, tuple[int, Number, Number]])
 
     def crowded(self, t: Number) -> None:
         """More transitions than cost no time fell within the relaxation."""
@@ -39,13 +40,25 @@ class Diagnostics:
             )
 
     def in_contact(self, edge: str, start: Number, end: Number, still: bool) -> None:
-        """The state moved along a guard, or rested on it; for less than can be seen, that is neither."""
-        if show(start) != show(end):
-            how = "at rest on" if still else "motion along"
-            self.departures.append(f"{how} the guard of {edge} from t = {show(start)} to t = {show(end)}")
+        """The state moved along a guard, or rested on it; for less than can be seen, that is neither.
+
+        Motion that goes on behind a transition of something else is one.
+        """
+        if show(start) == show(end):
+            return
+        how, place = "at rest on" if still else "motion along", len(self.departures)
+        before = self._moved.pop(edge, None)
+        if before is not None and not still and before[1] == start:
+            place, start = before[0], before[2]
+        self.departures[place : place + 1] = [f"{how} the guard of {edge} from t = {show(start)} to t = {show(end)}"]
+        if not still:
+            self._moved[edge] = place, end, start
 
     def replaced(self, edge: str, number: int, end: Number, left: Number) -> None:
         """The transitions after ``number`` were replaced by their limit."""
+        for other, (place, until, start) in self._moved.items():
+            if until >= end - 2 * left:  # meanwhile motion along other guards goes on
+                self._moved[other] = place, end, start
         self.departures.append(
             f"Zeno at t = {show(end)}: the transitions of {edge} after number {number}, all within {show(left)} "
             "of each other, are replaced by their limit",

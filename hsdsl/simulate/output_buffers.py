@@ -81,6 +81,7 @@ class OutputBuffers:
     def _open(self, rows: int) -> None:
         shape = self._shape
         arcs, transitions, notes = rows // 2 + 8, rows // 4 + 8, rows // 16 + 8
+        notes += rows // 2 * max(0, shape.contacts - 1)  # of each guard that holds a state, where something else jumps
         self._columns: dict[str, Array] = {
             "times": np.empty(rows),
             "values": np.empty((rows, shape.width)),

@@ -1,0 +1,126 @@
+"""Bodies that guards hold together, and large models of them, against closed forms."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from engines import assert_engines_agree
+
+import hsdsl
+
+ENGINES = ["python", "c"]
+TOWER = """
+hsdsl: 1
+parameters: {{m: 2, e: 0.4}}
+modes:
+  a:
+    flow: {{x: v, y: w, v: -1 + {lift}, w: -1 + {pull}}}
+    transitions:
+      - {{name: floor, when: x <= 0, to: a, reset: {{v: -e*v}}}}
+      - name: bodies
+        when: y <= x
+        to: a
+        reset: {{v: (m*v + w - e*(v - w))/(1 + m), w: (m*v + w + m*e*(v - w))/(1 + m)}}
+initial: {{mode: a, x: 0, y: 0, v: 0, w: 0}}
+experiment: {{until: 3}}
+"""
+
+
+def tower(lift: str, pull: str, **arguments: Any) -> Any:
+    return hsdsl.loads(TOWER.format(lift=lift, pull=pull)).simulate(tolerance=1e-12, **arguments)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "radau"])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_body_on_a_body_on_the_floor_rests_exactly_until_either_is_lifted(engine: str, method: str) -> None:
+    """The upper one leaves where its own force is its weight; both where the forces on both are their weight."""
+    run = tower("0", "t/2", engine=engine, method=method)
+    assert run.final.state["x"] == run.final.state["v"] == 0
+    assert run.final.state["w"] == pytest.approx(1 / 4, abs=1e-10)
+    assert run.final.state["y"] == pytest.approx(1 / 12, abs=1e-10)
+    run = tower("t", "0", engine=engine, method=method)  # (2 (t - 1) - 1)/3 from t = 3/2 on
+    assert run.final.state["x"] == pytest.approx(3 / 8, abs=1e-10)
+    assert run.final.state["y"] == pytest.approx(3 / 8, abs=1e-10)
+    assert run.final.state["w"] == pytest.approx(3 / 4, abs=1e-10)
+    assert any("at rest on the guard of bodies from t = 0 to t = 1.5" in reason for reason in run.verdict.reasons)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_forces_that_are_not_one_choice_end_the_run(engine: str) -> None:
+    """Each of two guards takes back twice what the other takes back of its own: alone or together, either holds."""
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, y: w, v: 1, w: 1}
+    transitions:
+      - {name: one, when: x >= 0, to: a, reset: {v: -v/2, w: w - 3*v}}
+      - {name: two, when: y >= 0, to: a, reset: {w: -w/2, v: v - 3*w}}
+initial: {mode: a, x: 0, y: 0, v: 0, w: 0}
+experiment: {until: 1}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "zeno"
+    assert "that of one among them, and their forces on each other are not one choice" in run.stop.message
+
+
+def many(n: int, springs: str = "") -> str:
+    """Masses that fall on tables of their own; ``springs`` between neighbours."""
+
+    def pull(i: int) -> str:
+        beside = [f"x{j} - x{i}" for j in (i - 1, i + 1) if 0 <= j < n]
+        return f" + {springs}*({' + '.join(beside)})" if springs and beside else ""
+
+    flow = "".join(f"      x{i}: v{i}\n      v{i}: -1{pull(i)}\n" for i in range(n))
+    stops = "".join(f"      - {{name: s{i}, when: x{i} <= 0, to: a, reset: {{v{i}: -v{i}/2}}}}\n" for i in range(n))
+    start = "".join(f", x{i}: {Fraction(1 + i * 7 % 11, 22) + Fraction(i, 50 * n)}, v{i}: 0" for i in range(n))
+    return (
+        f"hsdsl: 1\nmodes:\n  a:\n    flow:\n{flow}    transitions:\n{stops}"
+        f"initial: {{mode: a{start}}}\nexperiment: {{until: 4}}\n"
+    )
+
+
+@pytest.mark.parametrize("n", [6, *(pytest.param(n, marks=pytest.mark.slow) for n in (50, 200))])
+def test_masses_come_to_rest_one_after_another(n: int) -> None:
+    """A fall from h and bounces of half the speed end at 3 sqrt(2 h)."""
+    run = hsdsl.loads(many(n)).simulate(tolerance=1e-9)
+    assert run.stop.reason == "until"
+    assert all(abs(run.final.state[f"x{i}"]) <= 1e-12 for i in range(n))
+    ends = {reason.split(" of s")[1].split()[0]: float(reason.split("t = ")[1].split(":")[0])
+            for reason in run.verdict.reasons if reason.startswith("Zeno at")}  # fmt: skip
+    for i in range(n):
+        height = (1 + i * 7 % 11) / 22 + i / (50 * n)
+        assert ends[str(i)] == pytest.approx(3 * (2 * height) ** 0.5, abs=1e-6)
+    assert sum("the guard of s0 " in reason for reason in run.verdict.reasons) <= 3
+
+
+def test_engines_agree_on_masses_with_springs_and_towers() -> None:
+    arguments: dict[str, Any] = {"tolerance": 1e-6, "max_transitions": 100, "relaxation": 1e-2}
+    for scheme in ("located", "relaxed"):
+        assert_engines_agree(hsdsl.loads(many(3, "3/2")), until=2, scheme=scheme, **arguments)
+        text = TOWER.format(lift="t/2", pull="t/3")
+        assert_engines_agree(hsdsl.loads(text), scheme=scheme, **arguments)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_stack_of_bodies_rests_and_leaves_from_the_top(engine: str) -> None:
+    """Inelastic bodies of one mass: body i is lifted by i t/8, and each leaves at 8/i, the topmost first."""
+    n = 4
+    flow = ", ".join(f"x{i}: v{i}, v{i}: -1 + {i}*t/8" for i in range(n))
+    pairs = "".join(
+        f"      - {{name: c{i}, when: x{i} <= x{i - 1}, to: a, reset: {{v{i}: (v{i} + v{i - 1})/2, "
+        f"v{i - 1}: (v{i} + v{i - 1})/2}}}}\n" for i in range(1, n)
+    )  # fmt: skip
+    start = "".join(f", x{i}: 0, v{i}: 0" for i in range(n))
+    text = (
+        f"hsdsl: 1\nmodes:\n  a:\n    flow: {{{flow}}}\n    transitions:\n"
+        f"      - {{name: c0, when: x0 <= 0, to: a, reset: {{v0: 0}}}}\n{pairs}"
+        f"initial: {{mode: a{start}}}\nexperiment: {{until: 4}}\n"
+    )
+    run = hsdsl.loads(text).simulate(engine=engine, tolerance=1e-11)
+    flown = 4 - 8 / 3
+    assert run.final.state["x3"] == pytest.approx(3 / 8 * flown**3 / 6, abs=1e-9)
+    assert [run.final.state[f"x{i}"] for i in range(3)] == [0, 0, 0]
+    assert any("the guard of c2 from t = 2.6666" in reason for reason in run.verdict.reasons)
