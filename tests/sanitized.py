@@ -1,10 +1,13 @@
-"""Run every case, every model and some random ones by the compiled loop, in small chunks: to be run under sanitizers.
+"""Run cases, every model and some random ones by the compiled loop, in small chunks: to be run under sanitizers.
+
+With the argument `all` every case and more of all others.
 
 Started by `unit/test_sanitizers.py`; a fault ends the process with a message of the sanitizer.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from itertools import product
 from pathlib import Path
@@ -21,6 +24,10 @@ from hsdsl.integrators import AUTO
 from hsdsl.model import Model
 from hsdsl.runtime.structures import SCHEMES
 from hsdsl.simulate import output_buffers
+
+ALL = sys.argv[1:] == ["all"]
+SOME = list(CASES) if ALL else list(CASES)[::3]
+WITH = STEPS if ALL else STEPS[:1]
 
 
 def by_c(model: Model, **arguments: Any) -> bool:
@@ -47,7 +54,7 @@ def main() -> None:
                 hsdsl.load(path), Path(folder), method=method, scheme=scheme, **({**step, **SHORT.get(name, {})})
             )
             for name, path in MODELS.items()
-            for step, (scheme, method) in product(list(STEPS)[:2], COMPILED)
+            for step, (scheme, method) in product(WITH, COMPILED)
         )
     print(f"{count + in_chunks()} runs")
 
@@ -56,16 +63,16 @@ def in_chunks() -> int:
     """In chunks so small that every run fills several."""
     output_buffers.LEAST_ROWS, output_buffers.MOST_ROWS = 12, 200
     count = 0
-    for name in CASES:
+    for name in SOME:
         for run in map(Run.of, read(CASES[name])["runs"]) if name not in LONG else ():
             for setting, (scheme, method) in product(list(FLOATS.values())[::3], COMPILED):
                 if setting.get("method", AUTO) == method:
                     count += by_c(model(name), **arguments(run, setting, scheme))
     for name, path in MODELS.items():
         loaded = hsdsl.load(path)
-        for setting, (scheme, method) in product(({**s, **SHORT.get(name, {})} for s in STEPS), COMPILED):
+        for setting, (scheme, method) in product(({**s, **SHORT.get(name, {})} for s in WITH), COMPILED):
             count += by_c(loaded, method=method, max_transitions=40, scheme=scheme, **setting)
-    for seed in range(25):
+    for seed in range(25 if ALL else 8):
         for text, settings in ((random_model(seed), SETTINGS), (smooth_model(seed), SMOOTH_SETTINGS)):
             try:
                 drawn = Model(elaborate("random.yaml", text=text.encode()))

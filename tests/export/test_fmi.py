@@ -227,9 +227,14 @@ TOLERANCE = {"stiff-switch": 1e-6, "thermostat": 1e-6}
 CHATTERING = {"oscillator-with-stop-2"}  # how often it hits while it is stuck is a matter of tolerances
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        pytest.param(name, version, marks=pytest.mark.slow if k % 2 == i else pytest.mark.campaign)
+        for k, name in enumerate(NAMES)
+        for i, version in enumerate(VERSIONS)  # one version of each in turn
+    ],
+)
 def test_every_model_agrees_with_its_run(name: str, version: int, made: Any) -> None:
     model, path = loaded(name), made(name, version)
     source = source_of(model, {})
@@ -260,25 +265,21 @@ def test_every_model_agrees_with_its_run(name: str, version: int, made: Any) -> 
 OTHERWISE = {"event-at-end", "blow-up", "narrow-pulse"}
 # further ones that a solver steps over, that have no one answer, or that enlarge each error
 SOLVER = {"grazing-hit", "two-ways", "lorenz-section"}
-GALLERY = [
-    (path.stem, kind)
-    for path in sorted((MODELS / "gallery").glob("*.yaml"))
-    for kind in ("ModelExchange", "CoSimulation")
-    if path.stem not in OTHERWISE and (kind == "CoSimulation" or path.stem not in SOLVER)
-]
+GALLERY = [path.stem for path in sorted((MODELS / "gallery").glob("*.yaml")) if path.stem not in OTHERWISE]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "kind"), GALLERY)
-def test_scenes_of_the_gallery_end_where_their_runs_do(name: str, kind: str, made: Any) -> None:
+@pytest.mark.parametrize("name", GALLERY)
+def test_scenes_of_the_gallery_end_where_their_runs_do(name: str, made: Any) -> None:
     run = loaded(f"gallery/{name}").simulate()
-    until = run.final.time
-    result = fmpy.simulate_fmu(
-        made(f"gallery/{name}", 3), fmi_type=kind, stop_time=until, output_interval=until / 50, relative_tolerance=1e-9
-    )
-    for state, value in run.final.state.items():
-        size = np.nanmax(np.abs(run.sample(np.linspace(0, until, 201))[state])) or 1.0
-        assert result[state][-1] == pytest.approx(value, abs=1e-3 * size)
+    until, path = run.final.time, made(f"gallery/{name}", 3)  # made once for both kinds
+    for kind in ("ModelExchange", "CoSimulation")[name in SOLVER :]:
+        result = fmpy.simulate_fmu(
+            path, fmi_type=kind, stop_time=until, output_interval=until / 50, relative_tolerance=1e-9
+        )
+        for state, value in run.final.state.items():
+            size = np.nanmax(np.abs(run.sample(np.linspace(0, until, 201))[state])) or 1.0
+            assert result[state][-1] == pytest.approx(value, abs=1e-3 * size), kind
 
 
 class Stepped:

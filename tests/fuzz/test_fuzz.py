@@ -65,7 +65,7 @@ def test_any_document(guard, data):
     fed(guard, "documents", data, 0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @settings(max_examples=500, **LIMITS)
 @given(st.one_of(strategies.DOCUMENTS, strategies.BYTES))
 def test_many_documents(guard, data):

@@ -161,7 +161,9 @@ def varied(directory: Path) -> Any:
     return hsdsl.load(path)
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "count", [8, pytest.param(40, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.campaign)]
+)
 def test_no_impact_is_missed_or_made_up_whatever_the_parameters(count: int, tmp_path: Path) -> None:
     """Restitution and forcing varied, against the closed form."""
     rng, until = random.Random(7), 37.7

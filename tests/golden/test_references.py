@@ -94,8 +94,13 @@ def test_the_models_equations_hold(name: str) -> None:
         assert residual(model(name).program, reference(model(name), block)) <= DEFECTS.get(name, 1e-11)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "block"), KEPT, ids=KEPT_IDS)
+@pytest.mark.parametrize(  # the first of each model; all are rebuilt in a campaign
+    ("name", "block"),
+    [
+        pytest.param(name, block, marks=pytest.mark.campaign if block else pytest.mark.slow, id=f"{name}-{block}")
+        for name, block in KEPT
+    ],
+)
 def test_rebuilt_it_is_the_same(name: str, block: int) -> None:
     stored, anew = reference(model(name), block), solved(name, block)
     assert [(t.edge, t.time, t.before, t.after, t.alternatives) for t in stored.transitions] == [

@@ -191,8 +191,9 @@ def test_random_models_follow_the_exact_execution(block: int) -> None:
         check(seed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("block", range(12))
+@pytest.mark.parametrize(
+    "block", [pytest.param(k, marks=pytest.mark.campaign if k > 2 else pytest.mark.slow) for k in range(12)]
+)
 def test_many_random_models_follow_the_exact_execution(block: int) -> None:
     for seed in range(1000 + 20 * block, 1020 + 20 * block):
         check(seed)

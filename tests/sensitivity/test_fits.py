@@ -77,8 +77,9 @@ def test_noise(model: Any, samples: dict[str, Any]) -> None:
     assert sum(inside(model, samples, noise, {"x": 0.05}) for _ in range(8)) >= 6
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sigma", [None, {"x": 0.05}])
+@pytest.mark.parametrize(
+    "sigma", [pytest.param(None, marks=pytest.mark.slow), pytest.param({"x": 0.05}, marks=pytest.mark.campaign)]
+)
 def test_covariance_holds(model: Any, samples: dict[str, Any], sigma: dict[str, float] | None) -> None:
     """Of 100 tries 95 are expected inside, and fewer than 89 with a probability below 1 %."""
     noise = np.random.default_rng(2026)

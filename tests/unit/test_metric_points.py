@@ -255,8 +255,13 @@ def test_places_that_do_not_fit_are_refused(oscillator, place, message):
         distance(oscillator, place, SpacePoint("free", (1, 2)), relaxation=1e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("height", "shift"), [(0.85, 0.1), (0.9, 0.3), (0.83, 0.2)])
+@pytest.mark.parametrize(
+    ("height", "shift"),
+    [
+        pytest.param(*place, marks=pytest.mark.campaign if k else pytest.mark.slow)
+        for k, place in enumerate([(0.85, 0.1), (0.9, 0.3), (0.83, 0.2)])
+    ],
+)
 def test_runner_against_another_optimiser_from_two_hundred_starts(height, shift):
     from scipy.optimize import minimize
 

@@ -40,9 +40,11 @@ def _with_all_addresses() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "most", [pytest.param([], marks=pytest.mark.slow, id="some"), pytest.param(["all"], marks=pytest.mark.campaign)]
+)
 @pytest.mark.skipif("gcc" not in COMPILERS or sys.platform != "linux", reason="needs gcc's sanitizers")
-def test_no_fault_under_sanitizers(tmp_path: Path) -> None:
+def test_no_fault_under_sanitizers(most: list[str], tmp_path: Path) -> None:
     libraries = [
         subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout.strip()
         for name in ("libasan.so", "libubsan.so")
@@ -57,7 +59,7 @@ def test_no_fault_under_sanitizers(tmp_path: Path) -> None:
         "PYTHONPATH": os.pathsep.join([str(TESTS.parent), str(TESTS)]),
         "XDG_CACHE_HOME": str(tmp_path),
     }
-    command = [sys.executable, str(TESTS / "sanitized.py")]
+    command = [sys.executable, str(TESTS / "sanitized.py"), *most]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, check=False, preexec_fn=_with_all_addresses
     )
