@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+import warnings
 from pathlib import Path
 
 import pytest
@@ -313,3 +314,11 @@ def test_only_where_a_surface_is_reached_its_condition_decides(
     verdict = hsdsl.loads(HUMP.format(condition=condition)).simulate(method=method).verdict
     assert verdict.theorem == theorem
     assert any(word in reason for reason in verdict.reasons)
+
+
+def test_numbers_that_overflow_raise_no_warnings():
+    model = hsdsl.load(MODELS / "stiff-switch.yaml")
+    with warnings.catch_warnings(action="error"):
+        run = model.simulate(method="rk4", step=1e-3)
+        model.estimate(run)
+        assert run.estimated().verdict.theorem == "left"

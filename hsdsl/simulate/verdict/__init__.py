@@ -28,6 +28,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
@@ -48,6 +50,7 @@ INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow"
 LEFT = ("left_domain", "zeno")
 
 
+@np.errstate(all="ignore")  # what overflows is no number, and decides nothing
 def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a run, are left, or are unknown.
 
