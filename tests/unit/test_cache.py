@@ -334,6 +334,20 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
     assert "sympy" in said[0][-1] and said[1][-1] == "[]"
 
 
+PYTHON_LOOP = tuple(f"hsdsl.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching"))
+LOOKS = tuple(f"hsdsl.simulate.verdict.{name}" for name in ("looks", "flows", "misses", "landings", "steps"))
+OTHERS = ("hsdsl.report.summary", "hsdsl.elaborate", "hsdsl.lower", "hsdsl.backends.c")
+
+
+@needs_compiler
+@pytest.mark.parametrize(("name", "more"), [("thermostat", LOOKS), ("oscillator-with-stop-1", ())])
+def test_a_run_of_a_model_seen_before_imports_no_loop_and_no_summary(name: str, more: tuple[str, ...]) -> None:
+    unneeded = (*HEAVY, *PYTHON_LOOP, *OTHERS, *more)
+    command = [sys.executable, "-c", LIGHT_COMMAND, str(ROOT / "models" / f"{name}.yaml"), *unneeded]
+    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
+    assert "hsdsl.lower" in said[0][-1] and said[1][-1] == "[]"
+
+
 @needs_compiler
 def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[str | None] = []

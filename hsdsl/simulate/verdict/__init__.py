@@ -11,6 +11,7 @@ that the run allows itself.
 `agreement`     the errors of a run, by the same run made finer
 `run_view`      an execution with its modes' routines; `place` is one state of it
 `steps`         its steps as polynomials, many at once, with routines over intervals
+`looks`         all of the following, of a run that the screen leaves open
 `finding`       one reason; `judged` holds margins against errors
 `reliability`   from when on a run cannot be relied on
 `crossings`     is each transition transversal, and its condition the same all around it?
@@ -34,14 +35,10 @@ from hsdsl.execution import Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
-from hsdsl.simulate.verdict.commutation import choices, together
+from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.companion import has_companion, is_compiled
-from hsdsl.simulate.verdict.crossings import crossings, summary
+from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.flows import flows
-from hsdsl.simulate.verdict.landings import landings
-from hsdsl.simulate.verdict.misses import misses
-from hsdsl.simulate.verdict.reliability import reliability
 from hsdsl.simulate.verdict.run_view import RunView
 
 __all__ = ["RunView", "assess"]
@@ -74,18 +71,16 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
-    left, unknown, margins = list(departures(run, diagnostics)), [*diagnostics.doubts], list[str]()
+    left, unknown = list(departures(run, diagnostics)), [*diagnostics.doubts]
     if left:
         return Verdict("left", _once(left, unknown))
     screen = run.screen
     if screen is not None and not screen.doubts() and (run.accompanied or not run.execution.enters_beyond):
         margins = *summary(run, *screen.crossings), *together(screen.commuting), *screen.nearest_miss
         return Verdict("holds", _once(margins))
-    found = list(reliability(run))
-    for look in (crossings, choices, landings, misses, flows):
-        findings, reasons = look(run)
-        found += findings
-        margins += reasons
+    from hsdsl.simulate.verdict.looks import looked_at  # of a run that the screen leaves open
+
+    found, margins = looked_at(run)
     left += _named(found, "left")
     unknown += _named(found, "unknown")
     unknown += _unchecked(run, run.stop)

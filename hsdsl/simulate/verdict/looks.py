@@ -1,0 +1,22 @@
+"""Findings about a run that the screen leaves open: one look after another."""
+
+from __future__ import annotations
+
+from hsdsl.simulate.verdict.commutation import choices
+from hsdsl.simulate.verdict.crossings import crossings
+from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.flows import flows
+from hsdsl.simulate.verdict.landings import landings
+from hsdsl.simulate.verdict.misses import misses
+from hsdsl.simulate.verdict.reliability import reliability
+from hsdsl.simulate.verdict.run_view import RunView
+
+
+def looked_at(run: RunView) -> tuple[list[Finding], list[str]]:
+    """Return what is found, and the margins of what holds."""
+    found, margins = list(reliability(run)), list[str]()
+    for look in (crossings, choices, landings, misses, flows):
+        findings, reasons = look(run)
+        found += findings
+        margins += reasons
+    return found, margins
