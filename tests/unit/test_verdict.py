@@ -319,6 +319,6 @@ def test_only_where_a_surface_is_reached_its_condition_decides(
 def test_numbers_that_overflow_raise_no_warnings():
     model = hsdsl.load(MODELS / "stiff-switch.yaml")
     with warnings.catch_warnings(action="error"):
-        run = model.simulate(method="rk4", step=1e-3)
+        run = model.simulate(method="rk4", step=1e-3, until=0.1)
         model.estimate(run)
         assert run.estimated().verdict.theorem == "left"
