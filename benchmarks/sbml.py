@@ -32,6 +32,7 @@ from sbml_math import NotExpressible
 import hsdsl
 
 TOLERANCE = 1e-10
+BEYOND = 1e-6  # runs are longer by this share: the suite counts what happens at the last instant, as floor(t) does
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ def document(folder: Path) -> dict[str, Any]:
         raise NotExpressible("flux balance: a steady state, not a course of time")
     kinds = {name: kind for kind in ("amount", "concentration") for name in given[kind]}
     outputs = {name: kinds.get(name, "value") for name in given["variables"]}
-    return convert(model_file(folder), outputs, float(given["start"]) + float(given["duration"]))
+    end = float(given["start"]) + float(given["duration"])
+    return convert(model_file(folder), outputs, end * (1 + BEYOND))
 
 
 def expected(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -82,7 +84,7 @@ def differences(folder: Path, run: Any) -> str:
     given, (times, columns) = settings(folder), expected(folder)
     if run.stop.reason not in ("until",):
         return f"stopped: {run.stop.reason}: {run.stop.message}"
-    samples = run.sample(np.minimum(times, run.time_span[1]))
+    samples = run.sample(times)
     for name, right in columns.items():
         own = samples[f"out_{name}"]
         allowed = float(given["absolute"]) + float(given["relative"]) * np.abs(right)
