@@ -240,17 +240,17 @@ class Converter(Facts):
         trigger = event.getTrigger()
         assignments = [a for a in event.getListOfEventAssignments() if a.isSetMath()]
         values = {a.getVariable(): self.running.number(a.getMath()) for a in assignments}
-        reset = {self.own(n): self.assigned_value(n, text, values) for n, text in values.items()}
+        reset = {self.own(n): self.assigned_value(n, text) for n, text in values.items()}
         name = spelled(event.getId() or f"event_{index + 1}")
         transition: dict[str, Any] = {"name": name, "event": self.running.condition(trigger.getMath())}
         if reset:
             transition["reset"] = reset
         if event.isSetDelay() and event.getDelay().isSetMath():
-            if not event.getUseValuesFromTriggerTime():
+            if not event.getUseValuesFromTriggerTime() or any(map(self.held_amount, values)):
                 raise NotExpressible("values of the time of execution, with a delay")
             transition["delay"] = self.running.number(event.getDelay().getMath())
-        elif event.getUseValuesFromTriggerTime() and len(self.events) > 1:
-            transition["delay"] = 0
+        elif event.getUseValuesFromTriggerTime() and self.depends_on_others(event):
+            transition["delay"] = 0  # its values are those of its trigger, whatever goes before it at that instant
         if not trigger.getPersistent():
             transition["persistent"] = False
         if trigger.isSetInitialValue() and not trigger.getInitialValue():
@@ -259,11 +259,16 @@ class Converter(Facts):
             transition["priority"] = priority(event.getPriority().getMath())
         return transition
 
-    def assigned_value(self, name: str, text: str, values: dict[str, str]) -> str:
-        if not self.held_amount(name):
-            return text
-        volume = self.volume(name) or ""
-        return f"({text})*({values.get(volume) or self.name(volume)})"
+    def depends_on_others(self, event: Any) -> bool:
+        """Whether what an event assigns uses what another event changes."""
+        used = set[str]().union(*(self.deep(a.getMath()) for a in event.getListOfEventAssignments() if a.isSetMath()))
+        used |= {self.volume(name) or "" for name in used if name in self.species}
+        others = [a for e in self.events if e is not event for a in e.getListOfEventAssignments()]
+        return any(a.getVariable() in used for a in others)
+
+    def assigned_value(self, name: str, text: str) -> str:
+        """What an event assigns to the state of a quantity; an amount is that in the compartment before."""
+        return f"({text})*{self.name(self.volume(name) or '')}" if self.held_amount(name) else text
 
 
 def priority(node: Node) -> int:

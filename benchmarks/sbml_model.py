@@ -236,7 +236,7 @@ class Facts:
         volume = self.volume(name)
         if volume is None or not self.varies(volume) or name in self.assigned or name in self.unknowns:
             return False
-        return not (name in self.rates and volume in self.assigned)
+        return name not in self.rates or volume in self.event_assigned
 
     def is_state(self, name: str) -> bool:
         if name in self.assigned or name in self.unknowns:
