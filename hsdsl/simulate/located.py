@@ -201,7 +201,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     if stop := run.limit_reached(t):
         return stop
     outcome, resumed = reset(here, crossing, event.scale, run), t
-    if crowded(run, t):
+    if crowded(run, here, edge.name, t):
         run.diagnostics.crowded(t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
@@ -231,10 +231,16 @@ def same_instant(run: Run, t: Number) -> bool:
     return bool(made) and made[-1].resumed is not None and t - made[-1].resumed <= run.tie(t)
 
 
-def crowded(run: Run, t: Number) -> bool:
-    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit."""
+def crowded(run: Run, here: ModeState, edge: str, t: Number) -> bool:
+    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
+
+    Those of one instant count only where the edge is one of theirs.
+    """
     last = run.recorder.transitions[-FREE:]
     if len(last) < FREE or contraction(last) is not None:
+        return False
+    again = any(made.edge == edge and made.source == here.mode.name for made in last)
+    if not again and t - last[0].time <= run.tie(t):
         return False
     flown = t - last[0].time
     for made in last:

@@ -326,3 +326,33 @@ def test_memory_is_never_suggested(delayed):
     with pytest.raises(UsageError) as caught:
         delayed.simulate(initial={"rise.armed": 0})
     assert caught.value.hint == "known here: x, y"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_many_events_at_one_instant_cost_no_time(tmp_path, engine):
+    """All 18 are made at t = 1: a cascade of different edges is no tail, which would go through strips."""
+    names = [f"x{k}" for k in range(18)]
+    flow, start = (", ".join(f"{name}: 0" for name in names) for _ in "12")
+    events = ", ".join(f"{{name: e{name}, event: t >= 1, reset: {{{name}: 1}}}}" for name in names)
+    run = model(tmp_path, flow, events, start, "2").simulate(engine=engine)
+    assert [(made.time, made.resumed) for made in run.transitions] == [(1.0, 1.0)] * 18
+    assert {run.final.state[name] for name in names} == {1.0}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "transitions",
+    [
+        "{name: one, event: t >= 1, reset: {a: 1}}, {name: other, event: t >= 1, reset: {b: 1}}",
+        "{name: one, when: t >= 1, if: a < 1, to: m, reset: {a: 2}}, {name: other, when: t >= 1, if: b < 1, to: m, "
+        "reset: {b: 2}}",
+    ],
+)
+def test_verdict_names_what_is_lost_in_a_strip(tmp_path, engine, transitions):
+    """Behind the strip of the first one the second one's surface is passed; `located` makes both."""
+    of = model(tmp_path, "a: 0, b: 0", transitions, "a: 0, b: 0", "2")
+    run = of.simulate(engine=engine, scheme="relaxed")
+    assert [made.edge for made in run.transitions] == ["one"]
+    assert run.verdict.theorem == "left"
+    assert run.verdict.reasons[0].startswith("other was lost at t = 1: ")
+    assert [made.edge for made in of.simulate(engine=engine).transitions] == ["one", "other"]

@@ -270,16 +270,20 @@ static int same_instant(const hs_run *run, hs_time t) {
   return resumed == resumed && t - resumed <= tie(run, t);
 }
 
-/* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit. */
-static int crowded(const hs_run *run, hs_time t) {
+/* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
+   Those of one instant count only where edge k is one of theirs. */
+static int crowded(const hs_run *run, int k, hs_time t) {
   hs_real flight, ratio;
+  int again = 0;
   if (run->jump < FREE || contraction(run, &flight, &ratio)) return 0;
-  hs_time flown = t - made_before(run, FREE - 1)->time;
+  const hs_time since = t - made_before(run, FREE - 1)->time;
+  hs_time flown = since;
   for (int i = FREE - 1; i >= 0; i--) {
     const hs_made *made = made_before(run, i);
     flown = flown - (made->resumed == made->resumed ? made->resumed - made->time : 0);
+    again |= made->edge == k && made->mode == run->here.mode;
   }
-  return flown <= run->epsilon;
+  return flown <= run->epsilon && (again || since > tie(run, t));
 }
 
 /* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */
@@ -293,7 +297,7 @@ static int jump(hs_run *run) {
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   const int without_value = reset(run, run->landed);
-  if (crowded(run, t)) {
+  if (crowded(run, k, t)) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
     run->noted_crowded = 1;
     resumed = t + run->epsilon;

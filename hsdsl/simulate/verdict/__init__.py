@@ -22,6 +22,7 @@ that the run allows itself.
 `flows`         does the flow vary unseen, jump, or have a slope without bound?
 `commutation`   do transitions that are reached together commute?
 `accumulation`  Zeno points and rest, which the relaxed scheme goes through without a word
+`strips`        transitions that are lost while another one waits in a strip
 ==============  ==============================================================================
 """
 
@@ -40,6 +41,7 @@ from hsdsl.simulate.verdict.companion import has_companion, is_compiled
 from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.strips import lost_in_strips
 
 __all__ = ["RunView", "assess"]
 
@@ -92,6 +94,7 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
 def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
     """How the run left what the theorem is about, as far as the run itself tells."""
     yield from diagnostics.departures
+    yield from lost_in_strips(run)
     if not diagnostics.departures and run.stop.reason not in LEFT and run.screen is not None:
         return  # it neither slid nor made crowded transitions
     if not run.followed:

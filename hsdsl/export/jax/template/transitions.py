@@ -147,7 +147,7 @@ def transit(model, config, p, lane, record, event):
     if config.scheme == "relaxed":
         resumed = event.landed + (config.relaxation - event.depth)
     else:
-        resumed = event.t + jnp.where(crowded(config, lane, event.t) & ~entry, config.relaxation, 0.0)
+        resumed = event.t + jnp.where(crowded(config, lane, edge, event.t) & ~entry, config.relaxation, 0.0)
     waits = resumed > event.t
     late = waits & (resumed > config.until + ties(config, config.until))
     resumed = keeping(jnp.minimum(resumed, jnp.where(waits, config.until, resumed)), event.t)
@@ -192,10 +192,15 @@ def entered_next(model, config, bound, lane, event, edge, x, after, scale, resum
     )  # fmt: skip
 
 
-def crowded(config, lane, t):
-    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit."""
-    flown = t - lane.times[0] - lane.waits.sum()
-    return (lane.count >= FREE) & ~contraction(lane)[0] & (flown <= config.relaxation)
+def crowded(config, lane, edge, t):
+    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
+
+    Those of one instant count only where the edge is one of theirs.
+    """
+    since = t - lane.times[0]
+    counts = (lane.loops == edge).any() | (since > ties(config, t))
+    flown = since - lane.waits.sum()
+    return (lane.count >= FREE) & ~contraction(lane)[0] & (flown <= config.relaxation) & counts
 
 
 def since_of(config, lane, event):
