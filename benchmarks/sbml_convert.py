@@ -256,7 +256,9 @@ class Converter(Facts):
         if trigger.isSetInitialValue() and not trigger.getInitialValue():
             transition["initially"] = False
         if event.isSetPriority() and event.getPriority().isSetMath():
-            transition["priority"] = priority(event.getPriority().getMath())
+            text = self.running.number(event.getPriority().getMath())
+            whole = re.fullmatch(r"\(?(-?\d{1,9})\)?", text)
+            transition["priority"] = int(whole[1]) if whole else text
         return transition
 
     def depends_on_others(self, event: Any) -> bool:
@@ -269,16 +271,6 @@ class Converter(Facts):
     def assigned_value(self, name: str, text: str) -> str:
         """What an event assigns to the state of a quantity; an amount is that in the compartment before."""
         return f"({text})*{self.name(self.volume(name) or '')}" if self.held_amount(name) else text
-
-
-def priority(node: Node) -> int:
-    """A priority that is a whole number."""
-    value = node.getValue() if node.isNumber() else math.nan
-    if node.getType() == libsbml.AST_MINUS and node.getNumChildren() == 1 and node.getChild(0).isNumber():
-        value = -node.getChild(0).getValue()
-    if math.isnan(value) or value != round(value):
-        raise NotExpressible("a priority that is no whole number")
-    return int(value)
 
 
 def sorted_lets(let: dict[str, str]) -> dict[str, str]:
