@@ -13,7 +13,7 @@ import yaml
 import hsdsl
 
 pytest.importorskip("libsbml")
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 from sbml_convert import convert_text
 from sbml_math import NotExpressible
