@@ -75,6 +75,7 @@ class Model:
         self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
         self._smaller: dict[tuple[str, ...], Model] = {}
         self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
+        self._slides: CallCache[bool] = CallCache(MOST_PREPARED)  # whether runs of a call slide
 
     @cached_property
     def _differentiator(self) -> Differentiator:
@@ -205,9 +206,13 @@ class Model:
 
     def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
         """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
-        given = {"completion": arguments.get("completion")}
-        options = self.resolve(arguments.get("settings"), given)
-        return self.sliding if options.values["completion"].value == "auto" else self
+        settings, completion = arguments.get("settings"), arguments.get("completion")
+        key = call_key(settings, completion)
+        slides = self._slides.find(key)
+        if slides is None:
+            slides = self.resolve(settings, {"completion": completion}).values["completion"].value == "auto"
+            self._slides.keep(key, slides)
+        return self.sliding if slides else self
 
     def _reduced_run(
         self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
