@@ -87,7 +87,7 @@ class Model:
         return type(self), (self.pipeline,)
 
     def __repr__(self) -> str:
-        name = visible(called(None, Path(self.program.path).name))
+        name = visible(called(None, Path(self.program.path).name).removeprefix("a model "))
         if parts := self.program.parts:
             return f"<hsdsl model {name}: a system of {len(parts)} parts>"
         modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])

@@ -100,7 +100,7 @@ def test_draws_have_the_moments_of_their_distribution(text, mean, deviation):
         (["c~normal(0, 1)"], 0, "expected at least 1"),
         (["c=1:2:3"], 5, "nothing is drawn"),
         (["c~gauss(0, 1)"], 5, "no distribution 'gauss'"),
-        (["c~normal(0)"], 5, "expected normal(mean, deviation), got 1 numbers"),
+        (["c~normal(0)"], 5, "expected normal(mean, deviation), got 1 number"),
         (["c~uniform(2, 1)"], 5, "needs low < high"),
         ({"c": [[1, 2]]}, None, "an array of shape"),
         ({"c": [1, float("inf")]}, None, "expected finite numbers"),
