@@ -118,6 +118,7 @@ class _Follower:
         self.problem, self.run, self.order = problem, run, order_of(problem.settings.method)
         self.modes = {mode.name: k for k, mode in enumerate(problem.program.modes)}
         self.apart = np.zeros((len(run.times), run.values.shape[1]))
+        self.times: list[float] = run.times.tolist()
         self.late: list[float] = []
         self.t: float = float(run.times[0])
         self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
@@ -125,7 +126,7 @@ class _Follower:
 
     def arc(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
-        times: list[float] = self.run.times.tolist()
+        times = self.times
         shift = self.t - times[arc.first]
         for row in range(arc.first, arc.last + 1):
             h = times[row] - times[row - 1] if row > arc.first else 0.0
