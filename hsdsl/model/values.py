@@ -16,7 +16,7 @@ from hsdsl.backends.python import PythonKernel
 from hsdsl.backends.text import compile_routines
 from hsdsl.errors import UsageError
 from hsdsl.model.options import KEYS, names_of
-from hsdsl.names import did_you_mean
+from hsdsl.names import did_you_mean, without_memory
 from hsdsl.parts import meant, numbers_of, of_all
 from hsdsl.program import Program
 from hsdsl.simulate.stops import show
@@ -239,7 +239,7 @@ def start_of_parts(program: Program, overrides: Mapping[str, Any]) -> Mapping[st
             numbers[part.name] = part.modes.index(mode) + 1
         if part.name in given:
             raise UsageError(f"'{part.name}' is a part of the model", f"write initial.{part.name}.mode")
-        for name in part.states[numbers.get(part.name, part.start + 1) - 1]:
+        for name in without_memory(part.states[numbers.get(part.name, part.start + 1) - 1]):
             if name not in given and name not in part.states[part.start]:
                 raise UsageError(f"no value is given for {name}", f"--set initial.{name}=VALUE")
     return given | numbers

@@ -300,3 +300,21 @@ def test_priorities_across_parts_count_at_the_instant():
 @pytest.mark.campaign
 def test_many_random_systems_run_as_in_rational_numbers():
     assert sum(compared(seed, "python") for seed in range(100, 400)) > 900
+
+
+@pytest.mark.parametrize(("n", "edges"), [("-1/5", ["lamp.off", "lamp.up"]), ("1/5", [])])
+def test_a_part_starts_in_the_mode_that_is_given(n, edges):
+    """What its event remembers there follows from the values that are given."""
+    text = """
+    hsdsl: 1
+    automata:
+      lamp:
+        modes:
+          dark: {flow: {n: 1}, transitions: [{name: up, event: n >= 0, reset: {n: n/2}}]}
+          bright: {flow: {n: 0}, transitions: [{name: off, event: n < 0, initially: false, to: dark}]}
+    system: {lamp: {automaton: lamp, initial: {mode: dark, n: 1}}}
+    experiment: {until: 1}
+    """
+    run = hsdsl.loads(text).simulate(initial={"lamp.mode": "bright", "lamp.n": n})
+    assert [t.edge for t in run.transitions if "re-arms" not in t.edge] == edges
+    assert [t.time for t in run.transitions] == pytest.approx([0.0, 0.2][: len(edges)])
