@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import libsbml
+import yaml
 from sbml_math import Node, NotExpressible, Writer, literal
 from sbml_model import Facts, names_in, plain_functions, prepared, raw, spelled, uses_time, written_function
 
@@ -288,3 +290,7 @@ def sorted_lets(let: dict[str, str]) -> dict[str, str]:
     for name in let:
         visit(name)
     return order
+
+
+if __name__ == "__main__":  # python benchmarks/sbml_convert.py model.xml > model.yaml
+    print(yaml.safe_dump(convert(sys.argv[1]), sort_keys=False, width=120), end="")
