@@ -2,8 +2,8 @@
 
 For each number of masses: processor seconds to load, lower and compile the first time, and again with everything kept;
 processor time of a run for each step and state; memory; and how many times as long SciPy and scikit-SUNDAE (CVODE,
-sparse) take, with events, to the same tolerance, each the fastest of runs that take turns with ours. Then a stiff chain
-by `radau`.
+sparse) take, with events, to the same tolerance, each the fastest of runs that take turns with ours. Then chains whose
+masses all come to rest on their stops, and a stiff chain by `radau`.
 
     python benchmarks/scale.py [10 50 100 200 500]
 """
@@ -162,11 +162,34 @@ def row(n: int) -> str:
     )
 
 
+def resting(n: int) -> str:
+    """One line about a chain that a force presses on its stops, until all masses rest there."""
+    text = chain(n, until=12).replace(" + c*(", " + 1 + c*(").replace("k: 4", "k: 1/64")
+    began = process_time()
+    model = hsdsl.loads(text)
+    kept = model.program.contacts[0]
+    loaded = process_time() - began
+    found = model.simulate(tolerance=TOLERANCE)
+    began = process_time()
+    model.simulate(tolerance=TOLERANCE)
+    own = process_time() - began
+    rest = sum(abs(found.final.state[f"v{i}"]) <= TOLERANCE for i in range(n))
+    each = own / len(found.times) / (2 * n) * 1e9
+    return (
+        f"{n:5}  lowered in {loaded:6.2f} s  {len(kept.routines.source) / n / 1e3:5.1f} kB of routines a mass  "
+        f"{len(found.transitions):6} impacts  {own:6.2f} s"
+        f"  {each:6.0f} ns a step and state  {rest} at rest"
+    )
+
+
 def main() -> None:
     """Print the tables."""
     print("    n     first     again    memory  impacts      run   step/state    SciPy     CVODE", flush=True)
     for n in map(int, sys.argv[1:] or (10, 50, 100, 200, 500)):
         print(row(n), flush=True)
+    print("masses that come to rest on their stops:", flush=True)
+    for n in map(int, sys.argv[1:] or (10, 50, 100, 200)):
+        print(resting(n), flush=True)
     first, again, memory = started(grid(25))
     print(f"625 modes: {first:.2f} s, again {again:.2f} s, {memory:.0f} MB", flush=True)
     model, other = hsdsl.loads(chain(200, 1e4, until=UNTIL)), Chain(200, 1e4)
