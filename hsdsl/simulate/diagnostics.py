@@ -75,8 +75,8 @@ class Diagnostics:
     def coupled(self, edge: str, t: Number) -> Stop:
         """Guards hold the state together, and the forces that do so are not one choice: the run stops at t."""
         sentence = (
-            f"several guards hold the state at t = {show(t)}, that of {edge} among them, and their forces on each "
-            "other are not one choice"
+            f"several guards hold the state at t = {show(t)}, that of {edge} among them, and no one motion along them "
+            "is known: their forces are not one choice, or they are too many"
         )
         self.departures.append(sentence)
         return Stop("zeno", t, sentence)

@@ -63,7 +63,7 @@ experiment: {until: 1}
 """
     run = hsdsl.loads(text).simulate(engine=engine)
     assert run.stop.reason == "zeno"
-    assert "that of one among them, and their forces on each other are not one choice" in run.stop.message
+    assert "that of one among them, and no one motion along them is known" in run.stop.message
 
 
 def many(n: int, springs: str = "") -> str:
