@@ -226,7 +226,7 @@ def test_the_relaxed_scheme_says_what_it_passed_over(tmp_path: Path) -> None:
     assert run.verdict.theorem == "unknown" and "passed over" in run.verdict.reasons[0]
 
 
-@pytest.mark.parametrize("scheme", ["located", "relaxed"])
+@pytest.mark.parametrize("scheme", ["located", pytest.param("relaxed", marks=pytest.mark.campaign)])  # 1000 halvings
 def test_more_digits_than_float64_has_exponents_for(scheme: str) -> None:
     run = model("bouncing-ball").simulate(
         "1.5", scheme=scheme, method="rk4", step="1/2", relaxation="1e-300", precision=400

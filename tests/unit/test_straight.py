@@ -24,10 +24,16 @@ def doubling(last: str, step: str, levels: int) -> str:
 
 
 # guard, let
+def nested(depth: int) -> dict[str, tuple[str, str]]:
+    return {
+        "nested roots": ("sqrt(1 + " * depth + "x + v" + ")" * depth, "{}"),
+        "nested minima": ("min(v + 0.1, " * depth + "x" + ")" * depth, "{}"),
+        "nested quotients": ("1/(1.1 + " * depth + "x*v" + ")" * depth, "{}"),
+    }
+
+
 LARGE = {
-    "nested roots": ("sqrt(1 + " * 60 + "x + v" + ")" * 60, "{}"),
-    "nested minima": ("min(v + 0.1, " * 60 + "x" + ")" * 60, "{}"),
-    "nested quotients": ("1/(1.1 + " * 60 + "x*v" + ")" * 60, "{}"),
+    **nested(30),
     "a product": ("*".join(f"(1 + sin(x*{i} + v)/{i}0)" for i in range(1, 100)), "{}"),
     "a sum of products": ("+".join(f"sin(x/{i})*cos(v*{i})" for i in range(1, 100)), "{}"),
     "squares of squares": ("l9", doubling("", "L**2/2 + 0.3", 10)),
@@ -49,7 +55,13 @@ experiment: {{until: 1}}
     return PythonKernel(Model(elaborate("large.yaml", text=text.encode())).program, arithmetic).bind(0, [])
 
 
-@pytest.mark.parametrize("case", LARGE.values(), ids=LARGE.keys())
+@pytest.mark.parametrize(
+    "case",
+    [
+        *(pytest.param(case, id=name) for name, case in LARGE.items()),
+        *(pytest.param(case, id=f"{name}, deep", marks=pytest.mark.campaign) for name, case in nested(60).items()),
+    ],
+)
 def test_large_expressions_are_lowered_soon_and_differentiated_rightly(case):
     began = time.process_time()
     exact = bound(*case, MANY)
