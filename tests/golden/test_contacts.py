@@ -82,7 +82,10 @@ def many(n: int, springs: str = "") -> str:
     )
 
 
-@pytest.mark.parametrize("n", [6, *(pytest.param(n, marks=pytest.mark.slow) for n in (50, 200))])
+LARGE = [pytest.param(50, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.campaign)]
+
+
+@pytest.mark.parametrize("n", [6, *LARGE])
 def test_masses_come_to_rest_one_after_another(n: int) -> None:
     """A fall from h and bounces of half the speed end at 3 sqrt(2 h)."""
     run = hsdsl.loads(many(n)).simulate(tolerance=1e-9)
