@@ -9,6 +9,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from engines import needs_compiler
 
 import hsdsl
 from hsdsl.simulate import verdict
@@ -124,3 +125,10 @@ def test_a_screen_reads_no_further_than_its_columns() -> None:
     assert table.run.transitions == len(run.transitions) == 1
     before = (ctypes.c_double * 2).from_address(table.run.before)
     assert np.array_equal(before, [run.transitions[0].before[name] for name in "xy"])
+
+
+@needs_compiler
+def test_ties_that_commute_need_no_closer_look():
+    run = run_of(hsdsl.load(ROOT / "models/pronking-runner.yaml"), "taylor", 1e-9)
+    screen = screen_of(run)
+    assert screen.commuting and not screen.doubts()

@@ -38,7 +38,7 @@ static int goes_at_once(hs_view *v, const hs_mode *table, const double *p, doubl
     const double r = v->values[k], near = hs_max(noise_of(v, v->magnitudes[k], t, x), fabs(rate) * since);
     if (!hs_finite(near)) return -2;
     if (r > near && !edge->conditional && is_first(table, k, beyond)) beyond = k;
-    if (!(fabs(r) <= near && rate > 0) || edge->releases) continue;
+    if (!(fabs(r) <= near && rate > 0) || edge->releases >= 0) continue;
     const int holds = condition_of(edge, p, t, x);
     if (holds < 0) return -2;
     if (holds && is_first(table, k, standing)) standing = k;
