@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from hsdsl.execution.parts import COMPLETE
 from hsdsl.execution.run import Execution
 from hsdsl.execution.samples import Array
 from hsdsl.names import called, visible
@@ -144,7 +145,7 @@ class Ensemble:
     @property
     def failed(self) -> Array:
         """Which instances did not get to where they were going: array of bool."""
-        return ~np.isin(self.stop, ("until", "final"))
+        return ~np.isin(self.stop, COMPLETE)
 
     def failures(self, most: int = 100) -> tuple[Failure, ...]:
         """Name the first failed instances; each is run again for its message.

@@ -53,20 +53,13 @@ class Stop:
     @property
     def complete(self) -> bool:
         """Whether the run got to where it was going (exit code 0)."""
-        return self.reason in ("until", "final")
+        return self.reason in COMPLETE
 
 
-REASONS = (
-    "until",
-    "final",
-    "left_domain",
-    "zeno",
-    "transition_limit",
-    "memory_limit",
-    "not_finite",
-    "step_underflow",
-    "interrupted",
-)
+COMPLETE = ("until", "final")  # the run got to where it was going
+LEFT = ("left_domain", "zeno")  # the execution itself ends there
+INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
+REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 
 @dataclass(frozen=True)

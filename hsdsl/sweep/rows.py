@@ -24,14 +24,13 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.execution import Array, Ensemble
+from hsdsl.execution import LEFT, Array, Ensemble
 from hsdsl.execution.samples import optional
 from hsdsl.simulate.stops import limit
 from hsdsl.sweep.manifest import Manifest
 
 FIXED = ("row", "stop", "message", "verdict", "time", "mode", "transitions")
 TAG = b"hsdsl.sweep"
-LEFT = ("left_domain", "zeno")
 LISTS = ("transition", "before", "after", "sample")
 
 

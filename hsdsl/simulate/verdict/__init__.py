@@ -32,7 +32,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hsdsl.execution import Stop, Verdict
+from hsdsl.execution import INCOMPLETE, LEFT, Stop, Verdict
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
@@ -44,9 +44,6 @@ from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.strips import lost_in_strips
 
 __all__ = ["RunView", "assess"]
-
-INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
-LEFT = ("left_domain", "zeno")
 
 
 @np.errstate(all="ignore")  # what overflows is no number, and decides nothing

@@ -26,7 +26,6 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.agreement import Errors
 
 Array = NDArray[np.float64]
-ENDED = ("until", "final")
 MORE = 2  # terms
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
 MOST_ROUNDS = 8  # of Newton's method
@@ -101,7 +100,7 @@ def has_companion(problem: Problem, run: Execution) -> bool:
         and order_of(settings.method) <= MOST_ORDER
         and problem.arithmetic.digits is None
         and len(problem.timeline.segments) == 1
-        and run.stop.reason in ENDED
+        and run.stop.complete
         and (is_compiled(run) or not (run.enters_beyond or any(arc.kind != "flow" for arc in run.arcs)))
     )
 

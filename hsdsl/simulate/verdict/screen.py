@@ -18,7 +18,7 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.companion import ENDED, Companion, is_compiled, order_of
+from hsdsl.simulate.verdict.companion import Companion, is_compiled, order_of
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
@@ -141,7 +141,7 @@ def screened(problem: Problem, run: Execution, finer: Execution | None) -> Scree
         return None
     one: Any = run.__dict__["_of"]
     other: Any = finer and finer.__dict__["_of"]
-    if run.stop.reason not in ENDED or (finer and finer.stop.reason != run.stop.reason):
+    if not run.stop.complete or (finer and finer.stop.reason != run.stop.reason):
         return None
     if one.columns.notes or (other and other.columns.notes):
         return None
