@@ -114,6 +114,14 @@ def test_architecture_page_has_the_layers_that_are_checked():
     assert [line.split("  ")[0] for line in table[1].splitlines()] == contracts[0]["layers"]
 
 
+def test_architecture_page_names_files_that_there_are():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    known = {"/" + place for line in listed.split() for place in (line, *map(str, Path(line).parents))}
+    named = set(re.findall(r"`((?:hsdsl|docs|tests|models|examples)/[\w./-]+|[\w./-]+\.(?:py|c|h|m|js|md))`", page))
+    assert [name for name in sorted(named) if not any(path.endswith("/" + name.rstrip("/")) for path in known)] == []
+
+
 def readme_command(mark: str) -> str:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     found = re.findall(rf"^<!-- {mark} -->\n```sh\n(.*?)\n```$", text, flags=re.MULTILINE | re.DOTALL)
