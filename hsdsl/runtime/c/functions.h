@@ -111,11 +111,18 @@ static int struggles(const hs_control *control);
 /* stall_detection.c */
 static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, hs_time t1);
 
+/* hs.c */
+static void *take(hs_store *store, int64_t count, size_t size);
+static hs_real *numbers(hs_store *store, int64_t count);
+
 /* surfaces.c */
 HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, hs_real *value);
 static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value);
 static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_polynomial *part);
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r);
+static int gradient_of(hs_run *run, int k, hs_time t, const hs_real *x);
+static int magnitudes_at(hs_run *run, hs_time t, const hs_real *x, hs_real *magnitudes);
+static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time t, const hs_real *x, int entry);
 static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise);
 static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_time reset_at);
 static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside);

@@ -135,4 +135,16 @@ static double noise_of(const hs_view *v, double magnitude, double t, const doubl
   return ROUNDOFF_UNITS * HS_UNIT * magnitude;
 }
 
+/* screen_errors.c */
+static void grow(double *error, double by);
+static double shift_by(const hs_view *v, double t);
+
+/* screen_ties.c */
+static int commute(hs_view *v, const hs_tied *tied, int one, int other);
+static int is_alternative(const hs_view *v, int64_t j, int k);
+
+/* screen_places.c */
+static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found);
+static int evaluate_surfaces(hs_view *v, double t, const double *x);
+
 #endif
