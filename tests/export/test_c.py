@@ -17,7 +17,7 @@ import hsdsl
 from hsdsl.cli.verbs import obey
 from hsdsl.export import files_of, source_of
 from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
-from hsdsl.export.c.sources import COMPILED
+from hsdsl.export.c.sources import COMPILED, c_sources
 from hsdsl.report import as_json
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -252,3 +252,52 @@ def test_a_run_in_stretches_makes_the_same_transitions(tmp_path: Path) -> None:
     found = output(built(folder, next(iter(COMPILERS.values())), main="stretches.c"))
     run = model.simulate()
     assert [t["time"] for t in found["transitions"]] == pytest.approx([t.time for t in run.transitions], abs=1e-9)
+
+
+USING = """
+hsdsl: 1
+parameters: {k: 2}
+modes:
+  up: {flow: {x: 1, y: -y, z: k}, transitions: [{when: x >= 99, to: up, reset: {x: z - y}}]}
+initial: {mode: up, z: x - y, x: k*y, y: 3}
+experiment: {until: 4}
+"""
+SET_START = """
+#include <stdio.h>
+#include "instance.h"
+
+static hs_instance run;
+
+int main(void) {
+  const double tried[][4] = {{0, 0, 0, 0}, {0, 4, 0, 0}, {1, 4, 0, 0}, {1, 4, 7, 0}, {0, 0, 0, 3}};
+  printf("[");
+  for (int k = 0; k < 5; k++) {
+    hs_open(&run);
+    for (int s = 0; s < 3; s++)
+      if (tried[k][s] != 0) run.x[s] = tried[k][s], run.given[s] = 1;
+    if (tried[k][3] != 0) run.parameters[0] = tried[k][3];
+    if (hs_tune(&run) || hs_start(&run)) return 2;
+    printf("%s[%.17g, %.17g, %.17g]", k ? ", " : "", run.x[0], run.x[1], run.x[2]);
+  }
+  printf("]\\n");
+  return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("initial", [{}, {"y": 5}, {"x": 1, "y": 0.5}])
+def test_initial_values_follow_those_that_they_use(initial: dict[str, float], tmp_path: Path) -> None:
+    model = hsdsl.loads(USING)
+    files = c_sources(source_of(model, {"initial": initial}), tunable=True)
+    for name, content in (files | {"start.c": SET_START.encode()}).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    found = output(built(tmp_path, next(iter(COMPILERS.values())), main="start.c"))
+    columns = next(iter(model.simulate().arcs)).states
+    assert columns == ("x", "y", "z")
+    for (x, y, z, k), row in zip(
+        [(0, 0, 0, 0), (0, 4, 0, 0), (1, 4, 0, 0), (1, 4, 7, 0), (0, 0, 0, 3)], found, strict=True
+    ):
+        given = initial | {name: value for name, value in zip(columns, (x, y, z), strict=True) if value}
+        run = model.simulate(initial=given, parameters={"k": k or 2})
+        assert row == [float(run.sample([0])[name][0]) for name in columns]

@@ -53,19 +53,30 @@ experiment: {until: 3, tolerance: 1e-10}
 """
 
 
+USING = """
+hsdsl: 1
+parameters: {k: 2}
+modes:
+  up: {flow: {x: 1, y: -y, z: k}, transitions: [{when: x >= 99, to: up, reset: {x: z - y}}]}
+initial: {mode: up, z: x - y, x: k*y, y: 3}
+experiment: {until: 2, tolerance: 1e-11}
+"""
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """Units by model and version, each made once."""
-    known: dict[tuple[str, int], str] = {}
+    known: dict[Any, str] = {}
 
-    def make(text: str, version: int) -> str:
-        if (text, version) not in known:
+    def make(text: str, version: int, **initial: float) -> str:
+        key = text, version, *initial.items()
+        if key not in known:
             model = hsdsl.loads(text) if "\n" in text else hsdsl.load(MODELS / f"{text}.yaml")
-            ((name, content),) = files_of(source_of(model, {}), f"fmi{version}").items()
+            ((name, content),) = files_of(source_of(model, {"initial": initial}), f"fmi{version}").items()
             path = tmp_path_factory.mktemp("unit") / name
             path.write_bytes(content)
-            known[text, version] = str(path)
-        return known[text, version]
+            known[key] = str(path)
+        return known[key]
 
     yield make
 
@@ -285,14 +296,15 @@ def test_scenes_of_the_gallery_end_where_their_runs_do(name: str, made: Any) -> 
 class Stepped:
     """A unit of FMI 3 in co-simulation, function by function."""
 
-    def __init__(self, path: str, **start: float) -> None:
+    def __init__(self, path: str, initialise: bool = True, **start: float) -> None:
         self.description = fmpy.read_model_description(path)
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         self.unit: Any = fmpy.instantiate_fmu(fmpy.extract(path), self.description, "CoSimulation")
         self.set(**start)
-        self.unit.enterInitializationMode(startTime=0)
-        self.unit.exitInitializationMode()
         self.time = 0.0
+        if initialise:
+            self.unit.enterInitializationMode(startTime=0)
+            self.unit.exitInitializationMode()
 
     def set(self, **values: float) -> None:
         for name, value in values.items():
@@ -333,6 +345,44 @@ def test_parameters_and_what_depends_on_them_can_be_tuned(made: Any) -> None:
     unit.go_to(3)
     run = loaded(DRIVEN).simulate(parameters={"m": 1})
     assert unit.get("x", "v") == pytest.approx(list(run.final.state.values()), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("version", "exported"),
+    [
+        (3, {"y": 5.0}),
+        pytest.param(2, {}, marks=pytest.mark.slow),
+        pytest.param(2, {"x": 1.5}, marks=pytest.mark.campaign),
+    ],
+)
+@pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
+@pytest.mark.parametrize("given", [{}, {"y": 4.5}, {"k": 1.25, "y": 6.0}, {"k": 0.5}, {"x": -2.0}])
+def test_initial_values_follow_those_that_they_use(
+    version: int, kind: str, exported: dict[str, float], given: dict[str, float], made: Any
+) -> None:
+    result = fmpy.simulate_fmu(
+        made(USING, version, **exported),
+        fmi_type=kind,
+        start_values=given,
+        stop_time=2,
+        output_interval=0.5,
+        relative_tolerance=1e-9,
+        output=["x", "y", "z"],
+    )
+    initial = exported | {name: value for name, value in given.items() if name != "k"}
+    run = loaded(USING).simulate(initial=initial, parameters={k: v for k, v in given.items() if k == "k"})
+    names = ("x", "y", "z")
+    assert [result[name][0] for name in names] == [float(run.sample([0])[name][0]) for name in names]
+    assert [result[name][-1] for name in names] == pytest.approx([run.final.state[n] for n in names], abs=1e-5)
+
+
+def test_initial_values_follow_before_a_unit_is_initialised(made: Any) -> None:
+    unit = Stepped(made(USING, 3, y=5.0), initialise=False)
+    seen: list[list[float]] = []
+    for given in ({"y": 4.0}, {"k": 3.0}, {"x": 1.0}, {"k": 2.0}):
+        unit.set(**given)
+        seen.append(unit.get("x", "y", "z"))
+    assert seen == [[8, 4, 4], [12, 4, 8], [1, 4, -3], [1, 4, -3]]
 
 
 DRIVEN_OTHERWISE = DRIVEN.replace("u: sin(t)", "u: {times: [0, 1, 2], values: [0.5, -1, 2], hold: zero}")

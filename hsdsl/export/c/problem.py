@@ -56,9 +56,13 @@ extern const char *const problem_owned[];
 /* Of each parameter whether others decide it, and whether it decides the times of inputs, which stay as exported. */
 extern const int problem_derived[], problem_structural[];
 
-/* Derive parameters from the ones before them, and the initial state from parameters. Not 0 where one has no value. */
+/* Of each state of the start whether the export gave its value; others follow parameters and those. */
+extern const char problem_given[];
+
+/* Derive parameters from the ones before them. Derive those initial values in `x` that are not `given` from parameters
+   and others, as in the file. Not 0 where one has no value. */
 int problem_derive(hs_real *p);
-int problem_start(const hs_real *p, hs_real *x);
+int problem_start(const hs_real *p, const char *given, hs_real *x);
 
 #endif
 """

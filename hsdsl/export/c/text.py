@@ -27,10 +27,16 @@ def comment(lines: Iterable[str]) -> str:
     return "/* " + "\n   ".join(wrapped) + " */\n"
 
 
-def array(kind: str, name: str, values: Iterable[str]) -> str:
-    """The definition of an array, of at least one element: C has no empty ones."""
+def array(kind: str, name: str, values: Iterable[str], after: str = "") -> str:
+    """The definition of an array, of at least one element: C has no empty ones; ``after`` is of its type."""
     listed = list(values) or ["0"]
-    return f"{kind} {name}[] = {{\n  {_wrapped(listed)}}};\n"
+    return f"{kind} {name}[]{after} = {{\n  {_wrapped(listed)}}};\n"
+
+
+def function(name: str, arguments: str, body: str, real: str = "hs_real") -> str:
+    """The definition of a routine of ``p`` that writes to ``out``; it returns 0 where it has a value."""
+    head = f"static int {name}({arguments}, {real} *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
+    return f"{head}{body}\n  return bad;\n}}\n"
 
 
 def _wrapped(values: Sequence[str]) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from hsdsl.backends.c import constant_bodies, width
-from hsdsl.export.c.text import array
-from hsdsl.parts import numbered
+from hsdsl.backends.c import constant_bodies
+from hsdsl.export.c.starts import starts
+from hsdsl.export.c.text import array, function
 from hsdsl.program import Program
 from hsdsl.simulate import Problem
 
@@ -21,14 +21,6 @@ int problem_derive(hs_real *p) {{
   (void)p;
 {calls}
   return bad;
-}}
-
-int problem_start(const hs_real *p, hs_real *x) {{
-  hs_real out[{width}] = {{0}};
-  if (initial(p, out)) return 1;
-  (void)x;
-{start}
-  return 0;
 }}
 """
 
@@ -71,26 +63,13 @@ def with_sources(program: Program, used: dict[str, set[int]], own: set[str], dir
 
 def derivations(problem: Problem) -> str:
     """The definitions of ``problem_derive`` and ``problem_start``, and of what kind each parameter is."""
-    program, overrides = problem.program, problem.settings.overrides
+    program = problem.program
     bodies, own, fixed = constant_bodies(program), derived(problem), structural(problem)
     flags = array("const int", "problem_derived", (str(int(name in own)) for name in program.parameters))
     flags += array("const int", "problem_structural", (str(int(name in fixed)) for name in program.parameters))
     functions, calls = list[str](), list[str]()
     for i, name in enumerate(program.parameters):
         if name in own:
-            functions.append(_function(f"parameter_{i}", bodies[f"parameter_{i}"]))
+            functions.append(function(f"parameter_{i}", "const hs_real *p", bodies[f"parameter_{i}"]))
             calls.append(f"  bad |= parameter_{i}(p, p + {i});")
-    kept = {f"initial.{name}" for name in numbered(program.parts)} | overrides.keys()
-    start = [
-        f"  x[{i}] = out[{program.initial_states.index(name)}];"
-        for i, name in enumerate(problem.states)
-        if f"initial.{name}" not in kept
-    ]
-    functions.append(_function("initial", bodies["initial"]))
-    text = _DERIVE.format(calls="\n".join(calls), start="\n".join(start), width=width(program) + 1)
-    return flags + "".join(functions) + text
-
-
-def _function(name: str, body: str) -> str:
-    head = f"static int {name}(const hs_real *p, hs_real *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
-    return f"{head}{body}\n  return bad;\n}}\n"
+    return flags + "".join(functions) + _DERIVE.format(calls="\n".join(calls)) + starts(problem)

@@ -132,7 +132,6 @@ def _starts(source: Source, run: Execution) -> Iterator[Data]:
     shown = frozenset(without_memory(run.arcs[0].states))
     for name, value in zip(problem.states, problem.x, strict=True):
         hidden = name not in shown
-        kept = hidden and bool(problem.program.parts)  # a mode, or what it lacks: as exported
         reach = _largest(run, name) or 1.0
         yield {
             "name": f"initial.{name}",
@@ -142,8 +141,8 @@ def _starts(source: Source, run: Execution) -> Iterator[Data]:
             "value": float(value),
             "low": float(value) - reach,
             "high": float(value) + reach,
-            "given": kept or f"initial.{name}" in problem.settings.overrides,
-            "fixed": kept,
+            "given": f"initial.{name}" in problem.settings.overrides,
+            "fixed": hidden,
             "hidden": hidden,
         }
 

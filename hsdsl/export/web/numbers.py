@@ -8,10 +8,10 @@ from itertools import pairwise
 
 from hsdsl import limits
 from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.c import constant_bodies, initial_bodies, switching_bodies
+from hsdsl.backends.c import constant_bodies, switching_bodies
 from hsdsl.backends.c.printer import literal
 from hsdsl.defaults import DEFAULTS
-from hsdsl.export.c.text import array
+from hsdsl.export.c.text import array, function
 from hsdsl.export.c.tuning import derived, used_by, with_sources
 from hsdsl.program import Program
 from hsdsl.simulate import Problem
@@ -30,13 +30,11 @@ def page_numbers(problem: Problem) -> str:
     program = problem.program
     bodies = constant_bodies(program)
     functions = (
-        _function(f"file_{name}", "const double *p", body)
+        function(f"file_{name}", "const double *p", body, "double")
         for name, body in bodies.items()
-        if not name.startswith(("tolerance", "sample_")) and (name not in SETTINGS or by_file(problem, name))
+        if not name.startswith(("tolerance", "sample_", "initial")) and (name not in SETTINGS or by_file(problem, name))
     )
-    bodies = initial_bodies(program)
-    following = (_function(f"file_{name}", "const double *p", body) for name, body in bodies.items())
-    return "".join([*_sizes(problem), *functions, *following, *_tables(problem), _inputs(program), _switches(problem)])
+    return "".join([*_sizes(problem), *functions, *_tables(problem), _inputs(program), _switches(problem)])
 
 
 def by_file(problem: Problem, name: str) -> bool:
@@ -75,8 +73,6 @@ def _sizes(problem: Problem) -> Iterable[str]:
     relaxation = FLOAT64.constant(DEFAULTS["relaxation"]) if by_default else 0.0
     sizes = {
         "STARTS": len(problem.states),
-        "INITIAL": len(program.initial_states),
-        "FOLLOWERS": len(program.initial_order),
         "STATES": len(program.all_states),
         "INPUT_COUNT": len(program.inputs),
         "SWITCH_COUNT": len(program.switches),
@@ -89,11 +85,6 @@ def _sizes(problem: Problem) -> Iterable[str]:
     yield from (f"#define PAGE_{name} {size}\n" for name, size in sizes.items())
 
 
-def _function(name: str, arguments: str, body: str) -> str:
-    head = f"static int {name}({arguments}, double *out) {{\n  int bad = 0;\n  (void)p, (void)out;\n"
-    return f"{head}{body}\n  return bad;\n}}\n"
-
-
 def _tables(problem: Problem) -> Iterable[str]:
     """Which routine computes what, and where states are."""
     program, overrides, names = problem.program, problem.settings.overrides, problem.program.constants.names
@@ -103,14 +94,6 @@ def _tables(problem: Problem) -> Iterable[str]:
         yield array("static page_constant *const", f"page_{kind}", pointers)
     pointers = (f"file_{name}" if by_file(problem, name) else "0" for name in SETTINGS)
     yield array("static page_constant *const", "page_setting", pointers)
-    known = program.initial_states
-    start = (str(known.index(name)) if name in known else "-1" for name in problem.states)
-    yield array("static const int", "page_start_place", start)
-    given = (str(int(f"initial.{name}" in overrides)) for name in problem.states)
-    yield array("static const int", "page_start_given", given)
-    yield array("static const int", "page_follower", map(str, program.initial_order))
-    pointers = (f"file_initial_{i}" for i in program.initial_order)
-    yield array("static page_constant *const", "page_following", pointers)
     scaled = (
         name in program.scaled_states and f"experiment.scale.{name}" not in overrides for name in program.all_states
     )
@@ -155,7 +138,7 @@ def _switches(problem: Problem) -> str:
     parts, rows = list[str](), list[str]()
     for name, body in bodies.items():
         arguments = "const double *p, double t" if name.startswith("argument") else "const double *p"
-        parts.append(_function(f"switch_{name}", arguments, body))
+        parts.append(function(f"switch_{name}", arguments, body, "double"))
     for i, switch in enumerate(problem.program.switches):
         head = f"{{{int(switch.kind == 'floor')}, {int(switch.jumps)}, switch_argument_{i}, "
         if f"line_{i}" in bodies:

@@ -96,7 +96,7 @@ void hs_open(hs_instance *instance) {
   instance->timeline.data = instance->data;
 #endif
   for (int i = 0; i < PROBLEM_PARAMETERS; i++) instance->parameters[i] = problem_timeline.data[i];
-  for (int i = 0; i < problem_dimension; i++) instance->x[i] = problem_x[i];
+  for (int i = 0; i < problem_dimension; i++) instance->x[i] = problem_x[i], instance->given[i] = problem_given[i];
   task->model = &hs_the_model;
   task->method = &problem_method;
   task->timeline = &instance->timeline;
@@ -129,7 +129,7 @@ int hs_tune(hs_instance *instance) {
 }
 
 int hs_start(hs_instance *instance) {
-  if (problem_start(instance->parameters, instance->x)) return 1;
+  if (problem_start(instance->parameters, instance->given, instance->x)) return 1;
   for (int i = 0; i < problem_dimension; i++)
     if (!hs_finite(instance->x[i])) return 1;
   return 0;

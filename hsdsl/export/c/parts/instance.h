@@ -50,6 +50,7 @@ struct hs_instance {
   hs_arc last;
   hs_real x[PROBLEM_WIDTH + 1];
   hs_real parameters[PROBLEM_PARAMETERS + 1];
+  char given[PROBLEM_WIDTH + 1]; /* of each number in `x`: whether it stays where others are derived */
 #if defined(PROBLEM_TUNABLE)
   hs_real data[PROBLEM_SEGMENTS * PROBLEM_DATA + 1];
 #endif
@@ -81,7 +82,8 @@ void hs_open(hs_instance *instance);
    finite value. `instance->parameters` has the values of the others. */
 int hs_tune(hs_instance *instance);
 
-/* Derive the initial state from the parameters; not 0 where it has no finite value. */
+/* Derive those initial values in `instance->x` of which `instance->given` has a 0 from the parameters and from others,
+   as the file does; not 0 where one has no finite value. */
 int hs_start(hs_instance *instance);
 #endif
 

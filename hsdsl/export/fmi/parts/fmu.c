@@ -52,6 +52,20 @@ void fmu_reset(fmu *unit) {
   unit->bound = 0;
 }
 
+/* Derive the initial values that were not set from those that were; not 0 where one has no value. */
+static int derive_start(fmu *unit) {
+  const hs_mode *mode = &hs_the_model.mode[problem_mode];
+  double *const state = unit->now.state;
+  for (int s = 0; s < problem_dimension && s < mode->dimension; s++) {
+    if (!unit->now.state_set[mode->state[s]]) continue;
+    unit->run.x[s] = state[mode->state[s]];
+    unit->run.given[s] = 1;
+  }
+  if (hs_start(&unit->run)) return 1;
+  for (int s = 0; s < problem_dimension && s < mode->dimension; s++) state[mode->state[s]] = unit->run.x[s];
+  return 0;
+}
+
 /* Put parameters and the inputs that were set where routines and the run read them; not 0 where one has no value. */
 static int put_in_place(fmu *unit) {
   double *const data = unit->run.data;
@@ -59,7 +73,7 @@ static int put_in_place(fmu *unit) {
   for (int i = 0; i < FMU_INPUTS; i++)
     if (fmu_input[i].given >= 0) unit->now.parameters[fmu_input[i].given] = unit->now.input_set[i] ? 0.0 : 1.0;
   for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->run.parameters[i] = unit->now.parameters[i];
-  if (hs_tune(&unit->run)) return 1;
+  if (hs_tune(&unit->run) || (!unit->now.started && derive_start(unit))) return 1;
   for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.parameters[i] = unit->run.parameters[i];
   for (int i = 0; i < FMU_INPUTS; i++) {
     if (!unit->now.input_set[i]) continue;
@@ -120,7 +134,10 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
   const fmu_variable *variable = &fmu_variables[reference];
   switch (variable->kind) {
     case FMU_TIME: *value = now->time; return FMU_OK;
-    case FMU_STATE: *value = (now->shows_before ? now->before : now->state)[variable->index]; return FMU_OK;
+    case FMU_STATE:
+      if (!now->started && !fmu_bind(unit)) return FMU_NO_VALUE;
+      *value = (now->shows_before ? now->before : now->state)[variable->index];
+      return FMU_OK;
     case FMU_PARAMETER:
       if (!fmu_bind(unit)) return FMU_NO_VALUE;
       *value = now->parameters[variable->index];
@@ -148,6 +165,7 @@ fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
     case FMU_STATE:
       now->state[variable->index] = value;
       now->state_set[variable->index] = 1;
+      now->tuned |= !now->started;
       return FMU_OK;
     case FMU_PARAMETER:
       if (problem_derived[variable->index] || (now->started && problem_structural[variable->index])) return FMU_ERROR;
@@ -241,13 +259,9 @@ static fmu_status started(fmu *unit) {
 
 fmu_status fmu_initialize(fmu *unit) {
   fmu_data *now = &unit->now;
-  const hs_mode *mode = &hs_the_model.mode[problem_mode];
   int jumped;
   double next;
   if (!fmu_bind(unit)) return FMU_ERROR;
-  if (hs_start(&unit->run)) return FMU_ERROR;
-  for (int s = 0; s < mode->dimension; s++)
-    if (!now->state_set[mode->state[s]]) now->state[mode->state[s]] = unit->run.x[s];
   now->segment = fmu_segment_at(now->time);
   unit->bound = 0;
   now->started = 1;

@@ -23,42 +23,17 @@ static page_refusal set_parameters(double *p) {
   return PAGE_RAN;
 }
 
-/* The initial values of the file behind the parameters in `row`; those that are `known` stay, and others follow them. */
-static int set_initial(double *row, const char *known, int any) {
-  double own[PAGE_INITIAL + 1], *const initial = row + PROBLEM_PARAMETERS;
-  int bad = 0;
-  if (any && PAGE_FOLLOWERS) {
-    for (int k = 0; k < PAGE_FOLLOWERS; k++)
-      if (!known[page_follower[k]]) bad |= page_following[k](row, initial + page_follower[k]);
-    return bad;
-  }
-  bad = file_initial(row, own);
-  for (int k = 0; k < PAGE_INITIAL; k++)
-    if (!known[k]) initial[k] = own[k];
-  return bad;
-}
-
+/* The initial state: numbers that are given, those that the export gave, and others that follow them. */
 static page_refusal set_start(const double *p, double *x) {
-  double row[PROBLEM_PARAMETERS + PAGE_INITIAL + 1];
-  char known[PAGE_INITIAL + 1] = {0};
-  int any = 0;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) row[i] = p[i];
+  char known[PAGE_STARTS + 1] = {0};
   for (int i = 0; i < PAGE_STARTS; i++) {
     const double own = given[PROBLEM_PARAMETERS + i];
-    const int place = page_start_place[i];
     x[i] = own == own ? own : problem_x[i];
-    if (place >= 0 && (own == own || page_start_given[i]))
-      row[PROBLEM_PARAMETERS + place] = x[i], known[place] = 1, any = 1;
+    known[i] = own == own || problem_given[i];
   }
-  const int bad = set_initial(row, known, any);
-  for (int i = 0; i < PAGE_STARTS; i++) {
-    const int place = page_start_place[i];
-    if (place >= 0 && !known[place]) {
-      if (bad) return refuse(PAGE_NO_INITIAL, i);
-      x[i] = row[PROBLEM_PARAMETERS + place];
-    }
-    if (!hs_finite(x[i])) return refuse(PAGE_NO_INITIAL, i);
-  }
+  const int bad = problem_start(p, known, x);
+  for (int i = 0; i < PAGE_STARTS; i++)
+    if ((bad && !known[i]) || !hs_finite(x[i])) return refuse(PAGE_NO_INITIAL, i);
   return PAGE_RAN;
 }
 
