@@ -1,0 +1,99 @@
+# pyright: basic
+"""Events: edges that fire where a condition turns true, written as edges with memory.
+
+The memory of an event NAME is in states that do not flow (`hsdsl.names.memory`): ``NAME@armed`` is 1 once the
+condition was false, and ``NAME@due`` where a reset made it true. With a delay the state ``NAME@waiting`` is 1 until
+``NAME@at``, and ``NAME@to.x`` is the value that x then gets; those of further executions that wait end in ``[2]``.
+An event of a part belongs to one mode of it: in the others its surfaces are inside and its memory means nothing.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from hsdsl.elaborate.events.event import Event, chosen
+from hsdsl.elaborate.events.firing import edges_of, highest_priority
+from hsdsl.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
+from hsdsl.elaborate.events.waiting import AGAIN, overflow
+from hsdsl.expression.scope import symbol
+from hsdsl.names import SINCE, memory
+from hsdsl.parts import Part
+from hsdsl.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
+
+
+def with_events(system: HybridSystem) -> HybridSystem:
+    """The system with the memory of its events, and edges that fire, wait and arm again."""
+    timed = SINCE not in (*system.states, *(parameter.name for parameter in system.parameters))
+    events = {mode.name: _events(system, mode, timed) for mode in system.modes}
+    if not any(events.values()):
+        return system
+    final = tuple(overflow(e, system) for own in events.values() for e in own if e.delay is not None)
+    events |= {mode.name: () for mode in final}
+    order = {mode.name: (*mode.states, *all_states(events[mode.name])) for mode in (*system.modes, *final)}
+    memories = {name: Memory(own) for name, own in events.items()}
+    modes = tuple(_mode(mode, memories, order) for mode in system.modes)
+    parts = tuple(_part(part, [event for own in events.values() for event in own]) for part in system.parts)
+    return replace(system, modes=modes + final, initial=_start(system, events), parts=parts)
+
+
+def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
+    constants = frozenset(system.parameter_symbols)
+    flow = {TIME: ONE} | ({symbol(SINCE): ONE} if timed else {})
+    flow |= dict(zip(map(symbol, mode.states), mode.flow, strict=True))
+    drafts = [Event(edge, mode, timed, flow, constants) for edge in mode.edges if edge.event is not None]
+    index, jumps = Memory(drafts), set[str]()
+    for meaning in (new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts):
+        jumps |= {event.edge.name for event in index.concerned(meaning) if event.touched(meaning)}
+    return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
+
+
+def _part(part: Part, events: Sequence[Event]) -> Part:
+    """A part with the memory of its events among the states of their modes."""
+    own: dict[int, list[str]] = defaultdict(list)
+    for event in events:
+        if event.edge.part is None or event.edge.part[0] == part.name:
+            own[0 if event.edge.part is None else event.edge.part[1] - 1] += event.states
+    return replace(part, states=tuple((*states, *own[k]) for k, states in enumerate(part.states)))
+
+
+def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[str, ...]]) -> Mode:
+    own, edges = memories[mode.name].events, list[Edge]()
+    highest = highest_priority(own)
+    by_name = {e.edge.name: e for e in own}
+    for edge in mode.edges:
+        drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest)
+        made = [remembered(draft, memories, order) for draft in drafts]
+        edges += made if edge.event is None else [replace(part, of_event=True) for part in made]
+    further = all_states(own)
+    return replace(
+        mode,
+        states=(*mode.states, *further),
+        flow=(*mode.flow, *(ZERO for _ in further)),
+        flow_texts=(*mode.flow_texts, *("0" for _ in further)),
+        edges=tuple(edges),
+    )
+
+
+def as_written(system: HybridSystem) -> tuple[int, int]:
+    """How many modes and transitions the file has, without those that make its events."""
+    parts = [edge for mode in system.modes for edge in mode.edges if edge.of_event]
+    full = {edge.target for edge in parts if edge.name.endswith(AGAIN)}
+    events = sum(name.endswith(memory("", "armed")) for mode in system.modes for name in mode.states)
+    plain = sum(not edge.of_event for mode in system.modes for edge in mode.edges)
+    return len(system.modes) - len(full), plain + events
+
+
+def _start(system: HybridSystem, events: Mapping[str, tuple[Event, ...]]) -> Initial:
+    """The initial values with the memory of every event whose condition they decide."""
+    values, initial = dict(system.initial.in_order), system.initial
+    known = {symbol(name) for name in values} | set(system.parameter_symbols)
+    meaning = {TIME: ZERO} | ({} if symbol(SINCE) in known else {symbol(SINCE): ZERO})
+    for event in (event for own in events.values() for event in own):
+        kept = dict.fromkeys(event.states, ZERO)
+        kept |= chosen(event, event.here({}, {}), entered(event, meaning), kept)
+        if all(value.free_symbols <= known for value in kept.values()):
+            values |= kept
+    names = [name for name, _ in initial.values] + [name for name in values if name not in dict(initial.values)]
+    return started(initial.mode, names, tuple(values.items()))

@@ -1,0 +1,184 @@
+# pyright: basic
+"""An event as mathematics: its condition, the states that remember what it did, and the executions that can wait."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import Any
+
+from hsdsl.expression.scope import symbol
+from hsdsl.expression.selection import is_mode, placed, select, total, whole
+from hsdsl.expression.trigger import Reached, comparisons, number, reached
+from hsdsl.functions import maximum
+from hsdsl.names import memory
+from hsdsl.system import ONE, TIME, ZERO, Edge, Mode, Surface
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event as it was written, ``edge``, and the names of the states that remember what it did.
+
+    ``timed`` says that `since` is the time since the mode was entered, and ``jumps`` that the condition may turn true
+    by a reset, or hold where the mode is entered. ``flow`` has the rates of symbols; ``constants`` are parameters.
+    """
+
+    edge: Edge
+    mode: Mode
+    timed: bool
+    flow: Mapping[Any, Any]
+    constants: frozenset[Any]
+    jumps: bool = False
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        return {part: memory(self.edge.name, part) for part in (["armed"] + (["due"] if self.jumps else []))}
+
+    @cached_property
+    def slots(self) -> tuple[Slot, ...]:
+        """The executions that can wait at a time; one that is not persistent is gone before it is triggered again."""
+        if self.delay is None:
+            return ()
+        given = dict(zip(self.edge.target_states, self.edge.reset, strict=True))
+        stored = tuple(state for state in self.event.given if given.get(state, symbol(state)) != symbol(state))
+        most = self.event.waiting if self.event.persistent else 1
+        return tuple(Slot(self.edge.name, stored, "" if k == 1 else f"[{k}]") for k in range(1, most + 1))
+
+    @property
+    def full(self) -> Any:
+        """1 where as many executions wait as can, else 0."""
+        return self.slots[-1].waits if self.slots else ZERO
+
+    @cached_property
+    def symbols(self) -> frozenset[Any]:
+        """What its condition depends on."""
+        return frozenset().union(*(c.residual.free_symbols for c in comparisons(self.event.trigger)))
+
+    def rate(self, expression: Any) -> Any:
+        """How fast an expression changes along the flow of the mode."""
+        known, done = number_left(self.edge), dict[Any, Any]()
+        moving = ((s, self.flow[s]) for s in sorted(expression.free_symbols, key=str) if s in self.flow)
+        return sum((expression.diff(s) * placed(flow, known, done) for s, flow in moving), ZERO)
+
+    @property
+    def delay(self) -> Any | None:
+        return self.event.delay
+
+    @cached_property
+    def priority(self) -> Any:
+        """The number that decides which event goes first; 0 where its part is in another mode."""
+        given, here = self.event.priority, self.here({}, {})
+        return whole(self.edge.priority) if given is None else select(here, self.guarded(given, here), ZERO)
+
+    @cached_property
+    def ready(self) -> Any:
+        """1 where it is to be made at this instant, else 0."""
+        if self.slots:
+            ready = reduce(maximum, (slot.ready for slot in self.slots))
+        else:
+            ready = self.symbol("armed") * self.rises()
+            ready = maximum(ready, self.symbol("due")) if self.jumps else ready
+        here = self.here({}, {})
+        return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
+
+    @property
+    def event(self) -> Any:
+        assert self.edge.event is not None
+        return self.edge.event
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return (*self.names.values(), *(name for slot in self.slots for name in slot.states))
+
+    def symbol(self, part: str) -> Any:
+        return symbol(self.names[part])
+
+    def here(self, meaning: Mapping[Any, Any], known: Mapping[Any, Any]) -> Any:
+        """1 where its part is in its mode, at new values of states."""
+        if self.edge.part is None:
+            return ONE
+        number = symbol(self.edge.part[0])
+        return is_mode(meaning.get(number, number).xreplace(known), self.edge.part[1])
+
+    def guarded(self, expression: Any, truth: Any) -> Any:
+        """An expression that has a value also where something is not true."""
+        return total(expression, lambda a, b: select(truth, a, b), self.constants)
+
+    def surface(self, left: Any, right: Any, text: str) -> Surface:
+        """A surface of its mode; inside everywhere where its part is in another one."""
+        here = self.here({}, {})
+        if here == 1:
+            return Surface(left, right, left - right, text)
+        rest = ((left, ZERO), (right, ZERO), (left - right, -ONE))
+        left, right, residual = (select(here, self.guarded(side, here), other) for side, other in rest)
+        return Surface(left, right, residual, text)
+
+    def touched(self, meaning: Mapping[Any, Any]) -> bool:
+        """Whether new values of states change its condition."""
+        return any(c.residual.xreplace(meaning) != c.residual for c in comparisons(self.event.trigger))
+
+    def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None) -> Any:
+        """1 where the condition holds at new values of states.
+
+        Of the comparisons that stay the one that was ``reached`` holds, and those that counted as reached with it.
+        """
+
+        def of(part: Reached) -> Any:
+            if reached is None or part.residual.xreplace(meaning) != part.residual:
+                return part.holds(meaning)
+            turns = part.turns(reached)
+            return part.nearly_holds(self.rate(part.residual), TIME) if turns is None else number(turns, of)
+
+        return number(self.event.trigger, of)
+
+    def rises(self) -> Any:
+        """1 where the flow turns the condition true at this instant, else 0."""
+        return number(self.event.trigger, lambda part: part.rises(self.rate(part.residual), TIME))
+
+
+@dataclass(frozen=True)
+class Slot:
+    """An execution that can wait: its event, states that get the values that are ``stored``, and its number."""
+
+    name: str
+    stored: tuple[str, ...]
+    number: str
+
+    def _state(self, part: str) -> str:
+        return memory(self.name, f"{part}{self.number}")
+
+    @property
+    def waits(self) -> Any:
+        return symbol(self._state("waiting"))
+
+    @property
+    def at(self) -> Any:
+        return symbol(self._state("at"))
+
+    @property
+    def ready(self) -> Any:
+        """1 where it is to be made at this instant, else 0."""
+        return self.waits * reached(TIME, self.at)
+
+    @property
+    def values(self) -> dict[str, str]:
+        return {state: self._state(f"to.{state}") for state in self.stored}
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return (self.waits.name, self.at.name, *self.values.values())
+
+
+def number_left(edge: Edge) -> dict[Any, Any]:
+    """The number of the part's mode that an edge leaves."""
+    return {} if edge.part is None else {symbol(edge.part[0]): whole(edge.part[1])}
+
+
+def chosen(event: Event, truth: Any, values: Values, others: Values) -> Values:
+    """Values where something is true, and others elsewhere."""
+    if truth == 1:
+        return values
+    return {name: select(truth, event.guarded(value, truth), others[name]) for name, value in values.items()}

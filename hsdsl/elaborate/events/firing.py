@@ -1,0 +1,85 @@
+# pyright: basic
+"""The edges of an event: those that fire it, begin to wait, make what waited, and arm it again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial, reduce
+from typing import Any
+
+from hsdsl.elaborate.events.event import Event, Values
+from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, executes, overflowing
+from hsdsl.expression.scope import symbol
+from hsdsl.expression.trigger import Reached, comparisons, condition
+from hsdsl.functions import below, maximum, minimum
+from hsdsl.system import HALF, ONE, TIME, TRUTH, ZERO, Edge, all_of, at_least
+
+Draft = tuple[Edge, Event | None, Reached | None]
+
+
+def highest_priority(events: Sequence[Event]) -> Any | None:
+    """The highest priority of the events that are to be made at this instant; None where the edges' own decide."""
+    if all(event.event.priority is None for event in events):
+        return None
+    least = reduce(minimum, (event.priority for event in events))
+    return reduce(lambda most, e: e.ready * maximum(most, e.priority) + (1 - e.ready) * most, events, least)
+
+
+def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
+    """The edges of an event: which of them fires it, and the comparison that was reached."""
+    edge, trigger, armed = replace(event.edge, event=None), event.event.trigger, event.symbol("armed")
+    fires = edge if event.delay is None else staying(event, f"{edge.name} triggers", begins_to_wait(event))
+    if event.delay is not None:  # what only remembers goes before anything that changes states
+        fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
+    turn = None if highest is None else at_least(event.priority, highest)
+    free = [at_least(HALF, event.full)] if event.slots else [] if turn is None else [turn]
+    for part in comparisons(trigger):
+        others = condition(trigger, partial(_with, event, part, True))
+        surface = event.surface(part.left, part.right, part.text)
+        when = all_of(at_least(armed, HALF), others)
+        yield replace(fires, surface=surface, condition=all_of(when, *free), condition_text=_text(event)), event, part
+        if event.slots:
+            full = all_of(when, at_least(event.full, HALF))
+            yield replace(overflowing(fires, event), surface=surface, condition=full), None, None
+    if event.jumps:
+        due = event.symbol("due")
+        if highest is not None and not event.slots:
+            due *= below(event.priority - highest, ZERO, ZERO, ONE)
+        yield _when_due(fires, event, due - event.full), event, None
+        if event.slots:
+            yield _when_due(overflowing(fires, event), event, due + event.full - 1), None, None
+    for slot in event.slots:
+        made = executes(event, slot)
+        yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
+    arms = staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | dropped(event))
+    for part in comparisons(trigger):
+        holds = condition(trigger, partial(_with, event, part, False))
+        surface = event.surface(part.right, part.left, part.opposite)
+        when = all_of(at_least(HALF, armed), ~holds)
+        yield replace(arms, surface=surface, condition=when, condition_text=f"not ({_text(event)})"), None, None
+
+
+def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
+    """An edge that goes where a number is 1, and not where it is 0 or less."""
+    surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
+    return replace(edge, surface=surface, condition=None, condition_text=None)
+
+
+def _with(event: Event, reached: Reached, value: bool, part: Reached) -> Any:
+    """The Boolean of a comparison where another one turns to a value."""
+    turns = part.turns(reached)
+    return part.follows(event.rate(part.residual), TIME) if turns is None else TRUTH[value == turns]
+
+
+def _text(event: Event) -> str:
+    return event.event.text
+
+
+def staying(event: Event, name: str, values: Values) -> Edge:
+    """An edge that changes some memory of an event, and nothing else."""
+    mode = event.mode
+    states = (*mode.states, *values)
+    reset = (*map(symbol, mode.states), *values.values())
+    edge = replace(event.edge, event=None, name=name, target=mode.name, target_states=states, reset=reset)
+    return replace(edge, reset_texts=tuple(map(str, reset)), stays=True, condition_text=None)
