@@ -15,6 +15,7 @@ block of commands or of Python has a mark, and `hsdsl` in the running text names
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import doctest
 import io
@@ -221,6 +222,24 @@ def headings(page: Path) -> set[str]:
     """The anchors of a page's headings, as mkdocs names them."""
     lines = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", line).strip().lower()) for line in lines}
+
+
+def test_reasons_of_verdicts_on_their_page_are_those_of_the_code():
+    page = (ROOT / "docs" / "how-to" / "unknown.md").read_text(encoding="utf-8")
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "hsdsl" / "simulate").rglob("*.py")]
+    code = "\n".join(
+        node.value
+        for tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+    cells = re.findall(r"^\| (`.*?`) \| ", page, flags=re.MULTILINE)
+    reasons = [reason for cell in cells for reason in re.findall(r"`(.+?)`(?:, |$)", cell)]
+    parts = [part.split() for reason in reasons for part in reason.split("...")]
+    assert len(reasons) > 10
+    for words in parts:  # of one string, or of two that follow each other
+        halves = ((" ".join(words[:i]), " ".join(words[i:])) for i in range(len(words) + 1))
+        assert any(one in code and other in code for one, other in halves), words
 
 
 def test_tutorial_and_readme_have_examples_that_run():
