@@ -1,13 +1,14 @@
 """Inputs over time: the segments between samples and between switches of time, each a boundary no step may cross.
 
 On a segment a sampled input is a line ``a + b (t - c)`` and a switch a number, so every stage of a step sees the values
-of the step's own open interval, and the stage at its right end takes the left limit.
+of the step's own open interval, and the stage at its right end takes the left limit. Where an input jumps at the end of
+the run, a last segment of no length has the values behind the jump.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -16,6 +17,8 @@ from hsdsl.errors import UsageError
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program, SampledInput
 from hsdsl.simulate.surfaces import TIE
+
+BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Timeline:
         """Return the segment that time is in; at a boundary the later one."""
         return self.segments[max(0, bisect_right(self.segments, t, key=lambda s: s.start) - 1)]
 
+    def goes_on(self, segment: Segment) -> bool:
+        """Whether another segment is behind this one."""
+        return self.at(segment.end) is not segment
+
 
 def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number], until: Number) -> Timeline:
     """Cut time at every sample of every sampled input, and where a switch changes.
@@ -51,35 +58,51 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
     zero = kernel.arithmetic.zero
     cuts = sorted({zero} | {t for times, _ in samples for t in times if zero < t < until})
     ends = [*cuts[1:], until]
+    if until > 0:
+        cuts, ends = [*cuts, until], [*ends, until + BEHIND * TIE * until]
     segments: list[Segment] = []
     held_before: tuple[Number, ...] = ()
     for start, end in zip(cuts, ends, strict=True):
         lines = [
-            _line(given, times, values, start) for given, (times, values) in zip(program.inputs, samples, strict=True)
+            _line(given, times, values, start if start < until else until + TIE * until)
+            for given, (times, values) in zip(program.inputs, samples, strict=True)
         ]
         held = tuple(a for given, (a, _, _) in zip(program.inputs, lines, strict=True) if given.hold == "zero")
         data = (*parameters, *(number for line in lines for number in line), *(zero for _ in program.switches))
         segments.append(Segment(start, end, data, jump=bool(segments) and held != held_before))
         held_before = held
-    return Timeline(_switched(program, kernel, segments) if program.switches else tuple(segments))
+    if program.switches:
+        segments = _switched(program, kernel, segments, until)
+    return Timeline(tuple(_ended(segments, until)))
 
 
-def _switched(program: Program, kernel: Kernel, segments: list[Segment]) -> tuple[Segment, ...]:
+def _ended(segments: list[Segment], until: Number) -> Iterator[Segment]:
+    """Let the segments end with the run, at a jump there with one of no length."""
+    for segment in segments:
+        if segment.start < until or until == 0:
+            yield segment
+        elif segment.start == until and segment.jump:
+            yield Segment(until, until, segment.data, jump=True)
+
+
+def _switched(program: Program, kernel: Kernel, segments: list[Segment], until: Number) -> list[Segment]:
     """Cut segments where a switch changes, each with the switches before it known."""
     from hsdsl.simulate.switches import Changes, same  # only models with switches pay for it
 
-    tie, first = TIE * segments[-1].end, len(segments[0].data) - len(program.switches)
+    tie, first = TIE * until, len(segments[0].data) - len(program.switches)
     for place, switch in enumerate(program.switches, first):
         found, before = list[Segment](), None
         jumps = {segment.start: segment.jump for segment in segments}
         for piece in Changes(kernel, switch, place - first, tie).pieces(segments):
-            changed = before is not None and not same(piece.number, before)
-            data = (*piece.part.data[:place], piece.number, *piece.part.data[place + 1 :])
+            no_value = piece.number != piece.number and before is not None and not piece.start < until
+            number = before if no_value else piece.number  # a model need not have a meaning behind its end
+            changed = before is not None and not same(number, before)
+            data = (*piece.part.data[:place], number, *piece.part.data[place + 1 :])
             jump = jumps.get(piece.start, False) or (switch.jumps and changed)
             found.append(Segment(piece.start, piece.end, data, jump))
-            before = piece.number
+            before = number
         segments = found
-    return tuple(segments)
+    return segments
 
 
 def _samples(

@@ -249,8 +249,8 @@ def crowded(run: Run, here: ModeState, edge: str, t: Number) -> bool:
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
-    """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
-    if here.t < run.settings.until:
+    """Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
+    if run.timeline.goes_on(here.segment):
         return go_on(run, here)
     held = contact_at(run, here)
     if isinstance(held, Stop) or not (standing := standing_on(run, held)):

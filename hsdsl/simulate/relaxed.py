@@ -186,8 +186,8 @@ def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
-    """Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires."""
-    if here.t < run.settings.until:
+    """Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
+    if run.timeline.goes_on(here.segment):
         return go_on(run, here)
     t, x = here.t, here.x
     standing = standing_on(run, here)

@@ -102,7 +102,9 @@ class Run(Problem):
         def outputs(t: Number, *x: Number) -> State:
             return self.kernel.bind(mode, self.timeline.at(t).data).outputs(t, *x)
 
-        self.recorder.strip(here.arc, rows, q, outputs if rows[-1][0] > here.segment.end else here.arc.outputs)
+        end = rows[-1][0]
+        further = end > here.segment.end or end == self.settings.until
+        self.recorder.strip(here.arc, rows, q, outputs if further else here.arc.outputs)
 
     def returns(self, here: ModeState, made: Crossing, entered: ModeState) -> bool:
         """Whether a transition from an arc without any flow led back to where its cascade has been."""

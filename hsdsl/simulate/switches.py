@@ -53,28 +53,17 @@ class Changes(Argument):
         ]
         certain = [True] * len(cut) if linear else decided(self, [(piece.part, piece.at) for piece in cut])
         sure = (replace(p, number=self.number(p.part)(p.at)) if yes else p for p, yes in zip(cut, certain, strict=True))
-        return list(self._merged(sure))
+        return list(self._numbered(_merged(sure)))
 
-    def _merged(self, pieces: Iterator[SwitchPiece]) -> Iterator[SwitchPiece]:
-        """Join neighbours in one part that have the same number, and one that has none to a neighbour."""
-        last: SwitchPiece | None = None
+    def _numbered(self, pieces: Iterator[SwitchPiece]) -> Iterator[SwitchPiece]:
+        """Give a part that is on a level to round-off all along the number before it."""
+        before: Number | None = None
         for piece in pieces:
-            if last is None or last.part is not piece.part:
-                if last is not None:
-                    yield self._with_number(last)
-                last = piece
-            elif last.number is None:
-                last = replace(piece, start=last.start)
-            elif piece.number is None or same(piece.number, last.number):
-                last = replace(last, end=piece.end)
-            else:
-                yield last
-                last = piece
-        assert last is not None
-        yield self._with_number(last)
-
-    def _with_number(self, piece: SwitchPiece) -> SwitchPiece:
-        return replace(piece, number=self.number(piece.part)(piece.at)) if piece.number is None else piece
+            number = piece.number
+            if number is None:
+                number = self.number(piece.part)(piece.at) if before is None else before
+            yield replace(piece, number=number)
+            before = number
 
     def _apart(self, part: Part, cuts: Sequence[Number]) -> Iterator[Number]:
         """The cuts, in order, that are no ties of one before or of an end."""
@@ -162,6 +151,25 @@ class Changes(Argument):
         if between != between and first == first:
             return [_change(number, a, middle), _change(number, middle, b)]
         return []
+
+
+def _merged(pieces: Iterator[SwitchPiece]) -> Iterator[SwitchPiece]:
+    """Join neighbours in one part that have the same number, and one that has none to a neighbour."""
+    last: SwitchPiece | None = None
+    for piece in pieces:
+        if last is None or last.part is not piece.part:
+            if last is not None:
+                yield last
+            last = piece
+        elif last.number is None:
+            last = replace(piece, start=last.start)
+        elif piece.number is None or same(piece.number, last.number):
+            last = replace(last, end=piece.end)
+        else:
+            yield last
+            last = piece
+    assert last is not None
+    yield last
 
 
 def _change(number: Callable[[Number], Number], a: Number, b: Number) -> Number:

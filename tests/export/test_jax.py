@@ -33,6 +33,7 @@ NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml")) if path.stem != "st
 MEANING = (
     "curved-surface", "dimensions", "m1-wall-stops", "m3-cross-again", "m3-transparent", "m4-rising-floor",
     "m4-start-tangent", "m5-entry-at-input-jump", "m5-entry-chain", "m6-tie-priority", "m8-end-on-guard",
+    "m8-jump-at-the-end", "m8-jump-and-guard-at-the-end",
     "m9-linear-hold", "m9-pulses", "m10-final", "m10-flow-ends-at-guard", "m11-awake-at-rest", "outputs",
 )  # fmt: skip
 REST = """

@@ -47,6 +47,11 @@ CASES = {
     "inputs": (f"{SAMPLED.replace('HOLD', 'zero')}, {LINE}", "u + w"),
     "switches": ("", "floor(a*t + c) + sign(b - t) + max(t - d, c*t) + abs(t - a - c)"),
     "nested": ("", "sign(a/2 - (b*t - floor(b*t))) + floor(t/3 - floor(t/3) + c)"),
+    "at the end": (
+        "u: {times: [0, 5 + a], values: [1, b], hold: zero}, "
+        "v: {times: [1, 5 + a, 7 + a], values: [a, b, c], hold: linear}",
+        "u + v + floor(t/(5 + a)) + sign(t - 5 - a) + abs(t - a - 5) + floor(a*t)",
+    ),
     "of inputs": (f"{SAMPLED.replace('HOLD', 'linear')}", "abs(u) + sign(u - c*t) + min(u, floor(a*t))"),
 }
 

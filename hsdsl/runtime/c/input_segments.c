@@ -23,6 +23,9 @@ static hs_time segment_end(const hs_run *run) {
   return open ? run->pause : earlier(timeline->end[segment], run->pause);
 }
 
+/* Whether another segment is behind the one that the run is in. */
+static int segment_follows(const hs_run *run) { return run->here.segment + 1 < run->task->timeline->segments; }
+
 static const hs_real *segment_data(const hs_run *run, int64_t segment) {
   return run->task->timeline->data + segment * run->model->data;
 }

@@ -323,11 +323,11 @@ static int jump(hs_run *run) {
   return returns(run, t > arc_start) ? slides(run, mode, k) : close_tail(run, k);
 }
 
-/* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
+/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t >= run->pause) return PAUSED;
-  if (t < run->until) return go_on(run);
+  if (t < run->until || segment_follows(run)) return go_on(run);
   const hs_mode *const own = run->here.table;
   const int count = contact_at(run) == GOES_ON ? standing_on(run) : 0;
   if (count) {

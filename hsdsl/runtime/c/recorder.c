@@ -67,7 +67,8 @@ static void begin(hs_run *run, int kind) {
 /* Write a strip: the state waits at q while time and depth pass through `rows`; inputs go on. */
 static void strip(hs_run *run, int rows, hs_time (*row)[2], const hs_real *q) {
   const hs_mode_state *here = &run->here;
-  const int further = row[rows - 1][0] > run->task->timeline->end[here->segment];
+  const hs_time end = row[rows - 1][0];
+  const int further = end > run->task->timeline->end[here->segment] || end == run->until;
   begin(run, HS_STRIP);
   for (int i = 0; i < rows; i++) {
     const hs_real *p = here->outputs_p;

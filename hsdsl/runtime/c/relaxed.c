@@ -232,11 +232,11 @@ static int go_on(hs_run *run) {
   return continued(run, timeline->jump[segment_at(timeline, run->here.t)]);
 }
 
-/* Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires. */
+/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
 static int at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t >= run->pause) return PAUSED;
-  if (t < run->until) return go_on(run);
+  if (t < run->until || segment_follows(run)) return go_on(run);
   const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);

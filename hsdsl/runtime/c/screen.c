@@ -57,7 +57,8 @@ static int undecided_end(hs_view *v) {
   v->crossed = -1;
   bind(v, s->run.arc[v->arc].mode, segment_at(s->timeline, end));
   if (v->table->final) return 0; /* there it ended */
-  if (takes_time(&s->run, v->arc) && ends_close(v, 1)) return 1;
+  const int jumped = length > 0 && s->timeline->start[v->segment] == end; /* there an input jumps */
+  if ((jumped || takes_time(&s->run, v->arc)) && ends_close(v, 1)) return 1;
   if (!count) return 0;
   const double last = s->run.transition[count - 1].time;
   return end - last < SAFE * (late_by(v, last) + s->tolerance * length);

@@ -73,7 +73,7 @@ static int ends_close(hs_view *v, int all) {
   const hs_screen *s = v->s;
   const double t = s->run.times[v->last], *x = recorded_row(&s->run, v->last);
   const int64_t step = v->segment, there = segment_at(s->timeline, t);
-  if (v->crossed < 0 && !all && t >= s->until) return 0;
+  if (v->crossed < 0 && !all && t >= s->until && there == step) return 0;
   if (v->crossed >= 0 || all) bind(v, v->mode, there);
   int close = evaluate_surfaces(v, t, x);
   for (int k = 0; k < v->table->surfaces && !close; k++) {
@@ -96,7 +96,7 @@ static int jumps_close(const hs_view *v, const hs_transition *made) {
   const double late = SAFE * late_by(v, made->time);
   const int64_t here = segment_at(timeline, made->time);
   if (timeline->jump[here] && fabs(timeline->start[here] - made->time) <= late) return 1;
-  if (timeline->end[here] < v->s->until && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late)
+  if (here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late)
     return 1;
   return v->s->formulas[made->mode].jumping[made->edge];
 }

@@ -24,9 +24,10 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
     Where an input has a kink, a surface may turn back.
     """
     place, until = run.at_row(arc, arc.last), run.problem.settings.until
-    if crossed is None and place.t >= until:
+    behind = run.problem.timeline.at(place.t)
+    if crossed is None and place.t >= until and behind.start < place.t:
         return
-    if crossed is None and not run.problem.timeline.at(place.t).jump:
+    if crossed is None and not behind.jump:
         yield from _at_a_kink(run, arc, place)
         return
     if crossed is None:

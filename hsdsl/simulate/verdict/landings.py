@@ -142,7 +142,7 @@ def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
     """The boundaries of the input segments on either side of a time, and whether an input jumps there."""
     segment = run.problem.timeline.at(t)
     yield float(segment.start), segment.jump
-    if segment.end < run.problem.settings.until:
+    if run.problem.timeline.goes_on(segment):
         yield float(segment.end), run.problem.timeline.at(segment.end).jump
 
 

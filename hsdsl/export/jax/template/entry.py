@@ -28,7 +28,7 @@ from .verdicts import scaled
 
 
 def boundary(model, p, lane, here):
-    """Go on behind a jump of an input, or end; the end is closed, so a guard reached at it fires.
+    """Go on behind a jump of an input, or end: a jump at the end is made, and a guard reached there fires.
 
     Returns which runs have guards that may hold them from here on.
     """

@@ -128,7 +128,7 @@ def run(model, config, p, mode, x0, rounds=None):
         state = lax.scan(again, state, None, rounds)[0]
     lane, record = state
     stop = jnp.where(lane.stop == RUNNING, STEPS, lane.stop)
-    bound = Bound(model, p, lane.segment)
+    bound = Bound(model, p, model.segment(frozen(p), frozen(lane.t)))  # at an end in a strip inputs may have jumped
     mode = model.of(model.owner, lane.mode).astype(jnp.int32)
     outputs = bound.routines.outputs(mode, bound.p, lane.t, lane.x)
     return Run(*record, lane.count, stop, lane.t, mode, lane.x, outputs, lane.steps)

@@ -401,7 +401,7 @@ function [w, here, event, done] = boundary(w, here)
   t = here.t;
   x = here.x;
   q = here.q;
-  if t >= w.s.until
+  if t >= w.s.until && here.k >= numel(w.m.ends)
     found = setdiff(on_guard(w, here, t, x, 1e-12 * t), here.rest);
     if ~isempty(found)
       [unused, best] = max(w.m.edge_priority{q}(found));

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#define BEHIND 4 /* ties of time behind the end, where inputs have the values behind a jump at it */
+
 static int refused_input;
 
 /* Add a segment with room for its data, which are those of `data`; 0 where there is no memory. */
@@ -121,7 +123,8 @@ static page_refusal cut_at_switch(int i, double until, const page_segments *from
     for (int64_t c = 0; c <= cuts->count; c++) {
       const double b = c < cuts->count ? cuts->start[c] : end;
       if (c < cuts->count && !(b - a > tie && end - b > tie)) continue;
-      const double number = number_between(s, data, a, b);
+      double number = number_between(s, data, a, b);
+      if (number != number && k && first >= until) number = before; /* a model need not have a meaning behind its end */
       if (to->count > own && same(number, before)) {
         to->end[to->count - 1] = b;
       } else {
@@ -137,7 +140,7 @@ static page_refusal cut_at_switch(int i, double until, const page_segments *from
   return PAGE_RAN;
 }
 
-/* Cut time from 0 to `until` at every sample of every input. */
+/* Cut time from 0 to `until` at every sample of every input, and a little behind it. */
 static page_refusal cut_at_samples(const double *p, double until, page_segments *made, page_segments *cuts) {
   static double *own[PAGE_INPUT_COUNT + 1];
   const double *times[PAGE_INPUT_COUNT + 1], *values[PAGE_INPUT_COUNT + 1];
@@ -149,22 +152,32 @@ static page_refusal cut_at_samples(const double *p, double until, page_segments 
     for (int k = 0; k < page_inputs[i].count; k++)
       if (times[i][k] > 0 && times[i][k] < until && !add_segment(cuts, times[i][k], 0, 0, 0)) return PAGE_NO_MEMORY;
   }
+  if (until > 0 && !add_segment(cuts, until, 0, 0, 0)) return PAGE_NO_MEMORY;
   qsort(cuts->start, (size_t)cuts->count, sizeof(double), compare);
   for (int64_t c = 0; c < cuts->count; c++) {
-    const double start = cuts->start[c];
+    const double start = cuts->start[c], tie = HS_TIE * until;
     if (c && start == cuts->start[c - 1]) continue;
-    double *row = add_segment(made, start, until, 0, 0);
+    double *row = add_segment(made, start, until > 0 ? until + BEHIND * HS_TIE * until : until, 0, 0);
     if (!row) return PAGE_NO_MEMORY;
     for (int i = 0; i < PROBLEM_PARAMETERS; i++) row[i] = p[i];
     for (int i = PROBLEM_PARAMETERS; i < PROBLEM_DATA; i++) row[i] = 0.0;
     if (made->count > 1) made->end[made->count - 2] = start;
     for (int i = 0; i < PAGE_INPUT_COUNT; i++) {
       double *abc = row + PROBLEM_PARAMETERS + 3 * i;
-      line_at(&page_inputs[i], times[i], values[i], start, abc);
+      line_at(&page_inputs[i], times[i], values[i], start < until ? start : until + tie, abc);
       if (made->count > 1 && !page_inputs[i].linear && abc[0] != abc[-PROBLEM_DATA]) made->jump[made->count - 1] = 1;
     }
   }
   return PAGE_RAN;
+}
+
+/* Let the segments end with the run, at a jump there with one of no length. */
+static void end_segments(double until, page_segments *s) {
+  int64_t k = 0;
+  if (until == 0) return;
+  while (k < s->count && s->start[k] < until) k++;
+  if (k < s->count && s->start[k] == until && s->jump[k]) s->end[k++] = until;
+  s->count = k;
 }
 
 static page_segments page_made[2], page_cuts;
@@ -178,6 +191,7 @@ static page_refusal make_timeline(const double *p, double until, hs_timeline *ti
     refusal = cut_at_switch(i, until, made, other, &page_cuts);
     made = other;
   }
+  end_segments(until, made);
   const hs_timeline table = {made->count, made->start, made->end, made->jump, made->data};
   *timeline = table;
   return refusal;

@@ -265,10 +265,10 @@ impl<S: Sink> Run<'_, S> {
         }
     }
 
-    /// Go on behind a sample of an input, or end; the end is closed, so a guard reached at it fires.
+    /// Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires.
     fn at_boundary(&mut self) -> Result<(), Stop> {
         let t = self.t;
-        if t < self.settings.until {
+        if t < self.settings.until || self.segment + 1 < SEGMENTS.len() {
             return self.go_on();
         }
         let (crossings, count) = self.standing_on();
