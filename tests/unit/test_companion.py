@@ -73,6 +73,21 @@ def test_chaos_is_repeated_and_unknown() -> None:
     assert "finer" in run.__dict__
 
 
+@pytest.mark.parametrize("engine", ["c", "python"])
+def test_round_off_that_both_share_is_seen(engine: str) -> None:
+    """A rate of cos t is the sum of terms of 1e14, whose last digit is 0.016: round-off decides whether x reaches 1."""
+    flow = {"x": "(c + 1e7)**2 - 1e14 - 2e7*c - c**2 + c", "c": "-s", "s": "c"}
+    loaded = hsdsl.loads(
+        f"""
+hsdsl: 1
+modes: {{a: {{flow: {flow}, transitions: [{{name: hit, when: x >= 1.0005, to: a, reset: {{x: x - 3}}}}]}}}}
+initial: {{mode: a, x: 0, c: 1, s: 0}}
+experiment: {{until: 2.5, scheme: located, method: taylor}}
+"""
+    )
+    assert loaded.simulate(tolerance=1e-5, engine=engine).verdict.theorem == "unknown"
+
+
 def test_one_that_cannot_follow_is_no_proof() -> None:
     run = model("1", "0", "1 - (x - 2)**2 - 1 + 1e-13 >= 0", "v").simulate(tolerance=1e-9)  # all but tangent
     assert run.verdict.theorem != "holds"

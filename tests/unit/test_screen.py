@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -85,11 +86,24 @@ def both(loaded: Any, method: str, tolerance: float) -> tuple[Any, Any]:
         return found, run_of(loaded, method, tolerance).verdict
 
 
+def assert_alike(found: Any, expected: Any) -> None:
+    """The same reasons; numbers in them may differ by how far bounds of round-off are rounded outwards."""
+    texts, numbers = zip(*(_split("\n".join(each.reasons)) for each in (found, expected)), strict=True)
+    assert (found.theorem, texts[0]) == (expected.theorem, texts[1])
+    assert numbers[0] == pytest.approx(numbers[1], rel=1e-4)
+
+
+def _split(text: str) -> tuple[str, list[float]]:
+    """A text without its numbers, and these."""
+    number = r"\d[\d,]*(?:\.\d+)?(?:e[+-]\d+)?"
+    return re.sub(number, "#", text), [float(each.replace(",", "")) for each in re.findall(number, text)]
+
+
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(("method", "tolerance"), [("taylor", 1e-9), ("dopri5", 1e-6)])
 def test_findings_are_the_same(name: str, method: str, tolerance: float) -> None:
     found, expected = both(hsdsl.load(ROOT / f"{name}.yaml"), method, tolerance)
-    assert found == expected
+    assert_alike(found, expected)
 
 
 @pytest.mark.parametrize("name", FLOWS)
@@ -97,7 +111,7 @@ def test_findings_are_the_same(name: str, method: str, tolerance: float) -> None
 def test_findings_of_small_flows_are_the_same(name: str, method: str, tolerance: float) -> None:
     method = "dopri5" if name == "kinked" and method == "taylor" else method  # which refuses kinks
     found, expected = both(model(*FLOWS[name]), method, tolerance)
-    assert found == expected
+    assert_alike(found, expected)
 
 
 def test_a_pulse_between_stages_is_found() -> None:

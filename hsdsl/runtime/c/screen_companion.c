@@ -28,6 +28,23 @@ static void companion_at(const hs_companion *c, double s, double *to) {
   }
 }
 
+/* Move the companion further away from the run by what round-off of the flow may do in a step from a row; 0 where that
+   has no bound. */
+static int round_companion(hs_view *v, hs_companion *c, int64_t row, double h) {
+  const double *const x = recorded_row(&v->s->run, row);
+  const hs_formula *const flow = &v->f->flow;
+  v->range[0] = (hs_range){c->t, c->t};
+  for (int i = 0; i < v->n; i++) v->range[1 + i] = (hs_range){c->x[i], c->x[i]};
+  range_operations(v->f, flow->first, flow->last, first_register(v), v->range);
+  for (int i = 0; i < v->n; i++) {
+    const hs_range f = v->range[flow->result[i]];
+    const double moved = h * (f.high - f.low) / 2;
+    if (!hs_finite(moved)) return 0;
+    c->x[i] += c->x[i] < x[i] ? -moved : moved;
+  }
+  return 1;
+}
+
 /* Find where it crosses surface k, from the time s on or back: 1 with the state there, to y. */
 static int companion_crosses(hs_view *v, hs_companion *c, int k, double *s) {
   const double tie = tie_of(v->s, c->t);
@@ -70,6 +87,7 @@ static int accompany(hs_view *v) {
     const int leaves = jump < run->transitions && (a + 1 == run->arcs || run->arc[a + 1].jump > jump);
     c.table = &s->model->mode[run->arc[a].mode];
     const double shift = c.t - run->times[run->arc[a].first];
+    if (!c.table->final) bind(v, run->arc[a].mode, 0);
     for (int64_t row = run->arc[a].first; row <= last; row++) {
       double *const measured = s->measured + row * run->width;
       const double *const x = recorded_row(run, row);
@@ -79,6 +97,7 @@ static int accompany(hs_view *v) {
         for (int i = 0; i < run->width; i++) measured[i] = 0.0;
         continue;
       }
+      if (h > 0 && !round_companion(v, &c, row - 1, h)) return 0;
       if ((h > 0 || jumps) && expand_companion(&c)) return 0;
       if (h > 0) companion_at(&c, h, c.y);
       else copy(c.y, c.x, c.table->dimension);

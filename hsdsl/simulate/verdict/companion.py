@@ -3,33 +3,30 @@
 The companion starts where the run does. Each step begins where the companion itself is, and takes as long as the run's;
 each transition is made where the companion crosses the same surface. So what it is away from the run is the sum of what
 the run's series left out, carried along by the flow and by jumps, as long as it is small. The step size is chosen by
-the last term and the first that is left out, so two more terms tell what was left out. Nothing is looked for: that no
-other surface is reached is decided along the run's own steps, by enclosures that are wider than the errors.
+the last term and the first that is left out, so two more terms tell what was left out. Round-off of the flow is much
+the same for both, so each step moves the companion further away from the run by the most that it may do. Nothing is
+looked for: that no other surface is reached is decided along the run's own steps, by enclosures that are wider than
+the errors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
-from hsdsl.execution import Arc, Execution, Transition
-from hsdsl.integrators.stepper import State
-from hsdsl.integrators.taylor import terms
+from hsdsl.execution import Execution
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.agreement import Errors
+from hsdsl.simulate.verdict.follower import Follower, Lost
 
 Array = NDArray[np.float64]
 MORE = 2  # terms
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
-MOST_ROUNDS = 8  # of Newton's method
-CLOSED_IN = 2.0**-10  # of the tie tolerance: a crossing's time is found
 
 
 @dataclass(frozen=True)
@@ -105,84 +102,10 @@ def has_companion(problem: Problem, run: Execution) -> bool:
     )
 
 
-class _Lost(ValueError):
-    """The companion cannot follow."""
-
-
-class _Follower:
-    """The companion on its way: its mode, time and state, and the series from there."""
-
-    def __init__(self, problem: Problem, run: Execution) -> None:
-        assert problem.settings.method is not None
-        self.problem, self.run, self.order = problem, run, order_of(problem.settings.method)
-        self.modes = {mode.name: k for k, mode in enumerate(problem.program.modes)}
-        self.apart = np.zeros((len(run.times), run.values.shape[1]))
-        self.times: list[float] = run.times.tolist()
-        self.late: list[float] = []
-        self.t: float = float(run.times[0])
-        self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
-        self.stages: Sequence[State] = ()
-
-    def arc(self, arc: Arc, made: Transition | None) -> None:
-        """Follow one arc, and the transition that ends it."""
-        times = self.times
-        shift = self.t - times[arc.first]
-        for row in range(arc.first, arc.last + 1):
-            h = times[row] - times[row - 1] if row > arc.first else 0.0
-            if h > 0 or (made and row == arc.last):
-                self._expand(arc)
-            y = self._at(h) if h > 0 else self.x
-            self._enter(row, self.run.values[row], y)
-            if made and row == arc.last:
-                self._jump(arc, made, h, y)
-            elif h > 0:
-                self.x, self.t = y, times[row] + shift
-
-    def _enter(self, row: int, x: Any, y: State) -> None:
-        if not all(map(isfinite, y)):
-            raise _Lost
-        away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
-        self.apart[row, : len(y)] = np.fmax(self.apart[row, : len(y)], away)
-
-    def _expand(self, arc: Arc) -> None:
-        series = self.problem.kernel.taylor(self.modes[arc.mode], self.problem.timeline.segments[0].data)
-        if series is None:
-            raise _Lost
-        self.stages = terms(series, self.order, self.t, self.x)
-
-    def _at(self, s: float) -> State:
-        z = self.stages[-1] if self.x else ()
-        for c in reversed((self.x, *self.stages[:-1])):
-            z = tuple(a + s * b for a, b in zip(c, z, strict=True))
-        return z
-
-    def _jump(self, arc: Arc, made: Transition, s: float, y: State) -> None:
-        """Make a transition where the companion crosses its surface, close to the time s of its series."""
-        mode = self.problem.program.modes[self.modes[arc.mode]]
-        kernel = self.problem.kernel.bind(self.modes[arc.mode], self.problem.timeline.segments[0].data)
-        found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
-        k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
-        tie, change = float(self.problem.tie(self.t)), np.inf
-        for _ in range(MOST_ROUNDS):
-            value, rate = kernel.surfaces(self.t + s, *y)[k], kernel.rates[k](self.t + s, *y)[0]
-            if not rate > 0:
-                raise _Lost
-            change = value / rate
-            s -= change
-            y = self._at(s)
-            if abs(change) <= CLOSED_IN * tie:
-                break
-        if not abs(change) <= tie:
-            raise _Lost
-        self._enter(arc.last, list(made.before.values()), y)
-        self.t += s
-        self.late.append(abs(float(made.time) - self.t))
-        self.x = kernel.resets[k](self.t, *y)
-
-
 def accompany(problem: Problem, run: Execution) -> Companion:
     """Follow a run that has a companion."""
-    on_its_way, arcs = _Follower(problem, run), run.arcs
+    assert problem.settings.method is not None
+    on_its_way, arcs = Follower(problem, run, order_of(problem.settings.method)), run.arcs
     lost = None
     for arc, following in zip(arcs, (*arcs[1:], None), strict=True):
         if problem.program.modes[on_its_way.modes[arc.mode]].final:
@@ -190,7 +113,7 @@ def accompany(problem: Problem, run: Execution) -> Companion:
         leaves = arc.jump < len(run.transitions) and (following is None or following.jump > arc.jump)
         try:
             on_its_way.arc(arc, run.transitions[arc.jump] if leaves else None)
-        except (_Lost, *DOMAIN_ERRORS):
+        except (Lost, *DOMAIN_ERRORS):
             lost = float(run.times[arc.first])
             break
     late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *on_its_way.late])[1:]
