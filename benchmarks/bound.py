@@ -1,12 +1,12 @@
 """How near the forced oscillators with stop are to a program written by hand for them: `taylor_by_hand.c`.
 
-The second one passes two Zeno points and is held by its stop three times: ours completes it, the program by hand holds
+The second one passes two Zeno points and is held by its stop three times. Ours completes it. The program by hand holds
 the mass after an impact slower than 1e-6 or 1e-9, and knows when the force lets go.
 
-Both run Taylor's method at many tolerances, warm and in turns, in one process; the program by hand is compiled as a
-person would who wants speed (-O3 -march=native, products and sums contracted), knows only this one model and hands over
-nothing but the samples. What counts is the least time at which the largest position error over 2,000 samples is below a
-target. Ours is a call of `model.simulate` and one of `sample`, from Python.
+Both run Taylor's method at many tolerances, warm and in turns, in one process. The program by hand is compiled for
+speed (-O3 -march=native, products and sums contracted), knows only this one model and hands over nothing but the
+samples. What counts is the least time at which the largest position error over 2,000 samples is below a target. Ours is
+a call of `model.simulate` and one of `sample`, from Python.
 
     python benchmarks/bound.py
 """

@@ -252,7 +252,7 @@ class Converter(Facts):
                 raise NotExpressible("values of the time of execution, with a delay")
             transition["delay"] = self.running.number(event.getDelay().getMath())
         elif event.getUseValuesFromTriggerTime() and self.depends_on_others(event):
-            transition["delay"] = 0  # its values are those of its trigger, whatever goes before it at that instant
+            transition["delay"] = 0  # its values are those of its trigger, before what other events do then
         if not trigger.getPersistent():
             transition["persistent"] = False
         if trigger.isSetInitialValue() and not trigger.getInitialValue():

@@ -1,9 +1,9 @@
 """What large flat models cost: chains of masses with stops (`tests/chains.py`), and the grid of 625 modes.
 
 For each number of masses: processor seconds to load, lower and compile the first time, and again with everything kept;
-processor time of a run for each step and state; memory; and how many times as long SciPy and scikit-SUNDAE (CVODE,
-sparse) take, with events, to the same tolerance, each the fastest of runs that take turns with ours. Then chains whose
-masses all come to rest on their stops, and a stiff chain by `radau`.
+processor time of a run for each step and state; memory. SciPy and scikit-SUNDAE (CVODE, sparse) run with events to the
+same tolerance, in turns with ours: how many times as long the fastest of their runs takes. Then chains whose masses all
+come to rest on their stops, and a stiff chain by `radau`.
 
     python benchmarks/scale.py [10 50 100 200 500]
 """

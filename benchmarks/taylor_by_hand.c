@@ -1,5 +1,5 @@
 /* Taylor's method for the forced oscillator with stop, with the model written into its recurrences: what a person might
-   write who wants this one answer fast. All impacts in a step are isolated (Bernstein form); samples go to `out`. An
+   write for this one answer, fast. All impacts in a step are isolated (Bernstein form); samples go to `out`. An
    impact slower than `rest` while the force presses ends the flight: the mass is held until the force lets go. */
 
 #include <math.h>

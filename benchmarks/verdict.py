@@ -1,8 +1,8 @@
 """What a verdict costs: processor time of a run and of its verdict.
 
 The scenes of `benchmarks/scenes.py` by `located`, and chains of 50 masses (`tests/chains.py`): without stops that are
-hit, with some, and with masses that hit theirs together. Run and verdict take turns; given are the medians, how many
-times the run's time the verdict takes, and whether the run was repeated for it.
+hit, with some, and with masses that hit theirs together. Run and verdict take turns. Printed are the medians, how many
+times the run's time the verdict takes, the verdict, and whether the run was repeated for it.
 
     python benchmarks/verdict.py [S1 S4 chain]
 """

@@ -105,12 +105,12 @@ NOTHING = Routines((), "def bind():\n    return ()\n")
 class EdgeProgram:
     """An edge; indices count modes in file order.
 
-    ``conditional`` says whether it has an `if`, and ``condition_text`` how that is written.
-    ``changes`` are the states of the target that the reset gives a value, by number, and ``change_texts`` how that is
-    written; the others keep theirs, which is so only where the mode has the same states as the target.
-    ``contact`` is the number of the motion along its guard in the mode; None where there is none. ``push_order`` is the
-    derivative of the guard along the flow that presses then. ``releases`` is the contact that an edge of
-    `ModeProgram.held` ends; ``of_event`` says that the edge is part of an event.
+    ``conditional`` is whether it has an `if`, written as ``condition_text``. ``changes`` are the states of the target
+    that the reset gives a value, by number, written as ``change_texts``. The others keep theirs; only where the mode
+    has the same states as the target are there any. ``contact`` is the number of the motion along its guard in the
+    mode; None where there is none. ``push_order`` is the order of the guard's derivative, along the flow, that presses
+    then. ``releases`` is the contact that an edge of `ModeProgram.held` ends. ``of_event`` is whether it is part of an
+    event.
     """
 
     name: str
@@ -183,8 +183,8 @@ class ModeProgram:
     ``tape`` gives Taylor coefficients along the flow; None where the flow is kinked (`abs`, `sign`, `min`, `max`,
     `floor`).
 
-    ``diagnosis`` has one routine ``expression_K`` for each of ``expressions`` (flows, surfaces, conditions as a person
-    knows them), to tell which of them has no finite value.
+    ``diagnosis`` has one routine ``expression_K`` for each of ``expressions``: flows, surfaces and conditions as a
+    person knows them. It finds which of them has no finite value.
 
     ``held`` is the number, among `Program.flows`, of this mode where guards hold the state.
     ``slides`` names the two modes between which a mode of a completion slides.
@@ -227,22 +227,23 @@ class Program:
     """A model as a simulator sees it.
 
     ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``minimum_i`` and ``maximum_i``
-    where the file bounds it, ``initial``, ``input_i`` (times, then values; where they are not plain numbers), ``until``
-    and, where the file gives them, ``step``, ``tolerance``, ``relaxation``, ``max_transitions``, ``scale`` (sizes of
-    ``scaled_states``) and ``sample_count`` or ``sample_times``.
+    where the file bounds it, ``initial`` and ``until``. Where samples are not plain numbers it has ``input_i``: times,
+    then values. Where the file gives them it has ``step``, ``tolerance``, ``relaxation``, ``max_transitions``,
+    ``scale`` (sizes of ``scaled_states``) and ``sample_count`` or ``sample_times``.
 
     ``switching`` has, for each of ``switches``, ``argument_i(t)``: what it is the floor or sign of, and the derivative
-    of that by time; for one that is linear in time also ``line_i()``: its value at t = 0, and numerator and denominator
+    of that by time. One that is linear in time also has ``line_i()``: its value at t = 0, and numerator and denominator
     of its slope. A switch depends on earlier ones only.
 
-    ``contacts`` are modes with motion along their guards. Such a mode takes one more number of ``contact_count`` for
-    each of its contacts, ``d_i``: 0 without, 1 where the surface of its edge is the push on the guard, negative, and 2
-    where the flow is constrained, too. Edges behind those of the mode are where an `if` may end a contact.
+    ``contacts`` are modes with motion along their guards. Routines of such a mode take a further number for each of
+    its contacts, ``d_i``, at most ``contact_count`` of them. It is `LOOKED_AT` where the surface of the contact's edge
+    is the push on the guard, negative, `HELD` where the contact also constrains the flow, and else 0. Edges behind
+    those of the mode are where an `if` may end a contact.
 
     A system of parts has one mode, whose last states are the numbers of the modes of ``parts`` (`hsdsl.parts`).
 
-    Where initial values use each other, ``initial_order`` has their states, each behind those that it uses, and
-    ``initial_values`` in this order a routine of the parameters and ``initial_states`` for each.
+    Where initial values use each other, ``initial_order`` has their states, each behind those that it uses. In this
+    order ``initial_values`` has a routine of the parameters and ``initial_states`` for each.
 
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
     """

@@ -92,9 +92,9 @@ class Surface:
 class Event:
     """What an edge has that fires where a condition turns true, until `elaborate.events` writes it as edges.
 
-    ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later,
-    and unless ``persistent`` only if the condition holds until then; the states of ``given`` get values of before.
-    At most ``waiting`` executions wait at a time. ``priority`` is an expression; None where it is that of the edge.
+    ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later;
+    if it is not ``persistent``, only where the condition holds until then. The states of ``given`` get values of
+    before. At most ``waiting`` executions wait at a time. ``priority`` is an expression; None where it is the edge's.
     """
 
     trigger: Trigger

@@ -26,13 +26,13 @@ MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 class Contact:
     """Motion of a mode along the guard of one of its edges, ``edge`` by its number.
 
-    ``base`` is the mode. ``rows`` has the flow of the states whose flow is another one, by the states' numbers, and
-    ``projection`` what each of these rows takes away of the flow: shares of the rates of time and states. ``release``
-    is in the place of the edge in contact: its surface is the push with which the flow presses on the guard, negative.
-    ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` says of each under which condition it
-    is one. ``push`` is the derivative along the flow of ``last``, which is the guard or, where the derivative of that,
-    ``rate``, is zero on it, the rate: ``order`` 1 or 2. ``landing`` is the state that repeated resets take a state near
-    the guard to.
+    ``base`` is the mode. ``rows`` has the constrained flow of the states whose flow changes, by their numbers.
+    ``projection`` has what each of these rows takes away of the flow, as shares of the rates of time and states.
+    ``release`` is in the place of the edge in contact: its surface is the push of the flow on the guard, negative.
+    ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` has the condition under which each
+    does. ``push`` is the derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where
+    the guard's own derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead
+    from a state near the guard.
     """
 
     edge: int

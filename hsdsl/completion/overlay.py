@@ -2,8 +2,8 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false, reportCallIssue=false
 """All motions of a mode along its guards in one copy of the mode, in which numbers choose the guards in contact.
 
-Contacts of which none changes what another one depends on choose their own rows of the flow each, so any subset costs
-as much as all of them. Of the others each connected set has rows of its own (`together`).
+Contacts are independent where none changes what another one depends on. Each chooses its own rows of the flow, so any
+subset costs as much as all of them. Of the others each connected set has rows of its own (`together`).
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ _NAN = symbol("nan")
 class Overlay:
     """A mode's motions along its guards, by the numbers of contacts.
 
-    ``mode`` has the states and walls of the mode, its edges, and then ends of `if`. ``flags`` choose: the surface of
-    the edge of a contact that is looked at, or holds, is the push on its guard, negative, along the flow that all
-    others leave; the flow is constrained by those that hold. Where more of them hold than have a flow, that is
-    not-a-number. ``releases`` has for each edge of ``mode`` the number of the contact that it ends.
+    ``mode`` has the states and walls of the mode, its edges, and then ends of `if`. ``flags`` are `HELD` for contacts
+    that hold, which constrain the flow, `LOOKED_AT` for others that may, and else 0. Where a flag is not 0, the surface
+    of the contact's edge is the push on its guard, negative, along the flow that the others leave. The flow is
+    not-a-number where contacts hold that have none together. ``releases`` has for each edge of ``mode`` the number of
+    the contact that it ends.
     """
 
     mode: Mode

@@ -2,9 +2,9 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false, reportCallIssue=false
 """Flows along several guards of one mode at once, for each set of contacts that depend on each other.
 
-A contact takes u (w phi)/(w u) away of a flow phi, for one direction u of its reset and the row w of what the reset
-keeps, or for a few such pairs. With Q the flow along the guards of a set, that of one contact more is
-Q f - Q u (w Q f)/(w Q u): exact in symbols, so that what is at rest has no rate but zero.
+A contact takes u (w phi)/(w u) away of a flow phi. Here u is a direction of its reset, and w the row that the reset
+keeps; some resets have a few such pairs. With Q f the flow along the guards of a set, that with one contact more is
+Q f - Q u (w Q f)/(w Q u). This is exact in symbols, so what is at rest has the rate zero.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ def _seen(found: Contact) -> set[sp.Symbol]:
 
 def connected_sets(near: Sequence[set[int]], first: int) -> list[frozenset[int]] | None:
     """The connected sets of two contacts and more among those connected with one, small ones first; None for many."""
-    group, edge = {first}, {first}
-    while edge:
-        edge = set().union(*(near[k] for k in edge)) - group
-        group |= edge
-    found: list[frozenset[int]] = []
-    latest = {frozenset((k,)) for k in group}
+    group, latest = {first}, {first}
     while latest:
-        latest = {few | {j} for few in latest for k in few for j in near[k] - few}
-        found += sorted(latest, key=sorted)
+        latest = set().union(*(near[k] for k in latest)) - group
+        group |= latest
+    found: list[frozenset[int]] = []
+    sets = {frozenset((k,)) for k in group}
+    while sets:
+        sets = {few | {j} for few in sets for k in few for j in near[k] - few}
+        found += sorted(sets, key=sorted)
         if len(found) > MOST_SETS:
             return None
     return found

@@ -74,7 +74,7 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
         for looked_at, code in looks:
             made = _findings(looked_at, code, min(seconds / PARTS, end - time.process_time()))
             found += [one for one in made if _place(one) not in places]
-            places |= set(map(_place, made))  # what another instance of an automaton has as well is said once
+            places |= set(map(_place, made))  # what several instances of an automaton have is one finding
     findings, ignored = sift(subject, found, codes)
     return Report(subject.system, findings, ignored)
 

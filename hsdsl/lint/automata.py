@@ -1,9 +1,9 @@
 # pyright: basic
 """Automata of a system as subjects of rules: the modes of one instance, with all that others provide as inputs.
 
-What another instance provides may have any value at any time, and a rate that is not known; the number of its mode is
-a whole number of them. Rules that say what never happens hold so. Those that find a point where something happens look
-only at automata that depend on no other one.
+What another instance provides may have any value at any time, and any rate; the number of its mode is one of its whole
+numbers. Rules on what never happens are right then. Rules that find a point where something happens look only at
+automata that depend on no other one.
 """
 
 from __future__ import annotations

@@ -35,8 +35,8 @@ def augmented(given: Overridden, by: Sequence[Target], entries: bool = False, im
     """Write a system with the derivatives of its states.
 
     ``entries`` lets it make transitions on entry; without it those of a run have the derivative of a crossing.
-    ``implicit`` says that an implicit method runs it: its Jacobian then has the second derivatives of the flow, without
-    which the derivatives follow the states an iteration later, and no factors of a step serve for the next.
+    With ``implicit`` an implicit method runs it, and its Jacobian has the second derivatives of the flow. Without these
+    the derivatives would follow the states an iteration later, and no factors of a step would serve for the next.
     """
     return _Writer(given, by, entries, implicit).system()
 

@@ -36,7 +36,7 @@ def parted(
     """The surfaces that part executions near a place where a run begins or goes on, and what moves them there.
 
     ``time`` and ``state`` are the derivatives of the place's time and states, ``parameters`` those of all parameters by
-    each target. ``crossing`` says that a surface which is crossed at once counts too.
+    each target. With ``crossing`` a surface that is crossed at once counts too.
     """
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         try:

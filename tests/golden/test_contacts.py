@@ -70,8 +70,8 @@ def many(n: int, springs: str = "") -> str:
     """Masses that fall on tables of their own; ``springs`` between neighbours."""
 
     def pull(i: int) -> str:
-        beside = [f"x{j} - x{i}" for j in (i - 1, i + 1) if 0 <= j < n]
-        return f" + {springs}*({' + '.join(beside)})" if springs and beside else ""
+        pulls = [f"x{j} - x{i}" for j in (i - 1, i + 1) if 0 <= j < n]
+        return f" + {springs}*({' + '.join(pulls)})" if springs and pulls else ""
 
     flow = "".join(f"      x{i}: v{i}\n      v{i}: -1{pull(i)}\n" for i in range(n))
     stops = "".join(f"      - {{name: s{i}, when: x{i} <= 0, to: a, reset: {{v{i}: -v{i}/2}}}}\n" for i in range(n))

@@ -42,7 +42,7 @@ def rate(name: str, formula: str) -> str:
 
 
 def event(trigger: str, changes: dict[str, str], delay: str = "") -> str:
-    """An event that reads values at its trigger and is made whatever the trigger does then."""
+    """An event that reads values at its trigger and is made also where the trigger turns false before."""
     lasting = f"<delay>{math(delay)}</delay>" if delay else ""
     assigned = "".join(f'<eventAssignment variable="{n}">{math(f)}</eventAssignment>' for n, f in changes.items())
     begins = f'<trigger initialValue="true" persistent="true">{math(trigger)}</trigger>'

@@ -27,7 +27,7 @@ static int together(hs_view *v) {
 }
 
 static void grow(double *error, double by) {
-  if (by > *error) *error = by; /* not-a-number tells nothing */
+  if (by > *error) *error = by; /* not-a-number shows nothing */
 }
 
 /* Hold a row against the finer run at an equal time since the last transition. */

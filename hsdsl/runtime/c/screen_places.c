@@ -44,7 +44,7 @@ static int lands_close(hs_view *v) {
   const hs_record *run = &v->s->run;
   const hs_arc *arc = &run->arc[v->arc];
   const double t = run->times[arc->first], *x = recorded_row(run, arc->first);
-  if (arc->jump && follows_another(v, arc->jump - 1)) return 0; /* its choice tells */
+  if (arc->jump && follows_another(v, arc->jump - 1)) return 0; /* its choice decides */
   if (evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope)) return 1;
   for (int k = 0; k < v->table->surfaces; k++) {
     hs_judged found;

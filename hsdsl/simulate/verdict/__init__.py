@@ -1,9 +1,9 @@
 """Does the theorem hold for this run? Its hypotheses, looked at one by one in what a run recorded.
 
 The convergence theorem (Burden et al. 2013, Thm 26, Cor. 28) is about executions that cross finitely many guards, each
-transversally, with no other surface so near that an error could change the sequence, and where simultaneous choices
-lead to the same point. A run shows its own neighbourhood of the execution, so every margin is held against the error
-that the run allows itself.
+transversally. No other surface is so near that an error could change the sequence, and simultaneous choices lead to the
+same point. A run shows its own neighbourhood of the execution, so every margin is held against the error that the run
+allows itself.
 
 ==============  ==============================================================================
 `screen`        where a compiled look says that there is nothing to find; `formulas`: routines as it takes them
@@ -89,7 +89,7 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
 
 
 def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
-    """How the run left what the theorem is about, as far as the run itself tells."""
+    """How the run left what the theorem is about, as far as the run itself shows."""
     yield from diagnostics.departures
     yield from lost_in_strips(run)
     if not diagnostics.departures and run.stop.reason not in LEFT and run.screen is not None:
@@ -107,7 +107,7 @@ def _once(*sentences: Sequence[str]) -> tuple[str, ...]:
 
 
 def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
-    """The sentences of one standing, by their kinds."""
+    """The sentences of findings that make the verdict ``theorem``, by their kinds."""
     of = [f for f in found if f.theorem == theorem]
     for kind in dict.fromkeys(f.kind for f in of):
         yield from dict.fromkeys(f.sentence for f in of if f.kind == kind)

@@ -1,12 +1,11 @@
 """Errors of a run by Taylor series without another run: a companion takes the same steps by series of more terms.
 
-The companion starts where the run does. Each step begins where the companion itself is, and takes as long as the run's;
-each transition is made where the companion crosses the same surface. So what it is away from the run is the sum of what
-the run's series left out, carried along by the flow and by jumps, as long as it is small. The step size is chosen by
-the last term and the first that is left out, so two more terms tell what was left out. Round-off of the flow is much
-the same for both, so each step moves the companion further away from the run by the most that it may do. Nothing is
-looked for: that no other surface is reached is decided along the run's own steps, by enclosures that are wider than
-the errors.
+The companion starts where the run does. Each of its steps begins where it is itself, and takes as long as the run's.
+It makes each transition where it crosses the same surface. Its distance to the run is the sum of what the run's series
+left out, carried along by the flow and by jumps, as long as that is small. The last term and the first that is left out
+choose the step size, so two more terms show what was left out. Round-off of the flow is much the same for both, so each
+step moves the companion further away from the run by the most that it may do. The companion looks for no other surface:
+enclosures wider than the errors decide along the run's own steps that none is reached.
 """
 
 from __future__ import annotations
@@ -84,9 +83,9 @@ def order_of(method: Any) -> int:
 
 
 def has_companion(problem: Problem, run: Execution) -> bool:
-    """Whether a run's errors can be told by a companion: one by Taylor series, without strips and inputs' samples.
+    """Whether a companion shows the errors of a run: one by Taylor series, without strips and samples of inputs.
 
-    Of a run made in C the rest is seen where it is followed.
+    Strips and transitions on entry of a run made in C are found where the companion follows it.
     """
     settings = problem.settings
     return (
@@ -105,17 +104,17 @@ def has_companion(problem: Problem, run: Execution) -> bool:
 def accompany(problem: Problem, run: Execution) -> Companion:
     """Follow a run that has a companion."""
     assert problem.settings.method is not None
-    on_its_way, arcs = Follower(problem, run, order_of(problem.settings.method)), run.arcs
+    companion, arcs = Follower(problem, run, order_of(problem.settings.method)), run.arcs
     lost = None
     for arc, following in zip(arcs, (*arcs[1:], None), strict=True):
-        if problem.program.modes[on_its_way.modes[arc.mode]].final:
+        if problem.program.modes[companion.modes[arc.mode]].final:
             break
         leaves = arc.jump < len(run.transitions) and (following is None or following.jump > arc.jump)
         try:
-            on_its_way.arc(arc, run.transitions[arc.jump] if leaves else None)
+            companion.follow(arc, run.transitions[arc.jump] if leaves else None)
         except (Lost, *DOMAIN_ERRORS):
             lost = float(run.times[arc.first])
             break
-    late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *on_its_way.late])[1:]
+    late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *companion.late])[1:]
     missing = np.full(len(run.transitions) + 1 - len(late), np.inf)
-    return Companion(on_its_way.apart, np.append(late, missing), lost)
+    return Companion(companion.apart, np.append(late, missing), lost)

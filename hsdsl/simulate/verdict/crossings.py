@@ -53,7 +53,7 @@ def summary(run: RunView, count: int, slowest: Number | None, least: Number | No
 
 
 def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transition) -> Number | None:
-    """How often the error fits into what keeps the crossing; None where nothing tells."""
+    """How often the error fits into what keeps the crossing; None where nothing shows it."""
     if run.errors is None:
         return None
     shift = run.shift(place, k, run.row_before(made))

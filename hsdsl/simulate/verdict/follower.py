@@ -37,7 +37,7 @@ class Follower:
         self.stages: Sequence[State] = ()
         self.enclosing: dict[int, ModeKernel] = {}
 
-    def arc(self, arc: Arc, made: Transition | None) -> None:
+    def follow(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
         times = self.times
         shift = self.t - times[arc.first]
@@ -48,7 +48,7 @@ class Follower:
             if h > 0 or (made and row == arc.last):
                 self._expand(arc)
             y = self._at(h) if h > 0 else self.x
-            self._enter(row, self.run.values[row], y)
+            self._compare(row, self.run.values[row], y)
             if made and row == arc.last:
                 self._jump(arc, made, h, y)
             elif h > 0:
@@ -69,7 +69,7 @@ class Follower:
             self.enclosing[mode] = self.problem.kernel.enclosing.bind(mode, data)
         return self.enclosing[mode]
 
-    def _enter(self, row: int, x: Any, y: State) -> None:
+    def _compare(self, row: int, x: Any, y: State) -> None:
         if not all(map(isfinite, y)):
             raise Lost
         away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
@@ -105,7 +105,7 @@ class Follower:
                 break
         if not abs(change) <= tie:
             raise Lost
-        self._enter(arc.last, list(made.before.values()), y)
+        self._compare(arc.last, list(made.before.values()), y)
         self.t += s
         self.late.append(abs(float(made.time) - self.t))
         self.x = kernel.resets[k](self.t, *y)

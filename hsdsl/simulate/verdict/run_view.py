@@ -76,7 +76,7 @@ class RunView:
 
     @cached_property
     def errors(self) -> Errors | None:
-        """How wrong the run is, by a finer one; None where steps are fixed and no finer run is given."""
+        """How wrong the run is, by a companion or a finer run; None where steps are fixed and no finer run is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
         known = float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(self.execution.times[-1]))
         if self.accompanied:

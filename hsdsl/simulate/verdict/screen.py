@@ -57,12 +57,12 @@ class Screen:
             table.order = order_of(method)
         else:
             table.finer = _record(finer.columns)
-        self._lay(record, finer is None)
+        self._reserve(record, finer is None)
         runtime().hs_look(ctypes.addressof(table))
-        self._first = run.columns
+        self._columns = run.columns
         self._modes: tuple[ModeProgram, ...] = problem.program.modes
 
-    def _lay(self, record: Any, accompanied: bool) -> None:
+    def _reserve(self, record: Any, accompanied: bool) -> None:
         """Give the table memory for what it finds: columns of marks, then what a companion is apart, and scratch."""
         table, rows, arcs, made = self.table, record.rows, record.arcs, record.transitions
         self._ends = 0, made, made + arcs, made + 2 * arcs, made + 2 * arcs + rows, made + 2 * (arcs + rows)
@@ -101,7 +101,7 @@ class Screen:
     @cached_property
     def first_rows(self) -> Array:
         """The first row of each arc."""
-        return self._first["arc"]["first"]
+        return self._columns["arc"]["first"]
 
     def arcs(self, name: str) -> set[int]:
         """The first rows of the arcs that are marked."""
@@ -117,7 +117,7 @@ class Screen:
         """When transitions were reached together of which every order leads to the same point."""
         if not self.table.marks & COMMUTES:
             return []
-        return self._first["transition"]["time"][self.marked("crossing") & COMMUTES != 0].tolist()
+        return self._columns["transition"]["time"][self.marked("crossing") & COMMUTES != 0].tolist()
 
     @property
     def nearest_miss(self) -> list[str]:

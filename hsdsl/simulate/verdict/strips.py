@@ -1,7 +1,7 @@
 """Transitions lost in strips: a surface with an `if` that moves past a state which waits is never crossed by it.
 
-Of transitions that are reached together one goes. Where it waits in a strip, time goes on; another one whose `if`
-holds is behind its surface afterwards, and so is one that the reset makes due at once.
+Of transitions that are reached together one goes. Where it waits in a strip, time goes on. Another one whose `if` holds
+is behind its surface afterwards, and so is one that the reset makes due at once.
 """
 
 from __future__ import annotations
