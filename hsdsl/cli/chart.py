@@ -30,7 +30,7 @@ def chart(
     steps: Annotated[str | None, option("A,B", "For fixed-step methods.")] = None,
     against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
     states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
-    samples: Annotated[int, option("N", "How many samples the error is sampling at.")] = 2000,
+    samples: Annotated[int, option("N", "At how many samples the error is taken.")] = 2000,
     clearance: Annotated[float, option("DT", "Samples nearer than this to an exact jump do not count.")] = 1e-4,
     digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
     rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
@@ -42,7 +42,7 @@ def chart(
 ) -> None:
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
     with answer.reporting():
-        from hsdsl.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
+        from hsdsl.chart import ENGINES, PEERS, SCHEMES, TOLERANCES
         from hsdsl.integrators import METHODS
 
         check_target(out, "--out", (".csv",))
@@ -58,22 +58,30 @@ def chart(
             "patience": patience,
             "with_rho": rho,
         }
-        charted: list[tuple[str, list[Row]]] = []
-        with progress(answer.hidden) as show:
+        sampling = {"states": names_of(states), "samples": samples, "clearance": clearance, "digits": digits}
+        _report(_charted(models, sampling, options, answer), out, plot, answer)
 
-            def watch(text: str) -> None:
-                if show:
-                    show(lambda: text)
 
-            sampling = {"states": names_of(states), "samples": samples, "clearance": clearance, "digits": digits}
-            for scene in [_scene(text, sampling, watch) for text in models]:
-                rows, remarks = work_precision(
-                    scene, **options, watch=lambda what, name=scene.name: watch(f"{name}: {what}")
-                )
-                charted.append((scene.name, rows))
-                for remark in remarks if not answer.quiet else ():
-                    say(f"left out: {remark}")
-        _report(charted, out, plot, answer)
+def _charted(
+    models: list[str], sampling: dict[str, Any], options: dict[str, Any], answer: Answer
+) -> list[tuple[str, list[Row]]]:
+    """The rows of each model by its name, with what is left out on standard error."""
+    from hsdsl.chart import work_precision
+
+    charted: list[tuple[str, list[Row]]] = []
+    with progress(answer.hidden) as show:
+
+        def watch(text: str) -> None:
+            if show:
+                show(lambda: text)
+
+        for scene in [_scene(text, sampling, watch) for text in models]:
+            name = scene.name
+            rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
+            charted.append((name, rows))
+            for remark in remarks if not answer.quiet else ():
+                say(f"left out: {remark}")
+    return charted
 
 
 def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) -> Any:

@@ -17,7 +17,7 @@ from hsdsl.names import did_you_mean, visible
 from hsdsl.progress import running
 
 if TYPE_CHECKING:
-    from hsdsl.execution import Execution
+    from hsdsl.execution import Execution, Stop
     from hsdsl.model import Model as LoadedModel
     from hsdsl.model.stream import Streamed
 
@@ -28,6 +28,7 @@ EVERY = "Write every K-th step to --out (.csv) during the run, in constant memor
 DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
 FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
 SPEED = "Of the film: time of the run by seconds; else 1 where the film then lasts 4 to 20 s."
+EVERY_ALONE = "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
 OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".html")
 
 
@@ -49,11 +50,7 @@ def run(
 ) -> None:
     """Simulate a model and summarise what happened."""
     with answer.reporting():
-        check_target(out, "--out", OUT_SUFFIXES)
-        if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
-            raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
-        check_target(plot, "--plot", PLOT_SUFFIXES)
-        check_target(animate, "--animate", (".gif", ".mp4"))
+        _check_files(out, plot, animate, outputs)
         loaded = _load(model, engine, precision, experiment.scheme)
         settings = experiment.settings(engine=engine, precision=precision)
         names = chosen_names(outputs, loaded.columns)
@@ -64,9 +61,7 @@ def run(
             if every is None:
                 result = loaded.simulate(**settings, outputs=needed(shown))
             elif out is None or plot or animate or estimate or precision is not None:
-                raise UsageError(
-                    "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
-                )
+                raise UsageError(EVERY_ALONE)
             else:
                 settings = {name: value for name, value in settings.items() if value is not None}
                 result = loaded.stream(out, every=every, columns=names, **settings)
@@ -76,11 +71,24 @@ def run(
                 write_film(loaded, animate, speed, settings, answer.hidden)
         else:
             _answer_streamed(result, model, answer)
-    stop = result.stop
+    _leave(result.stop, answer)
+
+
+def _leave(stop: Stop, answer: Answer) -> None:
+    """End with the exit code of a run that stopped early."""
     if not stop.complete:
         if not answer.json:
             say(f"hsdsl: stopped ({stop.reason})" + (f": {stop.message}" if answer.quiet else ""))
         raise Exit(INTERRUPTED if stop.reason == "interrupted" else STOPPED)
+
+
+def _check_files(out: Path | None, plot: Path | None, animate: Path | None, outputs: str | None) -> None:
+    """Refuse files that could not be written."""
+    check_target(out, "--out", OUT_SUFFIXES)
+    if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
+        raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
+    check_target(plot, "--plot", PLOT_SUFFIXES)
+    check_target(animate, "--animate", (".gif", ".mp4"))
 
 
 def _load(path: Path, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:
