@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.backends.text import compile_routines
+from hsdsl.backends.text import compile_routines, each_apart
 from hsdsl.kernel import ModeKernel, Routine, Taylor, Vector
 from hsdsl.program import EdgeProgram, Program
 
@@ -23,6 +23,7 @@ class PythonKernel:
         self._program = program
         self._enclosing: PythonKernel | None = None
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._apart: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
         self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
@@ -73,12 +74,27 @@ class PythonKernel:
         slopes = (spread_out(bound[f"gradient_{k}"], row, n + 1, zero) for k, row in enumerate(program.slopes))
         return ModeKernel(
             **{name: bound[name] for name in PLAIN},
+            outputs=self._outputs(mode, data, bound["outputs"]),
             gradients=tuple(slopes),
             rates=tuple(bound[f"rate_{k}"] for k in range(len(program.slopes))),
             conditions=tuple(conjunction([bound[name] for name in parts]) for parts in program.conditions),
             resets=tuple(changed(bound[f"reset_{k}"], edge, 1) for k, edge in enumerate(program.edges)),
             spreads=tuple(changed(bound[f"spread_{k}"], edge, n + 1) for k, edge in enumerate(program.edges)),
         )
+
+    def _outputs(self, mode: int, data: Sequence[Number], together: Routine) -> Routine:
+        """Evaluate outputs together; each apart, compiled on first use, where one of them has no value."""
+
+        def outputs(*arguments: Number) -> Vector:
+            try:
+                return together(*arguments)
+            except DOMAIN_ERRORS:
+                if mode not in self._apart:
+                    text = each_apart(self._program.flows[mode].routines, "outputs")
+                    self._apart[mode] = compile_routines(text, self.arithmetic, f"outputs of mode {mode}")
+                return self._apart[mode](*data)[0](*arguments)
+
+        return outputs
 
     def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
         """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
@@ -136,7 +152,7 @@ def spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number)
     return spread
 
 
-PLAIN = ("flow", "surfaces", "magnitudes", "outputs")
+PLAIN = ("flow", "surfaces", "magnitudes")
 
 
 def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..., tuple[bool, ...]]:

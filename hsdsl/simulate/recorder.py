@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 
@@ -196,10 +196,7 @@ class Recorder:
         return (*piece, *((self.arithmetic.zero,) * dimension for _ in range(missing))) if missing else piece
 
     def _outputs(self, arc: OpenArc, k: int) -> State:
-        try:
-            return arc.outputs(arc.times[k], *arc.values[k]) if arc.outputs else self._no_outputs
-        except DOMAIN_ERRORS:
-            return self._no_outputs
+        return arc.outputs(arc.times[k], *arc.values[k]) if arc.outputs else self._no_outputs
 
     @property
     def _no_outputs(self) -> State:

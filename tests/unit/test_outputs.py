@@ -1,13 +1,14 @@
-"""Outputs that only some modes define: no value elsewhere, whichever way they are asked for."""
+"""Outputs without a value, in modes that do not define them or at some instants: the others have theirs."""
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import COMPILER, assert_engines_agree, needs_compiler
 
 import hsdsl
 from hsdsl.report import as_json, dumps
@@ -67,3 +68,44 @@ def test_a_picture_has_gaps(tmp_path):
     model = hsdsl.load(CASE)
     model.plot(model.simulate(until=1.5), tmp_path / "run.svg")
     assert (tmp_path / "run.svg").stat().st_size
+
+
+def many_outputs(count: int) -> str:
+    """Outputs of three shapes with a part in common; of each shape some have no value at most times."""
+    shapes = ("log(x - {at})/(x - {pole}) + log(2 - x)", "sqrt({at} - x)*x + min(2, x)", "{at} + x")
+    written = (f"o{k}: '{shapes[k % 3].format(at=k / count, pole=2 * k / count)}'" for k in range(count))
+    return f"""
+hsdsl: 1
+outputs: {{{", ".join(written)}}}
+modes: {{a: {{flow: {{x: 1}}}}}}
+initial: {{mode: a, x: 0}}
+experiment: {{until: 2.5}}
+"""
+
+
+def own_value(k: int, count: int, x: float) -> float:
+    """The value of one of them at x, not-a-number where it has none."""
+    at, pole = k / count, 2 * k / count
+    try:
+        if k % 3 == 0:
+            return math.log(x - at) / (x - pole) + math.log(2 - x)
+        return math.sqrt(at - x) * x + min(2, x) if k % 3 == 1 else at + x
+    except (ValueError, ZeroDivisionError):
+        return math.nan
+
+
+@pytest.mark.parametrize("engine", ["python", pytest.param("c", marks=needs_compiler)])
+@pytest.mark.parametrize("count", [12, 300])  # as C in one function, and in pieces with loops
+def test_an_output_without_a_value_leaves_the_others_theirs(count, engine):
+    run = hsdsl.loads(many_outputs(count)).simulate(engine=engine)
+    times = np.linspace(0.001, 2.499, 21)
+    samples = run.sample(times)
+    for k in range(count):
+        expected = [own_value(k, count, t) for t in times]
+        np.testing.assert_allclose(samples[f"o{k}"], expected, rtol=1e-12, atol=1e-12)
+
+
+@needs_compiler
+@pytest.mark.parametrize("count", [12, 300])
+def test_engines_agree_on_outputs_without_values(count):
+    assert_engines_agree(hsdsl.loads(many_outputs(count)))

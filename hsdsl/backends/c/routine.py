@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
+from dataclasses import replace
 from textwrap import dedent
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
@@ -23,7 +24,16 @@ static HS_APART int {name}(const hs_real *restrict p, hs_real t, const hs_real *
   int bad = 0;
   (void)p, (void)t, (void)x, (void)v, (void)out;
 {body}
-  return bad;
+  return {status};
+}}
+"""
+_APART = """\
+static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
+  hs_real v[{size}];
+  int bad = 0;
+  (void)p, (void)t, (void)x, (void)v;
+{body}
+  return 0;
 }}
 """
 _WHOLE = """\
@@ -34,21 +44,54 @@ static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict 
 """
 
 
-def routine_function(name: str, text: str, data: Mapping[str, str]) -> str:
-    """A routine, its text being that of a Python function from its arguments on; ``data`` names what it closes over."""
+def routine_function(name: str, text: str, data: Mapping[str, str], apart: bool = False) -> str:
+    """A routine, its text being that of a Python function from its arguments on; ``data`` names what it closes over.
+
+    With ``apart`` a value that there is none of is not-a-number, and the others are what they are.
+    """
     definition = ast.parse(dedent(f"    def routine{text}")).body[0]
     assert isinstance(definition, ast.FunctionDef)
     names = {**data, **_named(definition)}
-    if _size(definition) <= LARGE:
+    small = _size(definition) <= LARGE
+    assignments, locals_ = _assignments(definition, dict(names)) if apart or not small else ([], 0)
+    if apart := apart and any("&bad" in one.value for one in assignments):
+        assignments, locals_ = _each_apart(assignments, locals_), 2 * locals_
+    if small and not apart:
         return _FUNCTION.format(name=name, body=function_body(definition, names))
-    assignments, locals_ = _assignments(definition, names)
+    if not small:
+        return _in_pieces(name, assignments, max(1, locals_), "0" if apart else "bad")
+    body = "\n".join(f"  {one.target} = {one.value};" for one in assignments)
+    return _APART.format(name=name, size=max(1, locals_), body=body)
+
+
+def _in_pieces(name: str, assignments: list[Assignment], size: int, status: str) -> str:
     found = pieces(assignments)
     parts = [f"{name}_{i}" for i in range(len(found))]
     bodies = ("\n".join(f"  {statement}" for statement in piece) for piece in found)
-    whole = _WHOLE.format(
-        name=name, size=max(1, locals_), calls=" || ".join(f"{part}(p, t, x, v, out)" for part in parts)
-    )
-    return "".join((*(_PIECE.format(name=part, body=body) for part, body in zip(parts, bodies, strict=True)), whole))
+    functions = (_PIECE.format(name=part, body=body, status=status) for part, body in zip(parts, bodies, strict=True))
+    calls = " || ".join(f"{part}(p, t, x, v, out)" for part in parts)
+    return "".join((*functions, _WHOLE.format(name=name, size=size, calls=calls)))
+
+
+def _failing(assignments: list[Assignment]) -> list[bool]:
+    """Whether each value may be none."""
+    found: list[bool] = []
+    for one in assignments:
+        found.append("&bad" in one.value or any(found[i] for i in one.needs))
+    return found
+
+
+def _each_apart(assignments: list[Assignment], locals_: int) -> list[Assignment]:
+    """Let each value be none where it, or what it needs, is none: ``v`` has behind the values whether they are lost."""
+    fails = _failing(assignments)
+
+    def apart(i: int, one: Assignment) -> Assignment:
+        lost = " | ".join(f"(v[{locals_ + k}] != 0)" for k in sorted(one.needs) if fails[k])
+        result = f"{one.target} = bad ? (hs_real)NAN : {one.target}"
+        kept = f"v[{locals_ + i}] = (hs_real)bad" if i < locals_ else result
+        return replace(one, target=f"bad = {lost or 0}, {one.target}", value=f"{one.value}, {kept}")
+
+    return [apart(i, one) if fails[i] else one for i, one in enumerate(assignments)]
 
 
 def _size(definition: ast.FunctionDef) -> int:

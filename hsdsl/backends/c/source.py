@@ -257,7 +257,7 @@ class _Writer:
 
     def routines(self, routines: Routines) -> dict[str, str]:
         """Write a mode's routines; returns their names in C."""
-        return {name: self.function(text) for name, text in _DEFINITION.findall(routines.source)}
+        return {name: self.function(text, name == "outputs") for name, text in _DEFINITION.findall(routines.source)}
 
     def shared(self, kind: str, text: str) -> str:
         """Write a function whose name is ``NAME`` in its text; equal texts are one function."""
@@ -266,8 +266,9 @@ class _Writer:
             self.functions[text] = text.replace("NAME", self._names[text])
         return self._names[text]
 
-    def function(self, text: str) -> str:
-        if text not in self.functions:
-            self._names[text] = name = f"routine_{len(self.functions)}"
-            self.functions[text] = routine_function(name, text, self.data)
-        return self._names[text]
+    def function(self, text: str, apart: bool = False) -> str:
+        key = f"{text} # apart" if apart else text
+        if key not in self.functions:
+            self._names[key] = name = f"routine_{len(self.functions)}"
+            self.functions[key] = routine_function(name, text, self.data, apart)
+        return self._names[key]

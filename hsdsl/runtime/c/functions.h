@@ -139,6 +139,7 @@ static int judge(hs_run *run, const hs_real *values, hs_found *found);
 /* input_segments.c */
 static int64_t segment_at(const hs_timeline *timeline, hs_time t);
 static hs_time segment_end(const hs_run *run);
+static int segment_follows(const hs_run *run);
 static const hs_real *segment_data(const hs_run *run, int64_t segment);
 
 /* recorder.c */
