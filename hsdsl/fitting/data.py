@@ -98,7 +98,7 @@ def _single(source: str, names: list[Any]) -> list[Any]:
     """The names, unless one comes twice."""
     for k, name in enumerate(names):
         if name in names[:k]:
-            raise UsageError(f"{source}: two columns are called '{shown(str(name))}'")
+            raise UsageError(f"{source}: expected a column once, got '{shown(str(name))}' twice")
     return names
 
 

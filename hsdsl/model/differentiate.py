@@ -185,7 +185,7 @@ def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[
     method = METHODS.get(str(call.get("method")))
     if method is not None and not method.adaptive:
         adaptive = ", ".join(name for name, each in METHODS.items() if each.adaptive)
-        sentence = f"method '{method.name}' has fixed steps, expected one that keeps a tolerance"
+        sentence = f"expected a method that keeps a tolerance, got '{method.name}' with fixed steps"
         raise UsageError(sentence, f"known here: auto, {adaptive}")
     if "tolerance" not in call and pipeline.resolve(settings, {"scheme": "located"}).size == "step":
         call["tolerance"] = DEFAULT_TOLERANCE

@@ -87,7 +87,7 @@ def address(memory: Any) -> c_void_p:
 
 
 def start_of(array: np.ndarray[Any, Any]) -> int:
-    """Where the numbers of an array are that is not empty and can be written: several times as fast as NumPy's own."""
+    """The address of the numbers of a writable array that is not empty, several times as fast as by NumPy."""
     return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
 
 

@@ -149,7 +149,7 @@ class TransitionDocument(Document):
         "With `event`: how long after its condition turned true the transition is made, with the values of then.", 2
     )
     persistent: Flag = optional(
-        "With `event`: whether the transition is made even if its condition turns false before it is its turn.",
+        "With `event`: whether the transition is made even if its condition turns false before.",
         False,
         default=True,
     )

@@ -372,7 +372,7 @@ def test_moving_jumps_are_refused() -> None:
         ("", {}, "got none", "for example"),
         ("c", {"step": 1e-3}, "no argument 'step'", ""),
         ("c", {"scheme": "relaxed"}, "no argument 'scheme'", ""),
-        ("c", {"method": "midpoint"}, "method 'midpoint' has fixed steps", "dop853"),
+        ("c", {"method": "midpoint"}, "got 'midpoint' with fixed steps", "dop853"),
         ("c", {"tolerence": 1e-3}, "no argument 'tolerence'", "tolerance"),
     ],
 )

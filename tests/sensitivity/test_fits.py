@@ -131,7 +131,7 @@ def test_progress(model: Any, samples: dict[str, Any]) -> None:
         ("t,x\n0,1\n1,inf\n", "a finite number in column x, row 3, got 'inf'"),
         ("t,x\n0,1\ninf,1\n", "a finite number in column t, row 3, got 'inf'"),
         ("t,x\nnan,1\n1,1\n", "not negative, got nan"),
-        ("t,x, x\n0,1,2\n", "two columns are called 'x'"),
+        ("t,x, x\n0,1,2\n", "expected a column once, got 'x' twice"),
     ],
 )
 def test_bad_data(text: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
