@@ -10,7 +10,8 @@ from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, check_target, known_names, names_of, option
+from hsdsl.cli.options import Answer, option
+from hsdsl.cli.texts import check_target, known_names, names_of
 from hsdsl.errors import UsageError
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 from hsdsl.cli.console import say
-from hsdsl.cli.options import AllowPath, Limit, Model, answering, check_target, option
+from hsdsl.cli.options import AllowPath, Limit, Model, answering, option
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 NOTHING = (

@@ -11,19 +11,9 @@ from typer import Argument
 
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import Text, print_json, progress, say
-from hsdsl.cli.options import (
-    AllowPath,
-    Json,
-    Limit,
-    Metric,
-    answering,
-    check_target,
-    names_of,
-    option,
-    overriding,
-    split,
-)
+from hsdsl.cli.options import AllowPath, Json, Limit, Metric, answering, option, overriding, split
 from hsdsl.cli.saved import run_of
+from hsdsl.cli.texts import check_target, names_of
 from hsdsl.errors import UsageError
 
 SET = "Override a parameter. May be repeated."

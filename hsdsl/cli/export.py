@@ -8,7 +8,8 @@ from typing import Annotated
 from typer import Option
 
 from hsdsl.cli.console import print_json, say
-from hsdsl.cli.options import Answer, Experiment, Model, names_of, option
+from hsdsl.cli.options import Answer, Experiment, Model, option
+from hsdsl.cli.texts import names_of
 from hsdsl.errors import UsageError
 from hsdsl.export import TARGETS, check_folder, check_scheme, files_of, source_of, write
 

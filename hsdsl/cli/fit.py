@@ -10,7 +10,8 @@ from typing import Annotated, Any
 from typer import Argument, Exit
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, Located, Model, check_target, option, overriding
+from hsdsl.cli.options import Answer, Located, Model, option, overriding
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."

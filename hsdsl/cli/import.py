@@ -8,7 +8,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from hsdsl.cli.console import print_json, say
-from hsdsl.cli.options import Json, Limit, Quiet, Until, answering, check_target, option
+from hsdsl.cli.options import Json, Limit, Quiet, Until, answering, option
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 from hsdsl.names import counted
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 from hsdsl.cli.console import say
-from hsdsl.cli.options import AS_RUN, Answer, Located, Model, check_target, option, overriding
+from hsdsl.cli.options import AS_RUN, Answer, Located, Model, option, overriding
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 SECTION = "The transition that the orbit is cut at, by its name."

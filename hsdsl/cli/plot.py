@@ -9,8 +9,9 @@ from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import say
-from hsdsl.cli.options import AllowPath, Limit, Phases, answering, check_target, names_of, option, pairs_of
+from hsdsl.cli.options import AllowPath, Limit, Phases, answering, option
 from hsdsl.cli.saved import run_of
+from hsdsl.cli.texts import check_target, names_of, pairs_of
 from hsdsl.errors import UsageError
 
 RUNS = "Saved runs (.npz), or model files, each of which is run as its own experiment says."

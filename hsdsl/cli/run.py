@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Exit, Option
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, check_target, names_of, option, pairs_of
+from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, option
 from hsdsl.cli.shown import needed, shown_of, write_film
+from hsdsl.cli.texts import check_target, names_of, pairs_of
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
 from hsdsl.names import did_you_mean, visible

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Option
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import AS_RUN, Answer, Located, Model, Until, check_target, option, overriding
+from hsdsl.cli.options import AS_RUN, Answer, Located, Model, Until, option, overriding
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 if TYPE_CHECKING:

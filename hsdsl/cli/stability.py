@@ -8,7 +8,8 @@ from typing import Annotated, Any
 from typer import Option
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, Model, check_target, known_names, option, overriding, values_of
+from hsdsl.cli.options import Answer, Model, option, overriding, values_of
+from hsdsl.cli.texts import check_target, known_names
 from hsdsl.errors import UsageError
 
 MAP = (

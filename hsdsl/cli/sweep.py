@@ -10,7 +10,8 @@ from typer import Argument, Exit
 
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, EngineName, Experiment, check_target, names_of, option
+from hsdsl.cli.options import Answer, EngineName, Experiment, option
+from hsdsl.cli.texts import check_target, names_of
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
 

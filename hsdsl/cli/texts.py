@@ -1,0 +1,89 @@
+"""Texts of options as values: names, pairs of names, limits, and files that can be written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hsdsl.errors import UsageError
+from hsdsl.limits import DEFAULT, NUMBERS, Limits
+from hsdsl.names import did_you_mean
+
+
+def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
+    """Read ``--allow-path`` and ``--limit``.
+
+    Raises
+    ------
+    UsageError
+        No such limit, no positive number, or no such folder.
+    """
+    numbers: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = (part.strip() for part in pair.partition("="))
+        if name not in NUMBERS:
+            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
+        try:
+            numbers[name] = type(getattr(DEFAULT, name))(float(value))
+        except (ValueError, OverflowError):
+            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-path {folder}: there is no such folder")
+    return Limits(**numbers, folders=tuple(folders))
+
+
+def names_of(text: str | None) -> list[str]:
+    """The names in a text with commas between them."""
+    return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def known_names(text: str | None, known: Sequence[str], name: str) -> tuple[str, ...]:
+    """The names in a text with commas between them.
+
+    Raises
+    ------
+    UsageError
+        One of them is not known.
+    """
+    names = names_of(text)
+    for each in names:
+        if each not in known:
+            raise UsageError(f"{name}: there is no '{each}'", did_you_mean(each, known))
+    return tuple(names)
+
+
+def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:
+    """Read ``--phase``; None where it is left out.
+
+    Raises
+    ------
+    UsageError
+        No pair, or no such state or output.
+    """
+    pairs: list[tuple[str, str]] = []
+    for text in texts or ():
+        names = [part.strip() for part in text.split(",")]
+        if len(names) != 2 or not all(names):
+            raise UsageError(f"--phase: expected two names with a comma between them, got '{text}'")
+        for name in names:
+            if name not in known:
+                raise UsageError(f"--phase: there is no state or output '{name}'", did_you_mean(name, known))
+        pairs.append((names[0], names[1]))
+    return pairs or None
+
+
+def check_target(path: Path | None, option: str, suffixes: Sequence[str]) -> None:
+    """Refuse a file that could not be written before a long run, not after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise UsageError(f"{option} {path}: the name must end in {known}")
+    if not path.parent.is_dir():
+        raise UsageError(f"{option} {path}: there is no folder {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        from hsdsl.execution.samples import optional
+
+        optional("pyarrow", f"{option} {path}")
