@@ -12,10 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import accumulate, count
+from typing import Any
 
 import sympy as sp
 
-from hsdsl.functions import rebuilt, solution
+from hsdsl.functions import below, floor, rebuilt, sign, solution
 from hsdsl.lower.elimination import solved
 from hsdsl.lower.printer import LARGEST_PRODUCT
 from hsdsl.system import TIME
@@ -130,7 +131,7 @@ class Gradient:
         return tuple(tuple(row.get(a, sp.S.Zero) for a in self._arguments) for row in self.sparse)
 
     def _row(self, expr: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-        present = expr.free_symbols
+        present = moving(expr)
         direct = {a: derivative(expr, a) for a in present & self._order.keys()}
         through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
@@ -138,6 +139,17 @@ class Gradient:
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
         return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
+
+
+@lru_cache(maxsize=4096)  # memory of events has many conditions, which only jump
+def moving(expr: sp.Basic) -> frozenset[Any]:
+    """The symbols outside of what only jumps: by the others the derivative is zero."""
+    if expr.is_Symbol:
+        return frozenset((expr,))
+    if isinstance(expr, (sign, floor)):
+        return frozenset()
+    parts = expr.args[2:] if isinstance(expr, below) else expr.args
+    return frozenset().union(*map(moving, parts))
 
 
 @lru_cache(maxsize=4096)  # the modes of a large model have most of their derivatives in common

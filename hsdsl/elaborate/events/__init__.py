@@ -2,8 +2,8 @@
 """Events: edges that fire where a condition turns true, written as edges with memory.
 
 The memory of an event NAME is in states that do not flow (`hsdsl.names.memory`): ``NAME@armed`` is 1 once the
-condition was false, and ``NAME@due`` where a reset made it true. With a delay the state ``NAME@waiting`` is 1 until
-``NAME@at``, and ``NAME@to.x`` is the value that x then gets; those of further executions that wait end in ``[2]``.
+condition was false, and ``NAME@due`` where a reset made it true. With a delay ``NAME@waiting`` counts the executions
+that wait; the first is made at ``NAME@at``, and ``NAME@to.x`` is the value that x then gets; others end in ``[2]``.
 An event of a part belongs to one mode of it: in the others its surfaces are inside and its memory means nothing.
 """
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import is_mode, placed, select, total, whole
 from hsdsl.expression.trigger import Reached, comparisons, number, reached
-from hsdsl.functions import maximum
+from hsdsl.functions import maximum, minimum
 from hsdsl.names import memory
 from hsdsl.system import ONE, TIME, ZERO, Edge, Mode, Surface
 
@@ -35,22 +35,22 @@ class Event:
 
     @cached_property
     def names(self) -> dict[str, str]:
-        return {part: memory(self.edge.name, part) for part in (["armed"] + (["due"] if self.jumps else []))}
+        parts = ["armed", *(["due"] if self.jumps else []), *([] if self.delay is None else ["waiting"])]
+        return {part: memory(self.edge.name, part) for part in parts}
 
     @cached_property
     def slots(self) -> tuple[Slot, ...]:
-        """The executions that can wait at a time; one that is not persistent is gone before it is triggered again."""
+        """The executions that can wait at a time, in the order in which they are made.
+
+        One that is not persistent is gone before it is triggered again; numbers need no memory.
+        """
         if self.delay is None:
             return ()
         given = dict(zip(self.edge.target_states, self.edge.reset, strict=True))
-        stored = tuple(state for state in self.event.given if given.get(state, symbol(state)) != symbol(state))
+        values = ((state, given.get(state, symbol(state))) for state in self.event.given)
+        stored = tuple(state for state, value in values if value != symbol(state) and value.free_symbols)
         most = self.event.waiting if self.event.persistent else 1
-        return tuple(Slot(self.edge.name, stored, "" if k == 1 else f"[{k}]") for k in range(1, most + 1))
-
-    @property
-    def full(self) -> Any:
-        """1 where as many executions wait as can, else 0."""
-        return self.slots[-1].waits if self.slots else ZERO
+        return tuple(Slot(self.edge.name, stored, k) for k in range(1, most + 1))
 
     @cached_property
     def symbols(self) -> frozenset[Any]:
@@ -77,7 +77,7 @@ class Event:
     def ready(self) -> Any:
         """1 where it is to be made at this instant, else 0."""
         if self.slots:
-            ready = reduce(maximum, (slot.ready for slot in self.slots))
+            ready = minimum(self.symbol("waiting"), ONE) * reached(TIME, self.slots[0].at)
         else:
             ready = self.symbol("armed") * self.rises()
             ready = maximum(ready, self.symbol("due")) if self.jumps else ready
@@ -141,27 +141,18 @@ class Event:
 
 @dataclass(frozen=True)
 class Slot:
-    """An execution that can wait: its event, states that get the values that are ``stored``, and its number."""
+    """An execution that can wait: its event, states that get the values that are ``stored``, and its number from 1."""
 
     name: str
     stored: tuple[str, ...]
-    number: str
+    number: int
 
     def _state(self, part: str) -> str:
-        return memory(self.name, f"{part}{self.number}")
-
-    @property
-    def waits(self) -> Any:
-        return symbol(self._state("waiting"))
+        return memory(self.name, part if self.number == 1 else f"{part}[{self.number}]")
 
     @property
     def at(self) -> Any:
         return symbol(self._state("at"))
-
-    @property
-    def ready(self) -> Any:
-        """1 where it is to be made at this instant, else 0."""
-        return self.waits * reached(TIME, self.at)
 
     @property
     def values(self) -> dict[str, str]:
@@ -169,7 +160,7 @@ class Slot:
 
     @property
     def states(self) -> tuple[str, ...]:
-        return (self.waits.name, self.at.name, *self.values.values())
+        return (self.at.name, *self.values.values())
 
 
 def number_left(edge: Edge) -> dict[Any, Any]:

@@ -9,7 +9,7 @@ from functools import partial, reduce
 from typing import Any
 
 from hsdsl.elaborate.events.event import Event, Values
-from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, executes, overflowing
+from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, due, executes, has_room, is_full, overflowing
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import Reached, comparisons, condition
 from hsdsl.functions import below, maximum, minimum
@@ -33,24 +33,24 @@ def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
     if event.delay is not None:  # what only remembers goes before anything that changes states
         fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
     turn = None if highest is None else at_least(event.priority, highest)
-    free = [at_least(HALF, event.full)] if event.slots else [] if turn is None else [turn]
+    free = [has_room(event)] if event.slots else [] if turn is None else [turn]
     for part in comparisons(trigger):
         others = condition(trigger, partial(_with, event, part, True))
         surface = event.surface(part.left, part.right, part.text)
         when = all_of(at_least(armed, HALF), others)
         yield replace(fires, surface=surface, condition=all_of(when, *free), condition_text=_text(event)), event, part
         if event.slots:
-            full = all_of(when, at_least(event.full, HALF))
+            full = all_of(when, is_full(event))
             yield replace(overflowing(fires, event), surface=surface, condition=full), None, None
     if event.jumps:
-        due = event.symbol("due")
+        now = due(event, False) if event.slots else event.symbol("due")
         if highest is not None and not event.slots:
-            due *= below(event.priority - highest, ZERO, ZERO, ONE)
-        yield _when_due(fires, event, due - event.full), event, None
+            now *= below(event.priority - highest, ZERO, ZERO, ONE)
+        yield _when_due(fires, event, now), event, None
         if event.slots:
-            yield _when_due(overflowing(fires, event), event, due + event.full - 1), None, None
-    for slot in event.slots:
-        made = executes(event, slot)
+            yield _when_due(overflowing(fires, event), event, due(event, True)), None, None
+    if event.slots:
+        made = executes(event)
         yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
     arms = staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | dropped(event))
     for part in comparisons(trigger):
@@ -61,7 +61,7 @@ def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
 
 
 def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
-    """An edge that goes where a number is 1, and not where it is 0 or less."""
+    """An edge that goes where a number is 1 or more, and not where it is 0 or less."""
     surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
     return replace(edge, surface=surface, condition=None, condition_text=None)
 
@@ -82,4 +82,4 @@ def staying(event: Event, name: str, values: Values) -> Edge:
     states = (*mode.states, *values)
     reset = (*map(symbol, mode.states), *values.values())
     edge = replace(event.edge, event=None, name=name, target=mode.name, target_states=states, reset=reset)
-    return replace(edge, reset_texts=tuple(map(str, reset)), stays=True, condition_text=None)
+    return replace(edge, reset_texts=states, stays=True, condition_text=None)

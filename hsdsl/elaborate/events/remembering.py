@@ -65,7 +65,7 @@ def remembered(draft: Draft, memories: Mapping[str, Memory], order: Mapping[str,
         edge,
         target_states=tuple(ordered),
         reset=tuple(ordered.values()),
-        reset_texts=tuple(texts.get(name, str(value)) for name, value in ordered.items()),
+        reset_texts=tuple(texts.get(name, name) for name in ordered),  # readers see no other memory
     )
 
 
