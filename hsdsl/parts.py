@@ -15,6 +15,7 @@ from typing import Any
 
 from hsdsl.names import did_you_mean
 
+_LISTED = 8  # instances that a hint names
 _INDEX = re.compile(r"\[\d+\]")
 
 
@@ -97,6 +98,14 @@ def meant(name: str, known: Iterable[str]) -> str | None:
     if alike := [each for each in names if of_all(each) == of_all(name)]:
         return f"known here: {alike[0]} to {alike[-1]}, and {of_all(name)} for all"
     return did_you_mean(name, names if "[" in name else map(of_all, names))
+
+
+def meant_alone(name: str, known: Iterable[str]) -> str | None:
+    """The hint for a name that is none of those known, where one for all instances has no meaning."""
+    names = list(dict.fromkeys(known))
+    if alike := [each for each in names if of_all(each) == name]:
+        return f"name one instance: {', '.join([*alike[:_LISTED], *['...'] * (len(alike) > _LISTED)])}"
+    return meant(name, names) if "[" in name else did_you_mean(name, names)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from hsdsl.errors import STEP_AND_TOLERANCE
 from hsdsl.expression.scope import Scope, Value, state
 from hsdsl.expression.syntax import Name, walk
 from hsdsl.names import SINCE, closest, did_you_mean, shown
+from hsdsl.parts import for_all, meant, of_all
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Experiment, Initial, started
 
@@ -129,11 +130,12 @@ def _missed_range(key: str, value: Value) -> str | None:
 def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tuple[tuple[str, Any], ...]:
     """The states with a given size, each with the expression of its size."""
     states = symbols.all_states()
+    known = {*states, *map(of_all, states)}
     for key in given:
-        if key not in states:
-            symbols.report(key.place, "HS322", f"the model has no state '{shown(key)}'", did_you_mean(key, states))
+        if key not in known:
+            symbols.report(key.place, "HS322", f"the model has no state '{shown(key)}'", meant(key, states))
     sizes = {str(key): _setting(symbols, scope, f"scale.{key}", scalar) for key, scalar in given.items()}
-    return tuple((name, size) for name, size in sizes.items() if size is not None)
+    return tuple((name, size) for name, size in for_all(sizes, states).items() if size is not None)
 
 
 def _samples(symbols: SymbolTable, scope: Scope, given: Scalar | list[Scalar] | None) -> Any:

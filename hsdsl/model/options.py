@@ -86,14 +86,18 @@ def names_of(program: Program, group: str) -> tuple[str, ...]:
     return (*(name for name in program.all_states if name not in numbered(program.parts)), *modes)
 
 
-def resolve(sources: Mapping[str, Mapping[str, Any]]) -> Options:
+def resolve(sources: Mapping[str, Mapping[str, Any]], states: Sequence[str] = ()) -> Options:
     """Resolve options: for each origin, the weakest first, its values by the names of :data:`KEYS`, None for no value.
+
+    A size for all instances of a `count` (`scale.leg.x`) is given to each of these ``states``.
 
     Raises UsageError: step and tolerance of one origin, an unknown name, or a method that cannot serve.
     """
     values = {key: Option(value, DEFAULT) for key, value in DEFAULTS.items()}
     for origin, source in sources.items():
         given = {key: value for key, value in _with_scales(origin, source) if value is not None}
+        if states and any(key.startswith(SCALE) for key in given):
+            given = for_all(given, (*KEYS, *(f"{SCALE}{name}" for name in states)))
         for key in given:
             if key not in KEYS and not key.startswith(SCALE):
                 raise UsageError(f"{origin}: the experiment has no setting '{key}'", did_you_mean(key, KEYS))

@@ -22,7 +22,7 @@ from hsdsl.orbits.continuation import Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
 from hsdsl.orbits.section import NoReturn, Return, Section
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
-from hsdsl.parts import numbers_of
+from hsdsl.parts import meant_alone, numbers_of
 from hsdsl.sensitivity.result import Sensitivity
 from hsdsl.simulate.surfaces import TIE
 
@@ -206,7 +206,7 @@ class Orbits:
         """Follow the orbit of the model's run in a parameter; see `Model.continuation`."""
         if parameter not in self.model.program.parameters:
             raise UsageError(
-                f"the model has no parameter '{parameter}'", did_you_mean(parameter, self.model.program.parameters)
+                f"the model has no parameter '{parameter}'", meant_alone(parameter, self.model.program.parameters)
             )
         values = with_parameters(self.model.pipeline.values(FLOAT64), self._parameters)
         low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))

@@ -156,7 +156,8 @@ class Pipeline:
         in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
         if "sample_times" in given or "sample_count" in given:
             in_file["samples"] = "samples"
-        return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}})
+        states = program.all_states if program.parts else ()
+        return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}}, states)
 
     def values(self, arithmetic: Arithmetic) -> Values:
         """The numbers of the model in an arithmetic, without overrides."""

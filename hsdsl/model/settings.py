@@ -17,7 +17,7 @@ from hsdsl.integrators import AUTO, Method
 from hsdsl.limits import current
 from hsdsl.model.options import DEFAULT, FILE, SCALE, Options
 from hsdsl.model.values import InstanceTable, Values
-from hsdsl.names import did_you_mean
+from hsdsl.parts import meant
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
 from hsdsl.simulate.stops import show
@@ -78,7 +78,7 @@ def _column(options: Options, columns: InstanceTable, name: str) -> Sequence[Num
     option, program = options.values[name], columns.values.program
     state = name.removeprefix(SCALE)
     if state != name and state not in program.all_states:
-        raise UsageError(f"{name}: the model has no state '{state}'", did_you_mean(state, program.all_states))
+        raise UsageError(f"{name}: the model has no state '{state}'", meant(state, program.all_states))
     if option.origin != FILE:
         return columns.expression(option.value, name)
     place = program.scaled_states.index(state) if state != name else 0

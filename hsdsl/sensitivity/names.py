@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
-from hsdsl.parts import numbered
+from hsdsl.parts import meant_alone, numbered
 from hsdsl.program import Program
 
 INITIAL = "initial."
@@ -43,7 +42,7 @@ def _target(label: str, program: Program, states: Sequence[str]) -> Target:
     if name != label and name in states:
         return Target(label, name, True)
     known = [*program.parameters, *(INITIAL + state for state in states)]
-    hint = f"did you mean '{INITIAL}{label}'?" if label in states else did_you_mean(label, known)
+    hint = f"did you mean '{INITIAL}{label}'?" if label in states else meant_alone(label, known)
     if label in (given.name for given in program.inputs):
         hint = "an input is no number; differentiate by a parameter that its expression or samples depend on"
     raise UsageError(f"the model has no parameter or initial state '{label}'", hint)

@@ -7,6 +7,7 @@ import pytest
 
 import hsdsl
 from hsdsl import UsageError
+from hsdsl.export import source_of
 from hsdsl.report.summary import summary
 
 TEXT = """
@@ -88,3 +89,42 @@ def test_wrong_names_are_refused_with_what_was_meant(model, given, message, hint
     with pytest.raises(UsageError, match=message) as caught:
         model.simulate(**given)
     assert caught.value.hint == hint
+
+
+def sized(text, **arguments):
+    return source_of(hsdsl.loads(text), arguments).problem.settings.scale
+
+
+def test_sizes_of_all():
+    sizes = {"lamp[1].x": 3, "lamp[2].x": 1 / 4, "lamp[3].x": 3}
+    both = TEXT.replace("1/8}", "1/8, scale: {'lamp[2].x': 1/4, lamp.x: 3}}")
+    whole = TEXT.replace("1/8}", "1/8, scale: {lamp.x: 9}}")
+    assert sized(both) == sized(whole, scale=sizes) == sized(TEXT, scale={"lamp.x": 3, "lamp[2].x": 1 / 4}) == sizes
+    assert sized(TEXT, settings={"scale.lamp[2].x": "1/4", "scale.lamp.x": "3"}) == sizes
+    assert sized(whole, scale={"lamp[2].x": 1}) == {"lamp[1].x": 9, "lamp[2].x": 1, "lamp[3].x": 9}
+
+
+def test_sizes_of_unknown_states_are_refused(model):
+    with pytest.raises(UsageError, match=r"no state 'lamp\.y'") as caught:
+        model.simulate(scale={"lamp.y": 3})
+    assert caught.value.hint == "did you mean 'lamp.x'?"
+    with pytest.raises(hsdsl.ModelError, match=r"no state 'lamp\.y'"):
+        hsdsl.loads(TEXT.replace("1/8}", "1/8, scale: {lamp.y: 9}}"))
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("lamp.rate", "name one instance: lamp[1].rate, lamp[2].rate, lamp[3].rate"),
+        ("initial.lamp.x", "name one instance: initial.lamp[1].x, initial.lamp[2].x, initial.lamp[3].x"),
+        ("clock.rat", "did you mean 'clock.rate'?"),
+    ],
+)
+def test_derivatives_and_fits_are_by_one_instance(model, name, hint):
+    for call in (
+        lambda: model.sensitivity(name),
+        lambda: model.fit({"time": [0.1, 0.2], "clock.x": [1.0, 2.0]}, name),
+    ):
+        with pytest.raises(UsageError, match="no parameter or initial state") as caught:
+            call()
+        assert caught.value.hint == hint
