@@ -131,6 +131,8 @@ def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing
         found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
     if crossing.edge in here.surfaces.active:  # it is off the surface by as much as the state was that it came from
         found = tuple(map(max, found, here.surfaces.scale))
+    if here.surfaces.touched:  # it is off the guards that hold it by as much as it has ever been computed from
+        found = tuple(map(max, found, here.arc.scales))
     return found
 
 

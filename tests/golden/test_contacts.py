@@ -47,6 +47,27 @@ def test_body_on_a_body_on_the_floor_rests_exactly_until_either_is_lifted(engine
     assert any("at rest on the guard of bodies from t = 0 to t = 1.5" in reason for reason in run.verdict.reasons)
 
 
+def test_body_that_lands_on_others_at_rest_stays() -> None:
+    """Two bodies that rest on each other at 0 are off each other by round-off of where they fell from."""
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow:
+      {x: u, y: v, z: w, u: 19.443*sin(5*t + 0.7) - 9.81, v: 2.443*sin(2*t + 0.7) - 9.81, w: 10.124*sin(t + 0.7) - 9.81}
+    transitions:
+      - {name: floor, when: x <= 0, to: a, reset: {u: 0}}
+      - {name: low, when: y <= x, to: a, reset: {u: (u + v)/2, v: (u + v)/2}}
+      - {name: high, when: z <= y, to: a, reset: {v: (4*v + w)/5, w: (4*v + w)/5}}
+initial: {mode: a, x: 0, u: 0, y: 0.3, v: 0, z: 0.3, w: 0}
+experiment: {until: 1.6}
+"""
+    run = hsdsl.loads(text).simulate(tolerance=1e-8)
+    assert run.stop.reason == "until"
+    assert sum(made.edge == "high" and made.time > 1.5 for made in run.transitions) > 1
+    assert list(run.final.state.values()) == pytest.approx([0] * 6, abs=1e-8)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_forces_that_are_not_one_choice_end_the_run(engine: str) -> None:
     """Each of two guards takes back twice what the other takes back of its own: alone or together, either holds."""

@@ -88,6 +88,7 @@ static void largest(hs_run *run) {
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
     if (run->active_surfaces[crossing->edge]) *found = hs_max(*found, run->scale[s]);
+    if (run->here.p == run->held_p) *found = hs_max(*found, run->scales[s]); /* off guards that hold it by as much */
   }
 }
 
