@@ -139,7 +139,7 @@ def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope)
     if not _continuous(symbols, given, trigger):
         return None
     if not 1 <= transition.waiting <= MOST_WAITING:
-        message = f"`waiting` must be between 1 and {MOST_WAITING}, not {transition.waiting}"
+        message = f"`waiting`: expected a number from 1 to {MOST_WAITING}, got {transition.waiting}"
         symbols.report(given.place, "HS323", message, "so many executions of an event can wait at a time")
         return None
     after = None if delay is None else delay.expr

@@ -8,6 +8,7 @@ automata that depend on no other one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -29,20 +30,20 @@ MOST = 8  # instances of an automaton that are looked at: those with other param
 
 
 def automata_of(subject: Subject) -> Iterator[AutomatonSubject]:
-    """Each automaton, once for each kind of instance."""
+    """Each automaton, once for instances with equal parameters and start."""
     document, parts = subject.document, {part.name: part for part in subject.system.parts}
     assert isinstance(document, SystemDocument)
-    seen: dict[Any, int] = {}
+    seen, counts = set[Any](), Counter[str]()
     for key, given in document.system.items():
         kind = document.automata[given.automaton.value]  # pyright: ignore[reportArgumentType]
         assert isinstance(kind, AutomatonDocument)
         part = parts[str(key) if given.count is None else f"{key}[1]"]
         values = tuple(sorted((str(name), scalar.value) for name, scalar in given.parameters.items()))
         alike = (given.automaton.value, values, part.start)
-        seen[given.automaton.value] = seen.get(given.automaton.value, 0) + (alike not in seen)
-        if alike not in seen and seen[given.automaton.value] <= MOST:
+        if alike not in seen and counts[given.automaton.value] < MOST:
+            seen.add(alike)
+            counts[given.automaton.value] += 1
             yield AutomatonSubject(subject, part, kind)
-        seen[alike] = 1
 
 
 class AutomatonSubject(Subject):

@@ -141,7 +141,7 @@ def test_executions_overtake_each_other(tmp_path, engine, scheme):
 @pytest.mark.parametrize("waiting", [0, 101])
 def test_how_many_wait_is_checked(tmp_path, waiting):
     event = f"{{name: e, event: x >= 1/2, delay: 9, waiting: {waiting}, reset: {{n: 1}}}}"
-    with pytest.raises(hsdsl.ModelError, match="between 1 and 100"):
+    with pytest.raises(hsdsl.ModelError, match="from 1 to 100, got"):
         model(tmp_path, "x: 1, n: 0", event, "x: 0, n: 0")
 
 

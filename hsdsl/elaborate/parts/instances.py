@@ -165,7 +165,7 @@ def _made(
     if given.count is None:
         return [Instance(str(key), key, None, label, kind, given)]
     if not 1 <= given.count <= MOST:
-        symbols.report(key.place, "HS321", f"`count` must be between 1 and {MOST:,}, not {given.count}")
+        symbols.report(key.place, "HS321", f"`count`: expected a number from 1 to {MOST:,}, got {given.count}")
         return []
     return [Instance(f"{key}[{k}]", key, k, label, kind, given) for k in range(1, given.count + 1)]
 

@@ -124,7 +124,7 @@ def _of_one_kind(board: Board, one: Instance, name: str, document: PartTransitio
     known = [key for key, scalar in given.items() if scalar is not None and scalar.value != ABSENT]
     if len(known) != 1:
         found = " and ".join(f"`{key}`" for key in known) or "none"
-        message = f"the transition '{name}' of '{one.automaton}' needs one of `when`, `event` and `on`, and has {found}"
+        message = f"the transition '{name}' of '{one.automaton}': expected one of `when`, `event` and `on`, got {found}"
         board.report_once(given[known[0]] if known else document.to or document.name or one.key, "HS353", message, None)
         return False
     if known != ["event"]:

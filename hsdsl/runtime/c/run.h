@@ -17,7 +17,7 @@
 #define HS_INLINE static inline
 #endif
 
-#if defined(HS_LANES) /* given by who has the compiler follow this pragma */
+#if defined(HS_LANES) /* defined where the compiler follows this pragma */
 #define HS_SIMD _Pragma("omp simd")
 #else
 #define HS_SIMD
