@@ -109,8 +109,8 @@ class EdgeProgram:
     that the reset gives a value, by number, written as ``change_texts``. The others keep theirs; only where the mode
     has the same states as the target are there any. ``contact`` is the number of the motion along its guard in the
     mode; None where there is none. ``push_order`` is the order of the guard's derivative, along the flow, that presses
-    then. ``releases`` is the contact that an edge of `ModeProgram.held` ends. ``of_event`` is whether it is part of an
-    event.
+    then. ``releases`` is the contact that an edge of `ModeProgram.held` ends. Of an edge that is part
+    of an event ``of_event`` has its name, and how its condition and its delay are written.
     """
 
     name: str
@@ -126,7 +126,7 @@ class EdgeProgram:
     contact: int | None = None
     push_order: int = 0
     releases: int | None = None
-    of_event: bool = False
+    of_event: tuple[str, ...] = ()
 
     @property
     def reset_texts(self) -> tuple[str, ...]:

@@ -105,6 +105,7 @@ class Event:
     given: tuple[str, ...] = ()
     waiting: int = 1
     priority: sp.Expr | None = None
+    delay_text: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,9 @@ class Edge:
 
     ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
     ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
-    ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again;
-    one ``of_event`` is part of an event. That of a ``part`` leaves the mode with this number of it.
+    ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again.
+    One that is part of an event has in ``of_event`` its name, and how its condition and its delay are written. That of
+    a ``part`` leaves the mode with this number of it.
     """
 
     name: str
@@ -130,7 +132,7 @@ class Edge:
     condition_text: str | None = None
     event: Event | None = None
     stays: bool = False
-    of_event: bool = False
+    of_event: tuple[str, ...] = ()
     part: tuple[str, int] | None = None
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from hsdsl.cli.diagnostic_report import DiagnosticReport
 from hsdsl.cli.options import Answer, Formatted, Models
 from hsdsl.names import counted
+from hsdsl.written import written_edges, written_modes
 
 
 def validate(
@@ -24,12 +25,11 @@ def validate(
 
 
 def _look(path: Path) -> tuple[dict[str, Any], str]:
-    from hsdsl.elaborate.events import as_written
     from hsdsl.model import load
 
     model = load(path)
     model.resolve()
-    modes, edges = as_written(model.system)
-    parts = len(model.system.parts)
-    size = counted(parts, "part") if parts else counted(modes, "mode")
+    modes, parts = written_modes(model.system.modes), len(model.system.parts)
+    edges = sum(len(written_edges(mode.edges)) for mode in modes)
+    size = counted(parts, "part") if parts else counted(len(modes), "mode")
     return {"valid": True}, f"valid, {size}, {counted(edges, 'transition')}"

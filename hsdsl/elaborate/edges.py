@@ -143,9 +143,10 @@ def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope)
         symbols.report(given.place, "HS323", message, "so many executions of an event can wait at a time")
         return None
     after = None if delay is None else delay.expr
+    text = transition.delay.value if transition.delay else ""
     flags = transition.persistent, transition.initially
     rank = None if priority is None else priority.expr
-    return Event(trigger, given.value, after, *flags, waiting=transition.waiting, priority=rank)
+    return Event(trigger, given.value, after, *flags, waiting=transition.waiting, priority=rank, delay_text=text)
 
 
 def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger) -> bool:

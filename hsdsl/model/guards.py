@@ -8,6 +8,7 @@ import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.model.values import Values
+from hsdsl.names import without_memory
 from hsdsl.plot import GuardLine
 
 
@@ -17,12 +18,14 @@ def guard_lines(values: Values) -> list[GuardLine]:
     parameters = set(system.parameter_symbols)
     lines: list[tuple[str, str, sp.Expr, str]] = []
     for mode in system.modes:
-        states = {symbol(name): name for name in mode.states}
-        labelled = [(edge.surface, edge.name) for edge in mode.edges] + [(wall, wall.text) for wall in mode.walls]
+        states = {symbol(name): name for name in without_memory(mode.states)}
+        labelled = [(edge.surface, (*edge.of_event, edge.name)[0]) for edge in mode.edges]
+        labelled += [(wall, wall.text) for wall in mode.walls]
         for surface, label in labelled:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
                 if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters:
                     lines.append((mode.name, states[side], level, label))
+    lines = list(dict.fromkeys(lines))  # an event has several edges at one level
     levels = values.evaluate({f"level_{k}": level for k, (_, _, level, _) in enumerate(lines)}) if lines else {}
     return [
         GuardLine(mode, state, float(level), label)

@@ -22,6 +22,7 @@ from hsdsl.program import Program
 from hsdsl.progress import counted, in_notebook, running
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
+from hsdsl.written import written_modes
 
 if TYPE_CHECKING:
     from hsdsl.fitting.fit import Fit
@@ -90,7 +91,8 @@ class Model:
         name = visible(called(None, Path(self.program.path).name).removeprefix("a model "))
         if parts := self.program.parts:
             return f"<hsdsl model {name}: a system of {len(parts)} parts>"
-        modes = ", ".join([*(mode.name for mode in self.program.modes[:8]), *["..."] * (len(self.program.modes) > 8)])
+        names = [mode.name for mode in written_modes(self.program.modes)]
+        modes = ", ".join([*names[:8], *["..."] * (len(names) > 8)])
         return f"<hsdsl model {name}: modes {modes}>"
 
     def _repr_html_(self) -> str:

@@ -10,7 +10,8 @@ from hsdsl.execution import Execution
 from hsdsl.names import shown, visible, without_memory
 from hsdsl.program import EdgeProgram, ModeProgram, Program
 from hsdsl.report.graph_layout import STUB, Box, Layout, Line, laid_out
-from hsdsl.report.visited import visited_part
+from hsdsl.report.visited import as_written, visited_part
+from hsdsl.written import event_text
 
 SIZE, PITCH, LETTER, INSIDE = 13, 18.0, 7.85, 12.0  # of the font, between lines, of a letter, from text to border
 LONGEST, MOST_LINES, MOST_MODES = 34, 7, 6  # of a line; of a flow's lines; of modes whose flow is in their box
@@ -33,7 +34,7 @@ CSS = """
 
 def mode_graph(program: Program, execution: Execution | None = None) -> str:
     """The graph and its table, as HTML; every text of the model is escaped. Without a run nothing is counted."""
-    program = visited_part(program, execution)
+    program = as_written(visited_part(program, execution), execution)
     edges = [edge for mode in program.modes for edge in mode.edges]
     picture = graph_of(program, execution)
     return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, _counts(edges, program, execution))}" if picture else ""
@@ -41,6 +42,7 @@ def mode_graph(program: Program, execution: Execution | None = None) -> str:
 
 def graph_of(program: Program, execution: Execution | None = None) -> str:
     """The graph alone; empty for a model without transitions, or one with too many modes for a picture."""
+    program = as_written(program, execution)
     edges = [edge for mode in program.modes for edge in mode.edges]
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""
@@ -151,7 +153,8 @@ def _path(line: Line, side: int) -> str:
 def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int] | None) -> str:
     rows: list[str] = []
     for number, edge in enumerate(edges, start=1):
-        when = edge.text + (f" if {edge.condition_text}" if edge.condition_text else "")
+        when = f"{edge.text} if {edge.condition_text}" if edge.condition_text else edge.text
+        when = ", ".join(event_text(edge.of_event)) or when
         resets = _seen(edge.target_states, edge.reset_texts)
         changed = ", ".join(f"{name} := {text}" for name, text in resets if name != text)
         ends = f"{program.modes[edge.source].name} -> {program.modes[edge.target].name}"

@@ -13,6 +13,7 @@ from hsdsl.report import mode_graph
 from hsdsl.report.mathml import Mathematics
 from hsdsl.report.visited import visited_part
 from hsdsl.system import Edge, HybridSystem, Mode
+from hsdsl.written import written_edges, written_modes
 
 MOST_MODES, MOST_OPEN = 40, 4  # modes that are shown; that are unfolded
 MOST_ROWS, MOST_EQUATIONS = 30, 60  # of a table; of a mode
@@ -23,11 +24,12 @@ def model_html(system: HybridSystem, program: Program) -> str:
     """Return the model in a ``div``; every text of the model is escaped, and nothing is fetched."""
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
     math = Mathematics(system.names, named_functions(system.functions, parameters))
-    kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(system.modes))
+    written = written_modes(system.modes)
+    kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(written))
     count = f"{number} {kind}{'s' * (number != 1)}"
     heading = f"<p><strong>{_said(called(system.title, system.path))}</strong><br>{count}, {_start(system, math)}</p>"
-    modes = [_mode(system, mode, math, len(system.modes) <= MOST_OPEN) for mode in system.modes[:MOST_MODES]]
-    left = len(system.modes) - MOST_MODES
+    modes = [_mode(system, mode, math, len(written) <= MOST_OPEN) for mode in written[:MOST_MODES]]
+    left = len(written) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
     parts = [
         heading,
@@ -98,8 +100,9 @@ def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -
     flows = zip(mode.states, mode.flow_texts, strict=True)
     flow = [math.derivative(name, text) for name, text in flows if name in seen]
     walls = [f"domain: {math.inequality(wall.text)}" for wall in mode.walls]
-    edges = [_edge(edge, math, not system.parts) for edge in mode.edges[:MOST_EQUATIONS]]
-    edges += [f"{len(mode.edges) - MOST_EQUATIONS} more transitions"] * (len(mode.edges) > MOST_EQUATIONS)
+    written = written_edges(mode.edges)
+    edges = [_edge(edge, math, not system.parts) for edge in written[:MOST_EQUATIONS]]
+    edges += [f"{len(written) - MOST_EQUATIONS} more transitions"] * (len(written) > MOST_EQUATIONS)
     items = [*flow[:MOST_EQUATIONS], *([f"{len(flow) - MOST_EQUATIONS} more"] * (len(flow) > MOST_EQUATIONS))]
     items += [*_definitions(system, mode.name, math), *walls, *edges]
     name = f"{_said(shown(mode.name))}{' (final)' if mode.final else ''}"
@@ -111,8 +114,12 @@ def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -
 def _edge(edge: Edge, math: Mathematics, named: bool) -> str:
     """A transition; ``named`` says that its target has a name that people gave."""
     condition = f" if {math.condition(edge.condition_text)}" if edge.condition_text else ""
+    when = f"when {math.inequality(edge.surface.text)}{condition}"
+    if edge.of_event:
+        _, event, delay = edge.of_event
+        when = f"event {math.condition(event)}{f', delay {_said(delay)}' if delay else ''}"
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     seen = without_memory(edge.target_states)
     changed = ", ".join(math.reset(name, text) for name, text in resets if text != name and name in seen)
     ends = f"<strong>{_said(edge.name)}</strong>{f' to {_said(edge.target)}' if named else ''}"
-    return f"{ends} when {math.inequality(edge.surface.text)}{condition}{': ' if changed else ''}{changed}"
+    return f"{ends} {when}{': ' if changed else ''}{changed}"

@@ -1,4 +1,4 @@
-"""The product modes of a system of parts that a run visited, as a program for pictures."""
+"""Programs for pictures: the product modes that a run visited, and events as they were written."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from hsdsl.execution import Execution
 from hsdsl.program import EdgeProgram, ModeProgram, Program
+from hsdsl.written import inner_modes, written_edges
 
 
 def visited_part(program: Program, run: Execution | None) -> Program:
@@ -46,3 +47,20 @@ def visited_part(program: Program, run: Execution | None) -> Program:
             replace(whole, name=mode, states=own, flow_texts=tuple(flows[s] for s in own), edges=edges(mode), walls=())
         )
     return replace(program, modes=tuple(modes), contacts=(), initial_mode=0)
+
+
+def as_written(program: Program, run: Execution | None) -> Program:
+    """A program with one edge for each event, without modes that only end runs, unless this run ended in one."""
+    inner = inner_modes(program.modes)
+    last = run.arcs[-1].mode if run is not None and run.arcs else None
+    shown = [k for k, mode in enumerate(program.modes) if k not in inner or mode.name == last]
+    number = {k: i for i, k in enumerate(shown)}
+    modes = tuple(
+        replace(mode, edges=tuple(_moved(e, number) for e in written_edges(mode.edges, inner & number.keys())))
+        for mode in (program.modes[k] for k in shown)
+    )
+    return replace(program, modes=modes, initial_mode=number.get(program.initial_mode, 0))
+
+
+def _moved(edge: EdgeProgram, number: dict[int, int]) -> EdgeProgram:
+    return replace(edge, source=number[edge.source], target=number[edge.target])

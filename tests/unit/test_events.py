@@ -11,7 +11,10 @@ from engines import COMPILER
 import hsdsl
 import hsdsl.store
 from hsdsl import UsageError
-from hsdsl.elaborate.events import as_written
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.cli.verbs import obey
+from hsdsl.export import files_of, source_of
+from hsdsl.model.guards import guard_lines
 from hsdsl.plot.view import View
 from hsdsl.report import mode_graph
 from hsdsl.report.model import model_html
@@ -338,8 +341,33 @@ def test_memory_is_no_column_of_sweeps_and_streams(delayed, tmp_path):
         assert (tmp_path / "rows.csv").read_text().startswith("time,mode,j,x,y,z\n")
 
 
-def test_modes_and_transitions_are_counted_as_written(delayed):
-    assert as_written(delayed.system) == (2, 2)
+def test_events_are_shown_as_written(delayed, tmp_path, capsys):
+    (tmp_path / "m.yaml").write_text(DELAYED)
+    assert obey(["validate", str(tmp_path / "m.yaml")]) == 0
+    assert "2 modes, 2 transitions" in capsys.readouterr().out
+    assert "modes on, off>" in repr(delayed)
+    ((_, diagram),) = files_of(source_of(delayed, {}), "mermaid").items()
+    run = delayed.simulate()
+    texts = [
+        mode_graph.mode_graph(delayed.program),
+        mode_graph.mode_graph(delayed.program, run),
+        model_html(delayed.system, delayed.program),
+        diagram.decode(),
+    ]
+    for text in texts:
+        assert not [word for word in ("waits", "triggers", "re-arms", "@") if word in text]
+        assert text.count("delay 0.3") == 1
+    assert "<td>event x &gt; 1/2, delay 0.3</td><td>y := 0</td><td>2</td>" in texts[1]
+    assert [(line.label, line.value) for line in guard_lines(delayed.pipeline.values(FLOAT64))] == [("rise", 0.5)]
+
+
+def test_a_run_that_ends_as_too_many_wait_shows_where(tmp_path):
+    text = DELAYED.replace("delay: 0.3", "delay: 9, waiting: 1").replace("t >= 8", "t >= 80")
+    model = hsdsl.loads(text)
+    run = model.simulate(until=20)
+    assert run.final.mode == "rise-waits-already" and "rise-waits-already" not in mode_graph.mode_graph(model.program)
+    shown = mode_graph.mode_graph(model.program, run)
+    assert "rise-waits-already" in shown and "rise triggers again" in shown
 
 
 def test_memory_is_never_suggested(delayed):

@@ -16,9 +16,9 @@ from dataclasses import replace
 from hsdsl.elaborate.events.event import Event, chosen
 from hsdsl.elaborate.events.firing import edges_of, highest_priority
 from hsdsl.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
-from hsdsl.elaborate.events.waiting import AGAIN, overflow
+from hsdsl.elaborate.events.waiting import overflow
 from hsdsl.expression.scope import symbol
-from hsdsl.names import SINCE, memory
+from hsdsl.names import SINCE
 from hsdsl.parts import Part
 from hsdsl.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
 
@@ -65,7 +65,8 @@ def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[
     for edge in mode.edges:
         drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest)
         made = [remembered(draft, memories, order) for draft in drafts]
-        edges += made if edge.event is None else [replace(part, of_event=True) for part in made]
+        given = () if edge.event is None else (edge.name, edge.event.text, edge.event.delay_text)
+        edges += made if not given else [replace(part, of_event=given) for part in made]
     further = all_states(own)
     return replace(
         mode,
@@ -74,15 +75,6 @@ def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[
         flow_texts=(*mode.flow_texts, *("0" for _ in further)),
         edges=tuple(edges),
     )
-
-
-def as_written(system: HybridSystem) -> tuple[int, int]:
-    """How many modes and transitions the file has, without those that make its events."""
-    parts = [edge for mode in system.modes for edge in mode.edges if edge.of_event]
-    full = {edge.target for edge in parts if edge.name.endswith(AGAIN)}
-    events = sum(name.endswith(memory("", "armed")) for mode in system.modes for name in mode.states)
-    plain = sum(not edge.of_event for mode in system.modes for edge in mode.edges)
-    return len(system.modes) - len(full), plain + events
 
 
 def _start(system: HybridSystem, events: Mapping[str, tuple[Event, ...]]) -> Initial:

@@ -12,8 +12,6 @@ from hsdsl.expression.scope import symbol
 from hsdsl.functions import below, maximum
 from hsdsl.system import HALF, ONE, TIME, ZERO, Edge, HybridSystem, Mode, at_least
 
-AGAIN = " triggers again"
-
 
 def begins_to_wait(event: Event) -> Values:
     """The values where an event is triggered: the execution that waits comes before those that are made later."""
@@ -89,7 +87,7 @@ def _overflow_name(event: Event) -> str:
 def overflowing(fires: Edge, event: Event) -> Edge:
     """The edge that ends a run in which an event is triggered while as many executions wait as can."""
     states = event.mode.states
-    edge = replace(fires, name=event.edge.name + AGAIN, target=_overflow_name(event))
+    edge = replace(fires, name=f"{event.edge.name} triggers again", target=_overflow_name(event))
     return replace(edge, target_states=states, reset=tuple(map(symbol, states)), reset_texts=states, stays=True)
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from hsdsl.export.automata import Automata, automata_of, pairs
 from hsdsl.export.source import Source
-from hsdsl.names import visible
+from hsdsl.names import visible, without_memory
 from hsdsl.system import Edge, Mode
+from hsdsl.written import event_text, written_edges, written_modes
 
 _ALIKE = str.maketrans({"*": "\u2217", "`": "\u02cb", "~": "\u223c"})
 _OUTER = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # underscores that are not inside a word
@@ -29,11 +30,13 @@ def diagram(source: Source) -> str:
     lines = [*(f"%% {_comment(line)}" for line in source.heading), "stateDiagram-v2"]
     if source.system.parts:
         return "\n".join([*lines, *_automata(automata_of(source))]) + "\n"
-    for mode in source.system.modes:
+    modes = written_modes(source.system.modes)
+    for mode in modes:
         lines.append(f"    {numbers[mode.name]} : {_label(_mode_lines(mode))}")
     lines.append(f"    [*] --> {numbers[source.system.modes[source.problem.mode].name]}")
-    for mode in source.system.modes:
-        lines += [f"    {numbers[mode.name]} --> {numbers[e.target]} : {_label(_edge_lines(e))}" for e in mode.edges]
+    for mode in modes:
+        edges = written_edges(mode.edges)
+        lines += [f"    {numbers[mode.name]} --> {numbers[e.target]} : {_label(_edge_lines(e))}" for e in edges]
         lines += [f"    {numbers[mode.name]} --> [*]"] if mode.final else []
     return "\n".join(lines) + "\n"
 
@@ -75,15 +78,16 @@ def _transition_lines(made: Any) -> list[str]:
 
 
 def _mode_lines(mode: Mode) -> list[str]:
-    flow = [f"d{name}/dt = {text}" for name, text in zip(mode.states, mode.flow_texts, strict=True)]
+    flows = dict(zip(mode.states, mode.flow_texts, strict=True))
+    flow = [f"d{name}/dt = {flows[name]}" for name in without_memory(mode.states)]
     return [mode.name, *flow, *(f"domain {wall.text}" for wall in mode.walls)]
 
 
 def _edge_lines(edge: Edge) -> list[str]:
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     condition = [] if edge.condition is None else [f"if {edge.condition_text}"]
-    changed = [f"{name} := {text}" for name, text in resets if text != name]
-    return [edge.name, f"when {edge.surface.text}", *condition, *changed]
+    when = event_text(edge.of_event) if edge.of_event else [f"when {edge.surface.text}", *condition]
+    return [edge.name, *when, *(f"{name} := {text}" for name, text in resets if text != name)]
 
 
 def _label(lines: list[str]) -> str:
