@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from hsdsl import __version__
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.backends.python import PythonKernel
 from hsdsl.export.identifiers import ascii_name
+from hsdsl.lower import lower_constants
 from hsdsl.model import Model
 from hsdsl.names import visible
 from hsdsl.simulate import Problem
-from hsdsl.system import HybridSystem
+from hsdsl.system import HybridSystem, started
 
 LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
 
@@ -61,7 +65,24 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     """
     prepared = model.pipeline.prepare({**arguments, "engine": "python"})
     completed = model.pipeline.sliding if prepared.settings.completion == "auto" else model.pipeline
-    return Source(completed.system, prepared, model, arguments)
+    return _with_given_start(Source(completed.system, prepared, model, arguments))
+
+
+def _with_given_start(source: Source) -> Source:
+    """The source with initial values that follow those which the call gives."""
+    problem, system = source.problem, source.system
+    given = {
+        name: Fraction(float(value))
+        for name, value in zip(problem.states, problem.x, strict=True)
+        if f"initial.{name}" in problem.settings.overrides
+    }
+    if not given.keys() & dict(system.initial.written).keys():
+        return source
+    values: Any = tuple((name, given.get(name, value)) for name, value in system.initial.written)
+    initial = started(system.initial.mode, dict(system.initial.values), values)
+    program = replace(problem.program, constants=lower_constants(replace(system, initial=initial)))
+    kernel = PythonKernel(program, FLOAT64)
+    return replace(source, problem=replace(problem, program=program, kernel=kernel))
 
 
 def drivable(source: Source) -> Source:

@@ -128,6 +128,12 @@ def lower_expressions(system: HybridSystem, expressions: dict[str, sp.Expr]) -> 
         )
 
 
+def lower_constants(system: HybridSystem) -> lowered.Routines:
+    """Lower the constants of a system: values of parameters and settings, and the initial values."""
+    with deep_stack():
+        return print_routines(_constants(system, number(system)), ())
+
+
 def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
     """The numbered symbols for the names of a system."""
     parameters = tuple(symbol(f"p{i}") for i in range(len(system.parameters)))

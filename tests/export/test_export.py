@@ -81,3 +81,22 @@ experiment: {until: 1}
     body = [line for line in diagram.splitlines() if not line.startswith("%%")]
     assert not any("<script" in line for line in body)
     assert "m0 --> m0 : state" in diagram
+
+
+USING = """
+hsdsl: 1
+parameters: {k: 2}
+modes: {m: {flow: {x: 1, y: -y, z: k}}}
+initial: {mode: m, z: x - y, x: k*y, y: 3}
+experiment: {until: 4}
+"""
+
+
+@pytest.mark.parametrize("initial", [{}, {"y": 5}, {"x": 0.1}, {"y": 5, "z": 1}])
+def test_initial_values_of_exports_follow_those_that_are_given(initial):
+    model = hsdsl.loads(USING)
+    problem = source_of(model, {"initial": initial}).problem
+    for k in (2.0, 7.0):
+        run = model.simulate(initial=initial, parameters={"k": k})
+        known = dict(zip(problem.program.initial_states, problem.kernel.constant("initial", (k,)), strict=True))
+        assert known == {name: float(run.sample([0])[name][0]) for name in ("x", "y", "z")}
