@@ -32,16 +32,13 @@ def values_text(source: Source) -> list[str]:
 
 def _start(source: Source, data: dict[str, str], given: tuple[float, ...]) -> str:
     problem, program = source.problem, source.problem.program
-    numbers = [literal(float(value)) for value in problem.x]
-    lines, known = list[str](), ()
-    if problem.mode == program.initial_mode and problem.states == program.initial_states:
-        text = function("values", definitions(program.constants)["initial"], data, "p")
-        lines = [f"    {line}" for line in text.splitlines()]
-        known = problem.kernel.constant("initial", given)
-    if parameters_in(definitions(program.constants)["initial"]):
-        own = [i for i, (a, b) in enumerate(zip(known, problem.x, strict=False)) if a == b]
-        numbers = [f"found[{i}]" if i in own else number for i, number in enumerate(numbers)]
-        lines += ["    found = values(p)"] if own else []
-    else:
-        lines = []
+    numbers, lines = [literal(float(value)) for value in problem.x], list[str]()
+    routine, own = definitions(program.constants)["initial"], program.initial_states
+    if problem.mode == program.initial_mode and parameters_in(routine):
+        known = dict(zip(own, problem.kernel.constant("initial", given), strict=True))
+        follow = [known.get(name) == value for name, value in zip(problem.states, problem.x, strict=True)]
+        lines = [f"    {line}" for line in function("values", routine, data, "p").splitlines()] if any(follow) else []
+        lines += ["    found = values(p)"] if any(follow) else []
+        triples = zip(problem.states, follow, numbers, strict=True)
+        numbers = [f"found[{own.index(name)}]" if follows else number for name, follows, number in triples]
     return "\n".join(["def initial_state(p):", *lines, f"    return padded([{', '.join(numbers)}], SIZES[0])", ""])

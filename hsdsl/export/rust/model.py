@@ -143,12 +143,13 @@ def _values(source: Source) -> str:
             follow.append(f"    let mut value = [0.0];\n    {name}(p, 0.0, &[], &mut value);\n    p[{i}] = value[0];\n")
     x = [literal(float(value)) for value in problem.x]
     start = ""
-    file = problem.mode == program.initial_mode and problem.states == program.initial_states
-    if file and parameters_in(routines["initial"]):
+    if problem.mode == program.initial_mode and parameters_in(routines["initial"]):
         texts.append(function("initial_values", routines["initial"], data))
-        start = f"    let mut found = [0.0; {len(x)}];\n    initial_values(p, 0.0, &[], &mut found);\n"
-        known = constant("initial", given)
-        x = [f"found[{i}]" if a == b else n for i, (a, b, n) in enumerate(zip(known, problem.x, x, strict=True))]
+        own = program.initial_states
+        start = f"    let mut found = [0.0; {len(own)}];\n    initial_values(p, 0.0, &[], &mut found);\n"
+        known = dict(zip(own, constant("initial", given), strict=True))
+        pairs = zip(problem.states, problem.x, x, strict=True)
+        x = [f"found[{own.index(name)}]" if known.get(name) == value else text for name, value, text in pairs]
     x += ["0.0"] * (width(program) - len(x))
     return (
         "".join(texts)
