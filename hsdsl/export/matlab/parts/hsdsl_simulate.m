@@ -597,8 +597,11 @@ function event = first_crossing(w, here, t, h, x, k1, z, C, ends_at, d)
     [unused, best] = max(w.m.edge_priority{q}(fires));
     k = fires(best);
   end
-  event = struct('k', k, 't', time, 'x', y, 'depth', 0, 't1', time, ...
-                 'sizes', max(sizes_along(here, x, z), max(abs(C), [], 2)));
+  sizes = sizes_along(here, x, y);
+  if share > 0
+    sizes = max(max(sizes, abs(z)), max(abs(C), [], 2));
+  end
+  event = struct('k', k, 't', time, 'x', y, 'depth', 0, 't1', time, 'sizes', sizes);
 end
 
 function yes = clear_of_all(w, q, t, h, x, z, after, d)
@@ -1048,6 +1051,9 @@ function event = choose(w, here, found, t1, z)
   same = find([found.k] == k, 1);
   if ~isempty(same)
     depth = found(same).depth;
+  end
+  if time == here.t
+    z = here.x;
   end
   event = struct('k', k, 't', time, 'x', found(first).x, 'depth', depth, 't1', t1, ...
                  'sizes', sizes_along(here, here.x, z));

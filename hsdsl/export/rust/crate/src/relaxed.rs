@@ -92,8 +92,8 @@ impl<S: Sink> Run<'_, S> {
             }
             if found.count > 0 || !self.trial.ends {
                 let (crossing, tied) = self.choose(&found.crossings[..found.count]);
-                let (x, z) = (self.x, self.z);
-                return Ok(Outcome::Landed(Event { crossing, tied, t1, sizes: self.sizes(&x, &z) }));
+                let end = if crossing.theta > 0.0 { self.z } else { self.x };
+                return Ok(Outcome::Landed(Event { crossing, tied, t1, sizes: self.sizes(&self.x, &end) }));
             }
             if halvings > 0 || !(t1 > self.t) {
                 if let Some(failure) = self.stalls(halvings, last, t1) {
