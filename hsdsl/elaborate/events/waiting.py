@@ -19,7 +19,7 @@ def begins_to_wait(event: Event) -> Values:
     given = dict(zip(event.edge.target_states, event.edge.reset, strict=True))
     waiting, time = _waiting(event), TIME + delay
     values = {waiting.name: ONE if len(event.slots) == 1 else waiting + 1}
-    latest = time if event.delay.free_symbols else None  # with the same delay none is made before one that waits
+    latest = time if delay.free_symbols else None  # with the same delay none is made before one that waits
     for slot, before in zip(event.slots, (None, *event.slots), strict=False):
         new = {slot.at.name: time} | {name: given[state] for state, name in slot.values.items()}
         if before is not None and latest is not None:

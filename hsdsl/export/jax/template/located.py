@@ -1,4 +1,4 @@
-# pyright: basic
+# pyright: basic, reportCallIssue=false
 """Crossings of the located scheme: the first of every surface inside a step, at its own instant.
 
 The surface is searched on the step's interpolant. Its root is then corrected on a step of the method that ends there.
