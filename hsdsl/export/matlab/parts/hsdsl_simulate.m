@@ -61,7 +61,8 @@ function [w, here] = enter(w, q, x, t, scale, since, inside, reset_at)
   visited = {};
   while true
     w = row(w, t, q, x);
-    here = struct('q', q, 'x', x, 't', t, 'k', segment(w.m, t), 'scale', scale, 'active', [], 'passed', [], 'rest', 0);
+    here = struct('q', q, 'x', x, 't', t, 'k', segment(w.m, t), 'entered', x, 'scale', scale, ...
+                  'active', [], 'passed', [], 'rest', 0);
     if w.m.final(q)
       w = ended(w, 'final', sprintf('entered mode %s at t = %.10g', w.m.mode_names{q}, t));
       return
@@ -158,7 +159,7 @@ end
 function sizes = sizes_along(here, x, z)
 % The sizes of the numbers that a point of a step is computed from; a state that has not moved has those it came with.
   sizes = max(abs(x), abs(z));
-  still = z == x;
+  still = z == here.entered;
   sizes(still) = max(sizes(still), here.scale(still));
 end
 
@@ -1052,7 +1053,7 @@ function event = choose(w, here, found, t1, z)
   if ~isempty(same)
     depth = found(same).depth;
   end
-  if time == here.t
+  if found(first).share == 0
     z = here.x;
   end
   event = struct('k', k, 't', time, 'x', found(first).x, 'depth', depth, 't1', t1, ...
@@ -1064,7 +1065,7 @@ function [inside, found, wall] = judge(w, here, t, h, t1, x, k1, z, K, d)
   q = here.q;
   inside = false;
   wall = 0;
-  found = struct('k', {}, 't', {}, 'x', {}, 'depth', {});
+  found = struct('k', {}, 't', {}, 'x', {}, 'depth', {}, 'share', {});
   values = w.m.surfaces{q}(t1, z, w.p, d);
   if ~all(isfinite(z)) || ~all(isfinite(values))
     return
@@ -1116,7 +1117,7 @@ end
 function [ok, one] = strip_crossing(w, here, k, t, h, t1, x, k1, z, k2, C, finite, d, value, noise)
 % The last crossing of a surface along a step that ends beyond it; none where the surface is transparent there.
   q = here.q;
-  one = struct('k', {}, 't', {}, 'x', {}, 'depth', {});
+  one = struct('k', {}, 't', {}, 'x', {}, 'depth', {}, 'share', {});
   ok = true;
   small = max(roundoff(w, q, k, t, x, d, 0 * x), roundoff(w, q, k, t1, z, d, 0 * x)) / 16;
   share = last_rise(w, q, k, t, h, x, C, d, small);
@@ -1161,7 +1162,7 @@ function [ok, one] = strip_crossing(w, here, k, t, h, t1, x, k1, z, k2, C, finit
       return
     end
   end
-  one = struct('k', k, 't', time, 'x', y, 'depth', min(w.s.relaxation, value / norm_of));
+  one = struct('k', k, 't', time, 'x', y, 'depth', min(w.s.relaxation, value / norm_of), 'share', share);
 end
 
 function share = last_rise(w, q, k, t, h, x, C, d, small)
