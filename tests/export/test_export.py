@@ -29,12 +29,11 @@ def texts(files: dict[str, bytes]) -> list[bytes]:
     return found
 
 
-COMPILED = {"fmi2", "fmi3", "web"}
+# what is compiled takes long; test_web.py compiles pages twice too
+LONG = {"fmi2": pytest.mark.slow, "fmi3": pytest.mark.slow, "web": pytest.mark.campaign}
 
 
-@pytest.mark.parametrize(
-    "target", [pytest.param(name, marks=pytest.mark.slow if name in COMPILED else ()) for name in TARGETS]
-)
+@pytest.mark.parametrize("target", [pytest.param(name, marks=LONG.get(name, ())) for name in TARGETS])
 def test_same_model_gives_same_bytes_and_settings_change_them(target: str) -> None:
     model = hsdsl.load(BALL)
     files = files_of(source_of(model, {}), target)
