@@ -11,10 +11,10 @@ from typer import Exit, Option
 from hsdsl.cli.console import progress, say
 from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, option
 from hsdsl.cli.shown import needed, shown_of, write_film
-from hsdsl.cli.texts import check_target, names_of, pairs_of
+from hsdsl.cli.texts import STATE, check_target, known_names, pairs_of
 from hsdsl.errors import UsageError
 from hsdsl.interrupts import INTERRUPTED
-from hsdsl.names import did_you_mean, visible
+from hsdsl.names import visible
 from hsdsl.progress import running
 
 if TYPE_CHECKING:
@@ -146,13 +146,10 @@ def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
     """The names of ``--outputs``, None where it is left out."""
     if outputs is None:
         return None
-    names = names_of(outputs)
-    for name in names:
-        if name not in known:
-            raise UsageError(f"--outputs: the model has no state or output '{name}'", did_you_mean(name, known))
+    names = known_names(outputs, known, "--outputs", STATE)
     if not names:
         raise UsageError("--outputs: expected names of states or outputs, with commas between them")
-    return names
+    return list(names)
 
 
 def _answer_streamed(run: Streamed, model: Path, answer: Answer) -> None:

@@ -10,6 +10,8 @@ from hsdsl.errors import UsageError
 from hsdsl.limits import DEFAULT, NUMBERS, Limits
 from hsdsl.names import did_you_mean
 
+STATE = "state or output "
+
 
 def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
     """Read ``--allow-path`` and ``--limit``.
@@ -39,8 +41,8 @@ def names_of(text: str | None) -> list[str]:
     return [part.strip() for part in (text or "").split(",") if part.strip()]
 
 
-def known_names(text: str | None, known: Sequence[str], name: str) -> tuple[str, ...]:
-    """The names in a text with commas between them.
+def known_names(text: str | None, known: Sequence[str], name: str, kind: str = "") -> tuple[str, ...]:
+    """The names in a text with commas between them; ``kind`` says in an error what they name.
 
     Raises
     ------
@@ -50,7 +52,7 @@ def known_names(text: str | None, known: Sequence[str], name: str) -> tuple[str,
     names = names_of(text)
     for each in names:
         if each not in known:
-            raise UsageError(f"{name}: there is no '{each}'", did_you_mean(each, known))
+            raise UsageError(f"{name}: there is no {kind}'{each}'", did_you_mean(each, known))
     return tuple(names)
 
 
@@ -64,13 +66,10 @@ def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, s
     """
     pairs: list[tuple[str, str]] = []
     for text in texts or ():
-        names = [part.strip() for part in text.split(",")]
-        if len(names) != 2 or not all(names):
+        if text.count(",") != 1 or len(names_of(text)) != 2:
             raise UsageError(f"--phase: expected two names with a comma between them, got '{text}'")
-        for name in names:
-            if name not in known:
-                raise UsageError(f"--phase: there is no state or output '{name}'", did_you_mean(name, known))
-        pairs.append((names[0], names[1]))
+        first, second = known_names(text, known, "--phase", STATE)
+        pairs.append((first, second))
     return pairs or None
 
 
