@@ -21,6 +21,14 @@ WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COMPILERS: dict[str, list[str]] = {name: [path] for name in ("gcc", "clang") if (path := which(name))}
 if find_spec("ziglang") and "clang" not in COMPILERS:
     COMPILERS["clang"] = [sys.executable, "-m", "ziglang", "cc", "-Wno-unused-command-line-argument"]
+USING = """
+hsdsl: 1
+parameters: {k: 2}
+modes:
+  up: {flow: {x: 1, y: -y, z: k}, transitions: [{when: x >= 99, to: up, reset: {x: z - y}}]}
+initial: {mode: up, z: x - y, x: k*y, y: 3}
+experiment: {until: 2, tolerance: 1e-11}
+"""  # initial values that use each other
 
 
 def exported(model: Model, folder: Path, target: str = "c", **arguments: Any) -> Path:

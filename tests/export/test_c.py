@@ -11,7 +11,7 @@ from shutil import which
 from typing import Any
 
 import pytest
-from export.c_builds import COMPILERS, built, exported, output
+from export.c_builds import COMPILERS, USING, built, exported, output
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -254,14 +254,6 @@ def test_a_run_in_stretches_makes_the_same_transitions(tmp_path: Path) -> None:
     assert [t["time"] for t in found["transitions"]] == pytest.approx([t.time for t in run.transitions], abs=1e-9)
 
 
-USING = """
-hsdsl: 1
-parameters: {k: 2}
-modes:
-  up: {flow: {x: 1, y: -y, z: k}, transitions: [{when: x >= 99, to: up, reset: {x: z - y}}]}
-initial: {mode: up, z: x - y, x: k*y, y: 3}
-experiment: {until: 4}
-"""
 SET_START = """
 #include <stdio.h>
 #include "instance.h"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from export.c_builds import COMPILERS, WARNINGS
+from export.c_builds import COMPILERS, USING, WARNINGS
 
 import hsdsl
 from hsdsl.export import files_of, source_of
@@ -23,6 +23,7 @@ from hsdsl.model import Model
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
 from fmpy.validation import validate_fmu  # noqa: E402
 
+STANDARD = Path(fmpy.__file__).parent / "c-code"  # the headers of both versions
 MODELS = Path(__file__).parents[2] / "models"
 NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml"))]
 VERSIONS = (2, 3)
@@ -50,16 +51,6 @@ modes:
 outputs: {force: k*x + u}
 initial: {mode: slide, x: start, v: 1}
 experiment: {until: 3, tolerance: 1e-10}
-"""
-
-
-USING = """
-hsdsl: 1
-parameters: {k: 2}
-modes:
-  up: {flow: {x: 1, y: -y, z: k}, transitions: [{when: x >= 99, to: up, reset: {x: z - y}}]}
-initial: {mode: up, z: x - y, x: k*y, y: 3}
-experiment: {until: 2, tolerance: 1e-11}
 """
 
 
@@ -102,26 +93,48 @@ def test_descriptions_have_no_findings(text: str, version: int, tmp_path: Path) 
     assert validate_fmu(str(path)) == []
 
 
-def test_all_functions_of_the_standard_are_exported(made: Any) -> None:
-    text = (archive.FOLDER / "headers" / "fmi3Functions.h").read_text()
-    names = set(re.findall(r"FMI3_Export\s+\w+\s+(fmi3\w+);", text))
-    assert len(names) == 75
-    folder = Path(fmpy.extract(made(BALL, 3)))
+@pytest.mark.parametrize(("version", "count"), [(2, 44), (3, 75)])
+def test_all_functions_of_the_standard_are_exported(version: int, count: int, made: Any) -> None:
+    text = (STANDARD / f"fmi{version}Functions.h").read_text()
+    names = set(re.findall(rf"FMI{version}_Export\s+\w+\s+(fmi{version}\w+);", text))
+    assert len(names) == count
+    folder = Path(fmpy.extract(made(BALL, version)))
     (library,) = folder.glob("binaries/*/*.so")
     loaded_library = ctypes.CDLL(str(library))
     assert all(hasattr(loaded_library, name) for name in names)
 
 
+def unit_sources(version: int, folder: Path) -> None:
+    for name, content in archive.sources_of(unit_of(source_of(loaded(DRIVEN), {})), version).items():
+        (folder / name).write_bytes(content)
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_sources_compile_without_warnings(compiler: str, version: int, tmp_path: Path) -> None:
-    unit = unit_of(source_of(loaded(DRIVEN), {}))
-    for name, content in archive.sources_of(unit, version).items():
-        (tmp_path / name).write_bytes(content)
+    unit_sources(version, tmp_path)
     names = [name for name in archive.compiled_names(version) if name != "hs.c"]  # the tests of C compile that
     command = [*COMPILERS[compiler], *WARNINGS, "-c", *names]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_functions_agree_with_the_declarations_of_the_standard(compiler: str, version: int, tmp_path: Path) -> None:
+    unit_sources(version, tmp_path)
+    flags = ["-DFMI_STANDARD_HEADERS", "-isystem", str(STANDARD), "-c"]
+    command = [*COMPILERS[compiler], *WARNINGS, *flags, "fmi.c", f"fmi{version}.c"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_functions_take_the_prefix_of_a_static_link(version: int, tmp_path: Path) -> None:
+    unit_sources(version, tmp_path)
+    compiler = next(iter(COMPILERS.values()))
+    subprocess.run([*compiler, f"-DFMI{version}_FUNCTION_PREFIX=Ball_", "-c", "fmi.c"], cwd=tmp_path, check=True)
+    assert f"Ball_fmi{version}SetTime".encode() in (tmp_path / "fmi.o").read_bytes()
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -18,7 +18,7 @@ from hsdsl.runtime.compiler import FLAGS, NoCompiler, find_compiler
 from hsdsl.runtime.process import workshop
 
 FOLDER = Path(__file__).parent
-COMPILED = ("model.c", "problem.c", "instance.c", "hs.c", "variables.c", "fmu.c", "events.c")
+COMPILED = ("model.c", "problem.c", "instance.c", "hs.c", "variables.c", "fmu.c", "events.c", "fmi.c")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "i686": "x86"}
@@ -35,10 +35,9 @@ def sources_of(unit: Unit, version: int) -> dict[str, bytes]:
     flat = {Path(name).name: text for name, text in c_sources(unit.source, tunable=True).items()}
     flat["variables.h"] = tables.header(unit, token_of(unit, version)).encode()
     flat["variables.c"] = tables.numbers(unit).encode()
-    parts = ("fmu.h", "fmu.c", "events.h", "events.c", f"fmi{version}.c")
-    headers = sorted((FOLDER / "headers").glob(f"fmi{version}*.h"))
-    own = {path.name: path.read_bytes() for path in (*(FOLDER / "parts" / name for name in parts), *headers)}
-    return flat | own
+    flat["fmi_version.h"] = f'#include "fmi{version}.h"\n'.encode()
+    parts = ("fmu.h", "fmu.c", "events.h", "events.c", "fmi.h", "fmi.c", f"fmi{version}.h", f"fmi{version}.c")
+    return flat | {name: (FOLDER / "parts" / name).read_bytes() for name in parts}
 
 
 def platform_folder(version: int) -> tuple[str, str]:
@@ -64,7 +63,7 @@ def library_of(sources: Mapping[str, bytes], version: int) -> bytes:
     with workshop() as folder:
         for name, text in sources.items():
             (folder / name).write_bytes(text)
-        target, files = folder / "unit.so", [folder / name for name in (*COMPILED, f"fmi{version}.c")]
+        target, files = folder / "unit.so", [folder / name for name in compiled_names(version)]
         try:
             find_compiler().build(files, [folder], target, "-O1", FLAGS)
         except NoCompiler as error:
