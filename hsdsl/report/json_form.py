@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Any, cast
 
 import numpy as np
@@ -47,8 +48,21 @@ def _named(value: object, *names: str) -> dict[str, Any]:
 
 
 def _transition(t: Transition) -> dict[str, Any]:
-    between = {"from": t.source, "to": t.target}
-    return _named(t, "index", "time", "resumed", "edge") | between | _named(t, "before", "after", "alternatives")
+    return {
+        "index": t.index,
+        "time": t.time,
+        "resumed": t.resumed,
+        "edge": t.edge,
+        "from": t.source,
+        "to": t.target,
+        "before": t.before,
+        "after": t.after,
+        "alternatives": t.alternatives,
+    }
+
+
+def _kind(value: Any) -> Any:
+    return cast(Any, type(value))
 
 
 def plain(value: Any) -> Any:
@@ -59,16 +73,21 @@ def plain(value: Any) -> Any:
     TypeError
         For a value of any other kind.
     """
-    if type(value) in _AS_THEY_ARE:
+    kind = _kind(value)
+    if kind in _AS_THEY_ARE:
         return value
-    if type(value) is float:
+    if kind is float:
         return value if math.isfinite(value) else None
+    if kind is dict:  # sooner found than by what follows
+        return {name if type(name) is str else str(name): plain(item) for name, item in value.items()}
     match value:
         case np.generic() | np.ndarray():
             return plain(cast(Any, value).tolist())
-        case str() | int():
-            return value
-        case dict() | Mapping():
+        case str():
+            return str.__str__(value)
+        case int():
+            return int(value)
+        case Mapping():
             return {str(key): plain(item) for key, item in cast("Mapping[Any, Any]", value).items()}
         case list() | tuple():
             return [plain(item) for item in cast("list[Any]", value)]
@@ -76,7 +95,9 @@ def plain(value: Any) -> Any:
             return float(value)
         case os.PathLike():
             return os.fspath(cast("os.PathLike[str]", value))
-        case _ if isinstance(value, float) or decimals.is_multiprecision(value):
+        case float():
+            return plain(float(value))
+        case _ if decimals.is_multiprecision(value):
             return value if decimals.is_finite(value) else None
         case _:
             raise TypeError(f"JSON has no form for a {type(value).__name__}")
@@ -88,8 +109,7 @@ def dumps(value: Any) -> str:
     Floats are written by ``repr``, multiprecision numbers as JSON numbers with the digits that the longest of them
     needs. A list or object that fits on a line is written on one.
     """
-    ready = plain(value)
-    return _written(ready, decimals.bits(_multiprecision(ready)), "\n", WIDTH)
+    return _Writer(value).texts([value], "\n", WIDTH)[0]
 
 
 def _multiprecision(value: Any) -> Iterator[Any]:
@@ -107,21 +127,72 @@ def _key(name: str) -> str:
     return _encoded(name) + ": "
 
 
-def _written(value: Any, precision: int, newline: str, room: int) -> str:
-    """Write a value; one that is longer than ``room`` on several lines."""
-    if not isinstance(value, (dict, list)):
-        number = isinstance(value, float) or decimals.is_multiprecision(value)
-        return decimals.text(value, precision) if number else _encoded(value)
-    inner = newline + "  "
-    room_inside = WIDTH - len(inner)
-    if isinstance(value, dict):
-        opening, closing = "{}"
-        named = [(_key(name), item) for name, item in cast("dict[str, Any]", value).items()]
-        parts = [key + _written(item, precision, inner, room_inside - len(key)) for key, item in named]
-    else:
-        opening, closing = "[]"
-        parts = [_written(item, precision, inner, room_inside) for item in cast("list[Any]", value)]
-    line = opening + ", ".join(parts) + closing
-    if len(line) <= room and "\n" not in line:
-        return line
-    return opening + inner + ("," + inner).join(parts) + newline + closing
+class _Writer:
+    """The texts of a value's parts; parts that are alike, such as the transitions of a run, are written together."""
+
+    def __init__(self, whole: Any) -> None:
+        self._whole = whole
+
+    @cached_property
+    def _precision(self) -> int:
+        return decimals.bits(_multiprecision(plain(self._whole)))
+
+    def texts(self, values: Sequence[Any], newline: str, room: int) -> list[str]:
+        """Write each of some values, one that is longer than ``room`` on several lines."""
+        places: dict[Any, list[int]] = {}
+        for place, value in enumerate(values):
+            kind = _kind(value)
+            places.setdefault(tuple(value) if kind is dict else kind, []).append(place)
+        if len(places) < 2:
+            return self._alike(values, newline, room)
+        found = [""] * len(values)
+        for some in places.values():
+            for place, text in zip(some, self._alike([values[i] for i in some], newline, room), strict=True):
+                found[place] = text
+        return found
+
+    def _alike(self, values: Sequence[Any], newline: str, room: int) -> list[str]:
+        """Write values of one type, and objects of the same keys."""
+        kind = _kind(values[0]) if values else None
+        if kind is float:
+            return [repr(number) if math.isfinite(number) else "null" for number in values]
+        if kind is int:
+            return list(map(repr, values))
+        if kind in _AS_THEY_ARE:
+            known = {value: _encoded(value) for value in set(values)}
+            return [known[value] for value in values]
+        if kind is dict:
+            return self._objects(values, newline, room)
+        if kind is list:
+            return self._lists(values, newline, room)
+        if values and decimals.is_multiprecision(values[0]):
+            return [decimals.text(x, self._precision) if decimals.is_finite(x) else "null" for x in values]
+        return self.texts(list(map(plain, values)), newline, room) if values else []
+
+    def _objects(self, values: Sequence[dict[Any, Any]], newline: str, room: int) -> list[str]:
+        names, inner = list(values[0]), newline + "  "
+        keys = [_key(str(name)) for name in names]
+        columns = [
+            self.texts([value[name] for value in values], inner, WIDTH - len(inner) - len(key))
+            for name, key in zip(names, keys, strict=True)
+        ]
+        rows = zip(*columns, strict=True) if names else ((),) * len(values)
+        line, lines = _forms([key.replace("%", "%%") + "%s" for key in keys], "{}", newline)
+        return [_fitting(line % row, room) or lines % row for row in rows]
+
+    def _lists(self, values: Sequence[list[Any]], newline: str, room: int) -> list[str]:
+        inner = newline + "  "
+        items = iter(self.texts([item for value in values for item in value], inner, WIDTH - len(inner)))
+        forms = (_forms(list(islice(items, len(value))), "[]", newline) for value in values)
+        return [_fitting(line, room) or lines for line, lines in forms]
+
+
+def _forms(parts: Sequence[str], brackets: str, newline: str) -> tuple[str, str]:
+    """A list or object on one line, and on several."""
+    inner, (opening, closing) = newline + "  ", brackets
+    return opening + ", ".join(parts) + closing, opening + inner + ("," + inner).join(parts) + newline + closing
+
+
+def _fitting(line: str, room: int) -> str:
+    """The text where it is one line that fits, else nothing."""
+    return line if len(line) <= room and "\n" not in line else ""

@@ -12,7 +12,9 @@ from hsdsl.report import json_form
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 LEAVES = st.none() | st.booleans() | st.integers() | FINITE | st.text()
-VALUES = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=30)
+ANY = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=30)
+ALIKE = {"n%": FINITE | st.none(), "list": st.lists(LEAVES, max_size=3), "own": st.dictionaries(st.text(), FINITE)}
+VALUES = ANY | st.lists(st.fixed_dictionaries(ALIKE) | LEAVES, max_size=5)
 
 
 @given(VALUES, st.integers(10, 120))
