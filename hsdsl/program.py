@@ -10,6 +10,7 @@ A routine's text is a Python function body in which every constant that is not a
 
 from __future__ import annotations
 
+import ast
 import re
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,6 +22,9 @@ from hsdsl.sparsity import Elimination, elimination
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
 JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
+STEEP = ("sqrt", "asin", "acos", "acosh")
+WHOLE = re.compile(r"q_m?\d+_1|\d+")
+MOVING = re.compile(r"t|[xv]\d+")
 Hold = Literal["zero", "linear"]
 
 
@@ -218,8 +222,26 @@ class ModeProgram:
     @property
     def jumps(self) -> bool:
         """Whether the flow has `sign`, `floor` or `atan2`, which jump; those of time alone are boundaries of steps."""
-        flow = self.routines.source.partition("def flow(")[2].partition("    def ")[0]
-        return JUMPS.search(flow) is not None
+        return JUMPS.search(self._flow_source) is not None
+
+    @cached_property
+    def steep(self) -> bool:
+        """Whether the flow has functions of time or states whose slope has no bound, as roots have at zero."""
+        return any(_steep(call) for call in ast.walk(ast.parse(f"def flow({self._flow_source}")))
+
+    @property
+    def _flow_source(self) -> str:
+        return self.routines.source.partition("def flow(")[2].partition("    def ")[0]
+
+
+def _steep(call: ast.AST) -> bool:
+    match call:
+        case ast.Call(func=ast.Name(id=name), args=[*_, last]):
+            steep = name in STEEP or (name == "pow" and not WHOLE.fullmatch(ast.unparse(last)))
+            names = [node.id for node in ast.walk(call) if isinstance(node, ast.Name)]
+            return steep and any(map(MOVING.fullmatch, names))
+        case _:
+            return False
 
 
 @dataclass(frozen=True)

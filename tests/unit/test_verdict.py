@@ -150,6 +150,9 @@ NOT_TO_RELY_ON = {
         "x: 0, v: 0", 3, "the run starts on the surface of m->n",
     ),
     "a slope without bound at the start": ("m: {flow: {y: 2*sqrt(y)}}", "y: 0", 3, "the slope of the flow of mode m"),
+    "a slope without bound of a name": (
+        "m: {let: {r: sqrt(y)}, flow: {y: 2*r}}", "y: 0", 3, "the slope of the flow of mode m"
+    ),
     "a slope without bound on the way": (
         "m: {flow: {y: sqrt(abs(y)) - 1 - y*y}}", "y: 1", 3, "the slope of the flow of mode m"
     ),

@@ -1,4 +1,4 @@
-/* Routines over ranges of numbers, and over discs in the complex plane. See hsdsl/enclosures.py.
+/* Routines over ranges of numbers. See hsdsl/enclosures.py.
 
    Rounding outwards: a result y in round-to-nearest is off by at most |y| u + m, with u = 2**-53 and m the least number
    that is not zero. `y - (|y| 2u + m)` is computed with an error of at most u times its own size, which is no more than
@@ -121,85 +121,10 @@ static hs_range range_of(const hs_operation *o, hs_range a, hs_range b) {
   }
 }
 
-/* Numbers that are no further from a real one than `radius`, in the complex plane; infinite where nothing is known. */
-typedef struct {
-  double centre, radius;
-} hs_disc;
-
-static const hs_disc anywhere = {0.0, INFINITY};
-
-/* What rounding adds to a radius: far more than it does. */
-HS_INLINE hs_disc disc(double centre, double radius) {
-  const hs_disc found = {centre, radius * (1 + 0x1p-40) + fabs(centre) * 0x1p-48};
-  return found.radius == found.radius && centre - centre == 0.0 ? found : anywhere;
-}
-
-HS_INLINE hs_disc disc_product(hs_disc a, hs_disc b) {
-  return disc(a.centre * b.centre, fabs(a.centre) * b.radius + fabs(b.centre) * a.radius + a.radius * b.radius);
-}
-
-static hs_disc disc_power(hs_disc a, int exponent) {
-  if (exponent == 1) return a;
-  const hs_disc half = disc_power(a, exponent / 2), square = disc_product(half, half);
-  return exponent % 2 ? disc_product(square, a) : square;
-}
-
-/* |1/(c + z) - 1/c| = |z|/(|c| |c + z|) <= r/(|c| (|c| - r)). */
-static hs_disc disc_reciprocal(hs_disc a) {
-  const double c = fabs(a.centre);
-  return a.radius < c ? disc(1.0 / a.centre, a.radius / (c * (c - a.radius))) : anywhere;
-}
-
-/* Of the powers of z in sqrt(c + z) and log(c + z) all coefficients but the first are those of sqrt(c - z) and
-   -log(c - z) up to their sign, so a change is largest at z = -r. sin(c + z) - sin(c) = sin(c) (cos(z) - 1)
-   + cos(c) sin(z), and |cos(z) - 1| <= cosh(r) - 1, |sin(z)| <= sinh(r), which e = exp(r) - 1 gives. tanh is 1 - 2/(1 + exp(2 z)). */
-static hs_disc disc_of(const hs_operation *o, hs_disc a, hs_disc b) {
-  const double c = a.centre, r = a.radius;
-  switch (o->kind) {
-  case HS_ADD: return disc(c + b.centre, r + b.radius);
-  case HS_SUB: return disc(c - b.centre, r + b.radius);
-  case HS_MUL: return disc_product(a, b);
-  case HS_DIV: return disc_product(a, disc_reciprocal(b));
-  case HS_NEG: return disc(-c, r);
-  case HS_SQUARE: return disc_product(a, a);
-  case HS_POWER: return disc_power(a, o->b);
-  case HS_ABS: return fabs(c) > r ? disc(fabs(c), r) : anywhere;
-  case HS_MIN: return c + r < b.centre - b.radius ? a : b.centre + b.radius < c - r ? b : anywhere;
-  case HS_MAX: return c - r > b.centre + b.radius ? a : b.centre - b.radius > c + r ? b : anywhere;
-  case HS_SQRT: return r < c ? disc(sqrt(c), sqrt(c) - sqrt(c - r)) : anywhere;
-  case HS_EXP: return disc(exp(c), exp(c) * expm1(r));
-  case HS_LOG: return r < c ? disc(log(c), -log1p(-r / c)) : anywhere;
-  case HS_SIN:
-  case HS_COS: {
-    const double more = expm1(r), rise = more * more / (2 * (1 + more)), turn = (more + more / (1 + more)) / 2;
-    const double here = o->kind == HS_SIN ? sin(c) : cos(c), across = o->kind == HS_SIN ? cos(c) : sin(c);
-    return disc(here, fabs(here) * rise + fabs(across) * turn);
-  }
-  case HS_TANH: {
-    const hs_disc grown = disc(1 + exp(2 * c), exp(2 * c) * expm1(2 * r)), part = disc_reciprocal(grown);
-    return disc(1 - 2 * part.centre, 2 * part.radius);
-  }
-  case HS_ATAN: {
-    const double away = sqrt(1 + c * c) - r; /* of the poles of its slope 1/((z - i) (z + i)) */
-    return away > 0 ? disc(atan(c), r / (away * away)) : anywhere;
-  }
-  case HS_SIGN: return fabs(c) > r ? disc(sign_of(c), 0.0) : anywhere;
-  case HS_FLOOR: return floor(c - r) == floor(c + r) ? disc(floor(c), 0.0) : anywhere;
-  default: return anywhere;
-  }
-}
-
 /* Carry out operations from one up to another; registers of results begin at `base`. */
 static void range_operations(const hs_formulas *f, int first, int last, int base, hs_range *v) {
   for (int i = first; i < last; i++) {
     const hs_operation *const o = &f->operation[i];
     v[base + i] = range_of(o, v[o->a], v[o->kind == HS_POWER ? o->a : o->b]);
-  }
-}
-
-static void disc_operations(const hs_formulas *f, int first, int last, int base, hs_disc *v) {
-  for (int i = first; i < last; i++) {
-    const hs_operation *const o = &f->operation[i];
-    v[base + i] = disc_of(o, v[o->a], v[o->kind == HS_POWER ? o->a : o->b]);
   }
 }

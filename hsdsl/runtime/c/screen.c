@@ -116,11 +116,13 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.bernstein = numbers(store, (int64_t)(LEVELS + 1) * (d + 1) * w);
   v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
   v.enough = numbers(store, w);
+  v.beyond = numbers(store, w);
   v.missed = numbers(store, (int64_t)w * model->modes);
   v.unseen = take(store, (int64_t)(LEVELS + 2) * w, sizeof(int));
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
-  v.disc = take(store, registers, sizeof(hs_disc));
+  v.around = take(store, registers, sizeof(hs_expansion));
+  v.slopes = take(store, w, sizeof(hs_expansion));
   v.nearest = take(store, model->modes, sizeof(hs_near_miss));
   return v;
 }

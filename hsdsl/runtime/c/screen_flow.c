@@ -3,19 +3,6 @@
 
 #include "screen_parts.h"
 
-/* How much the derivative of the step's polynomial changes along it, at least: from its start to its middle or end. */
-static double shown_change(const hs_view *v, int64_t row, int i) {
-  const double *c = recorded_piece(&v->s->run, row) + i;
-  const int d = v->s->run.degree, w = v->s->run.width;
-  double middle = 0.0, end = 0.0, power = 0.5;
-  for (int k = 1; k < d; k++, power /= 2) {
-    const double term = (k + 1) * c[k * w];
-    end += term;
-    middle += term * power;
-  }
-  return hs_max(fabs(end), fabs(middle));
-}
-
 /* How far the enclosed flow lies beyond the derivatives of the states on a part, and how far these vary there. */
 static double flow_beyond(const hs_view *v, int level, int i, double width, double *varies) {
   const int d = v->s->run.degree;
@@ -69,65 +56,57 @@ static int flow_open(hs_view *v, int64_t row, int level, double start, double wi
   return 0;
 }
 
-/* Enclose the flow over discs that hold what the polynomial p of a step is where |s| <= size. */
-static void enclose_in_discs(hs_view *v, int64_t row, double size) {
-  const hs_screen *s = v->s;
-  const double *x = recorded_row(&s->run, row), *c = recorded_piece(&s->run, row);
-  const int d = s->run.degree, w = s->run.width;
-  v->disc[0] = disc(s->run.times[row], size * (s->run.times[row + 1] - s->run.times[row]));
-  for (int i = 0; i < v->n; i++) {
-    double radius = 0.0, power = size;
-    for (int k = 0; k < d; k++, power *= size) radius += fabs(c[k * w + i]) * power;
-    v->disc[1 + i] = disc(x[i], radius);
+/* Expand the slope of a state and the state itself around the middle of a step. Sums are of powers of 1 + u. */
+static hs_expansion expand_state(const hs_view *v, int64_t row, int i, double half, hs_expansion *slope) {
+  const hs_record *const run = &v->s->run;
+  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i];
+  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, rest = 0.0, power = ldexp(1.0, -run->degree), at = 0.0;
+  for (int k = run->degree; k > 0; k--, power *= 2) {
+    const double term = c[(k - 1) * run->width] * power;
+    rest = 2 * rest + fabs(third);
+    third += second, second += first, first += value, value += k * term;
+    at += term;
   }
-  disc_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->disc);
+  rest += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANDED;
+  *slope = expansion(value / half, first / half, second / half, third / half, rest / half, 0.0);
+  rest = fabs(third) / 4 + rest / 5 + fabs(x + at) * EXPANDED;
+  return expansion(x + at, value, first / 2, second / 3, rest, fabs(value));
 }
 
-/* Whether the flow may be along a step what its Taylor polynomial p does not show.
-
-   F(s) = f(p(s)) is analytic where |s| < size; its coefficients are at most M/size**k there, M being how far f differs
-   from its first value over discs that hold p(s), those last enclosed. The first d are those of the derivative of p. So
-   along the step both differ by at most M size**(1 - d)/(size - 1). */
-static int disc_hides(hs_view *v, int64_t row, double size) {
-  const double length = v->s->run.times[row + 1] - v->s->run.times[row];
-  const double less = 1 / size;
-  double share = 1 / (size - 1);
-  for (int k = 1; k < v->s->run.degree; k++) share *= less;
+/* Expand the flow along a step: how far it may be from the slopes of the states there, and what these show. An eighth
+   of that is no pulse. */
+static void expand_flow(hs_view *v, int64_t row) {
+  const double begin = v->s->run.times[row], half = (v->s->run.times[row + 1] - begin) / 2;
+  v->around[0] = expansion(begin + half, half, 0.0, 0.0, 0.0, half);
+  for (int i = 0; i < v->n; i++) v->around[1 + i] = expand_state(v, row, i, half, &v->slopes[i]);
+  expand_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->around);
   for (int i = 0; i < v->n; i++) {
-    const double hidden = v->disc[v->f->flow.result[i]].radius * share;
-    if (!(hidden <= v->enough[i] || hidden * length <= v->own[i])) return 1;
+    const hs_expansion flow = v->around[v->f->flow.result[i]], slope = v->slopes[i];
+    v->beyond[i] = size_of(expanded_sum(flow, negated(slope)));
+    v->enough[i] = hs_max(flow.shown, fabs(slope.second)) / RESOLVED;
   }
+}
+
+/* Whether the expanded flow may be along a step what its polynomial does not show. */
+static int expansion_hides(const hs_view *v, double length) {
+  for (int i = 0; i < v->n; i++)
+    if (!(v->beyond[i] <= v->enough[i] || v->beyond[i] * length <= v->own[i])) return 1;
   return 0;
 }
 
-/* Whether the flow is known to be analytic on the discs that it was enclosed over. */
+/* Whether the flow has a bound along a step, and so have its slopes: no root is taken close to zero. */
 static int all_known(const hs_view *v) {
   for (int i = 0; i < v->n; i++)
-    if (!hs_finite(v->disc[v->f->flow.result[i]].radius)) return 0;
+    if (!hs_finite(v->beyond[i])) return 0;
   return 1;
-}
-
-/* Whether no slope of the flow is without a bound along a step: it is analytic around it. */
-static int has_bound(hs_view *v, int64_t row) {
-  enclose_in_discs(v, row, LEAST_SIZE);
-  return all_known(v);
 }
 
 static int flow_hides(hs_view *v, int64_t row) {
   if (v->f->affine && !v->f->steep) return 0;
   const double length = v->s->run.times[row + 1] - v->s->run.times[row];
-  const int by_discs = v->s->taylor && v->table->series;
-  if (by_discs) { /* where these hide nothing the flow is analytic around the step, and its slopes have a bound */
-    enclose_in_discs(v, row, LARGEST_SIZE);
-    for (int i = 0; i < v->n; i++) v->enough[i] = shown_change(v, row, i) / (RESOLVED * length);
-    if (!disc_hides(v, row, LARGEST_SIZE) && all_known(v)) return 0;
-  }
+  expand_flow(v, row);
+  if (v->f->steep && !all_known(v)) return 1;
+  if (!expansion_hides(v, length)) return 0;
   look_at_whole(v, row);
-  if (by_discs && !disc_hides(v, row, LARGEST_SIZE) && all_known(v)) return 0;
-  if (v->f->steep && !has_bound(v, row)) return 1;
-  for (double size = 1.5; by_discs && size >= LEAST_SIZE; size -= 0.25) {
-    enclose_in_discs(v, row, size);
-    if (!disc_hides(v, row, size)) return 0;
-  }
-  return flow_open(v, row, 0, 0.0, 1.0);
+  return expansion_hides(v, length) && flow_open(v, row, 0, 0.0, 1.0);
 }

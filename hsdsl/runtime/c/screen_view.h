@@ -3,7 +3,7 @@
 #ifndef HS_SCREEN_VIEW_H
 #define HS_SCREEN_VIEW_H
 
-#include "ranges.c"
+#include "expansions.c"
 
 #define DOUBT(at) (1 << (at))
 #define SAFE 10             /* margins below so many errors are named */
@@ -15,8 +15,6 @@
 #define MOST_LOOKS 128      /* at parts of one step */
 #define RESOLVED 8          /* changes of a flow smaller than this share of what its step shows are seen */
 #define PLACES 64           /* of a mode where the round-off of its flow is looked at */
-#define LEAST_SIZE 1.25     /* of discs around a step */
-#define LARGEST_SIZE 2.0
 #define ROUNDS 48           /* of closing in on a turning point */
 #define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */
 
@@ -44,7 +42,8 @@ typedef struct {
   int *open, *unseen;
   int *cut; /* whether a state is, where a step is cut in halves */
   hs_range *range;
-  hs_disc *disc;
+  hs_expansion *around, *slopes;
+  double *beyond; /* how far the flow may be from the slopes of states along the step */
   hs_near_miss *nearest; /* of each mode */
   int looks;
 } hs_view;
@@ -86,10 +85,10 @@ static void bind_formulas(hs_view *v) {
     const double *const c = v->f->constant + 2 * (i - constants);
     const hs_range value = {i < constants ? v->p[i - data] : c[0], i < constants ? v->p[i - data] : c[1]};
     v->range[i] = value;
-    v->disc[i] = disc((value.low + value.high) / 2, 0.0);
+    v->around[i] = constant_expansion((value.low + value.high) / 2);
   }
   range_operations(v->f, 0, v->f->fixed, base, v->range);
-  disc_operations(v->f, 0, v->f->fixed, base, v->disc);
+  expand_operations(v->f, 0, v->f->fixed, base, v->around);
 }
 
 static void bind(hs_view *v, int mode, int64_t segment) {

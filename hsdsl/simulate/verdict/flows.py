@@ -18,7 +18,6 @@ from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.formulas import STEEP
 from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
@@ -36,7 +35,7 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     for steps in steps_of(run, doubtful="changing"):
         with np.errstate(all="ignore"):
             found += _named(run, "a change of the flow", "may not have been seen", *_unseen(run, steps))
-            if any(STEEP.search(text) for text in run.problem.program.modes[steps.mode].flow_texts):
+            if run.problem.program.modes[steps.mode].steep:
                 found += _named(run, "the slope of the flow", "has no bound", *_steep(run, steps))
     return found, []
 

@@ -23,7 +23,6 @@ from hsdsl.program import JUMPS, ModeProgram, Program
 from hsdsl.runtime import structures
 
 CONSTANT = re.compile(r"q_(m?)(\d+)_(\d+)")
-STEEP = re.compile(r"\b(?:sqrt|asin|acos|acosh)\(|\*\* *(?:\(|[a-zA-Z_]|\d*\.|\d+/)")
 SIGNS: Mapping[type[ast.operator], str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 PLAIN = ("abs", "sqrt", "exp", "log", "sin", "cos", "tanh", "atan", "sign", "floor")
 MOST_POWER = 1 << 20
@@ -171,7 +170,7 @@ class Compiled:
             fixed=len(tape.fixed),
             operations=len(steps),
             affine=all(node.degree <= 1 for node in formulas[0][2]),
-            steep=any(map(STEEP.search, mode.flow_texts)),
+            steep=mode.steep,
             jumps=mode.jumps,
             constant=self._memory(np.array(list(tape.constants), np.float64)),
             operation=self._memory(np.array(steps, np.int32)),

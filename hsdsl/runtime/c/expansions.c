@@ -1,0 +1,175 @@
+/* Routines along a part of a step: up to third order around its middle, and how far they may be from that.
+
+   An expansion is a function of u from -1 to 1, no further from value + first u + second u**2 + third u**3 than `rest`;
+   that is infinite where nothing is known. What is added to it for rounding is far more than rounding does, that of C's
+   library too. `shown` is the size of its slope at the middle, where no terms cancel. */
+
+#include "ranges.c"
+
+#define EXPANDED 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
+
+typedef struct {
+  double value, first, second, third, rest, shown;
+} hs_expansion;
+
+static const hs_expansion anything = {0.0, 0.0, 0.0, 0.0, INFINITY, 0.0};
+
+HS_INLINE hs_expansion expansion(double value, double first, double second, double third, double rest, double shown) {
+  const hs_expansion found = {value, first, second, third, rest, shown};
+  return rest <= DBL_MAX ? found : anything;
+}
+
+HS_INLINE hs_expansion constant_expansion(double value) {
+  return expansion(value, 0.0, 0.0, 0.0, fabs(value) * EXPANDED, 0.0);
+}
+
+/* How far it may be from its value, and from zero. */
+HS_INLINE double reach(hs_expansion a) { return fabs(a.first) + fabs(a.second) + fabs(a.third) + a.rest; }
+HS_INLINE double size_of(hs_expansion a) { return fabs(a.value) + reach(a); }
+
+HS_INLINE hs_expansion expanded_sum(hs_expansion a, hs_expansion b) {
+  return expansion(a.value + b.value, a.first + b.first, a.second + b.second, a.third + b.third,
+                   a.rest + b.rest + (size_of(a) + size_of(b)) * EXPANDED, a.shown + b.shown);
+}
+
+HS_INLINE hs_expansion expanded_multiple(hs_expansion a, double by) {
+  const double rest = (a.rest + size_of(a) * EXPANDED) * fabs(by);
+  return expansion(a.value * by, a.first * by, a.second * by, a.third * by, rest, a.shown * fabs(by));
+}
+
+HS_INLINE hs_expansion negated(hs_expansion a) {
+  const hs_expansion found = {-a.value, -a.first, -a.second, -a.third, a.rest, a.shown};
+  return found;
+}
+
+/* The powers of a product from the fourth on, without what the factors' rests add. */
+HS_INLINE double higher(hs_expansion a, hs_expansion b) {
+  return fabs(a.first * b.third + a.second * b.second + a.third * b.first) +
+         fabs(a.second * b.third + a.third * b.second) + fabs(a.third * b.third);
+}
+
+HS_INLINE hs_expansion expanded_product(hs_expansion a, hs_expansion b) {
+  const double size = size_of(a), other = size_of(b);
+  return expansion(a.value * b.value, a.value * b.first + a.first * b.value,
+                   a.value * b.second + a.first * b.first + a.second * b.value,
+                   a.value * b.third + a.first * b.second + a.second * b.first + a.third * b.value,
+                   higher(a, b) + a.rest * other + b.rest * (size - a.rest) + size * other * EXPANDED,
+                   fabs(a.value) * b.shown + a.shown * fabs(b.value));
+}
+
+/* For v that is 1/a up to third order, a v = 1 + e with |e| <= off, so 1/a is off by |v e/(1 + e)|. */
+static hs_expansion expanded_reciprocal(hs_expansion a) {
+  const double v = 1 / a.value, first = -v * v * a.first, second = -v * (a.second * v + a.first * first);
+  const double third = -v * (a.third * v + a.second * first + a.first * second);
+  const hs_expansion found = {v, first, second, third, 0.0, a.shown * v * v};
+  const double size = size_of(found), off = higher(a, found) + a.rest * size + size_of(a) * size * EXPANDED;
+  return off < 1.0 ? expansion(v, first, second, third, size * off / (1 - off), found.shown) : anything;
+}
+
+/* For s > 0 that is sqrt(a) up to third order, |a - s**2| <= off, and sqrt(a) - s = (a - s**2)/(sqrt(a) + s). */
+static hs_expansion expanded_root(hs_expansion a) {
+  if (!(a.value > 0.0)) return anything;
+  const double s = sqrt(a.value), half = 0.5 / s, first = a.first * half, second = (a.second - first * first) * half;
+  const hs_expansion found = {s, first, second, (a.third - 2 * first * second) * half, 0.0, a.shown * half};
+  const double size = size_of(found), least = s - reach(found);
+  const double off = higher(found, found) + a.rest + (size_of(a) + size * size) * EXPANDED;
+  const int known = least > 0.0 && off < least * least;
+  return known ? expansion(s, first, second, found.third, off / least, found.shown) : anything;
+}
+
+/* A function with the coefficients c around an expansion's value; `further` bounds its powers from the fourth on. */
+HS_INLINE hs_expansion composed(hs_expansion a, const double c[4], double further) {
+  const double by = reach(a), one = fabs(a.first), slope = fabs(c[1]), bend = fabs(c[2]), twist = fabs(c[3]);
+  const double size = fabs(c[0]) + by * (slope + by * (bend + by * twist));
+  const double rest = slope * a.rest + bend * (by * by - one * (one + 2 * fabs(a.second))) +
+                      twist * (by * by * by - one * one * one) + further;
+  return expansion(c[0], c[1] * a.first, c[1] * a.second + c[2] * a.first * a.first,
+                   c[1] * a.third + a.first * (2 * c[2] * a.second + c[3] * a.first * a.first),
+                   rest + size * EXPANDED, slope * a.shown);
+}
+
+/* What the fourth derivative of a function makes of it, that being at most `most`. */
+HS_INLINE double fourth(double by, double most) { return by * by * by * by / 24 * most; }
+
+/* The powers from the fourth on of a function with the coefficients (1/size)**k/k at most. */
+HS_INLINE double further_logarithm(double by, double size) {
+  const double share = by / size;
+  return share < 1.0 ? share * share * share * share / (4 * (1 - share)) : INFINITY;
+}
+
+static hs_expansion expanded_exponential(hs_expansion a) {
+  const double here = exp(a.value), c[4] = {here, here, here / 2, here / 6};
+  return composed(a, c, fourth(reach(a), here * exp(reach(a))));
+}
+
+static hs_expansion expanded_logarithm(hs_expansion a) {
+  if (!(a.value > 0.0)) return anything;
+  const double less = 1 / a.value, c[4] = {log(a.value), less, -less * less / 2, less * less * less / 3};
+  return composed(a, c, further_logarithm(reach(a), a.value));
+}
+
+/* Where `here` is its sine and `across` its cosine; or its cosine, and minus its sine. */
+static hs_expansion expanded_sine(hs_expansion a, double here, double across) {
+  const double c[4] = {here, across, -here / 2, -across / 6};
+  return composed(a, c, fourth(reach(a), 1.0));
+}
+
+/* 2/(1 + exp(-2 a)) - 1, for minus a where that is smaller. */
+static hs_expansion expanded_tanh(hs_expansion a) {
+  const int minus = a.value < 0.0;
+  const hs_expansion less = expanded_exponential(expanded_multiple(a, minus ? 2.0 : -2.0));
+  const hs_expansion share = expanded_reciprocal(expanded_sum(constant_expansion(1.0), less));
+  const hs_expansion found = expanded_sum(expanded_multiple(share, 2.0), constant_expansion(-1.0));
+  return minus ? negated(found) : found;
+}
+
+/* The slope of atan has poles sqrt(1 + c**2) away. */
+static hs_expansion expanded_angle(hs_expansion a) {
+  const double x = a.value, m = 1 / (1 + x * x), c[4] = {atan(x), m, -x * m * m, (x * x - 1.0 / 3) * m * m * m};
+  return composed(a, c, further_logarithm(reach(a), sqrt(1 + x * x)));
+}
+
+static hs_expansion expanded_power(hs_expansion a, int exponent) {
+  if (exponent == 1) return a;
+  const hs_expansion half = expanded_power(a, exponent / 2), square = expanded_product(half, half);
+  return exponent % 2 ? expanded_product(square, a) : square;
+}
+
+/* The smaller of two, where it is the same one everywhere. */
+static hs_expansion expanded_least(hs_expansion a, hs_expansion b) {
+  const double apart = reach(a) + reach(b);
+  return b.value - a.value > apart ? a : a.value - b.value > apart ? b : anything;
+}
+
+static hs_expansion expansion_of(const hs_operation *o, hs_expansion a, hs_expansion b) {
+  const double c = a.value, r = reach(a);
+  switch (o->kind) {
+  case HS_ADD: return expanded_sum(a, b);
+  case HS_SUB: return expanded_sum(a, negated(b));
+  case HS_MUL: return expanded_product(a, b);
+  case HS_DIV: return expanded_product(a, expanded_reciprocal(b));
+  case HS_NEG: return negated(a);
+  case HS_SQUARE: return expanded_product(a, a);
+  case HS_POWER: return expanded_power(a, o->b);
+  case HS_ABS: return fabs(c) > r ? expanded_multiple(a, sign_of(c)) : anything;
+  case HS_MIN: return expanded_least(a, b);
+  case HS_MAX: return negated(expanded_least(negated(a), negated(b)));
+  case HS_SQRT: return expanded_root(a);
+  case HS_EXP: return expanded_exponential(a);
+  case HS_LOG: return expanded_logarithm(a);
+  case HS_SIN: return expanded_sine(a, sin(c), cos(c));
+  case HS_COS: return expanded_sine(a, cos(c), -sin(c));
+  case HS_TANH: return expanded_tanh(a);
+  case HS_ATAN: return expanded_angle(a);
+  case HS_SIGN: return fabs(c) > r ? constant_expansion(sign_of(c)) : anything;
+  case HS_FLOOR: return floor(c - r) == floor(c + r) ? constant_expansion(floor(c)) : anything;
+  default: return anything;
+  }
+}
+
+static void expand_operations(const hs_formulas *f, int first, int last, int base, hs_expansion *v) {
+  for (int i = first; i < last; i++) {
+    const hs_operation *const o = &f->operation[i];
+    v[base + i] = expansion_of(o, v[o->a], v[o->kind == HS_POWER ? o->a : o->b]);
+  }
+}
