@@ -192,6 +192,7 @@ class ModeProgram:
 
     ``held`` is the number, among `Program.flows`, of this mode where guards hold the state.
     ``slides`` names the two modes between which a mode of a completion slides.
+    ``measured`` numbers states whose slopes at the end of an implicit step are put into the states before the last.
     """
 
     name: str
@@ -209,6 +210,7 @@ class ModeProgram:
     diagnosis: Routines
     held: int | None = None
     slides: tuple[str, ...] = ()
+    measured: tuple[int, ...] = ()
 
     @cached_property
     def conditions(self) -> tuple[tuple[str, ...], ...]:

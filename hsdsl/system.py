@@ -164,6 +164,8 @@ class Mode:
     ``slides`` names the two modes between which a mode of a completion slides. A final mode without flow has
     ``states == ()`` here: it has the states it is entered with. The last ``derived`` states are derivatives of the
     others, and the flow's Jacobian leaves out how they depend on these.
+    The states before the last, one for each number in ``measured``, take the slopes of the states with these numbers
+    where a step by an implicit method ends; the last state is then 1.
     """
 
     name: str
@@ -177,6 +179,7 @@ class Mode:
     slides: tuple[str, str] | None = None
     scene: tuple[sp.Expr | None, ...] = ()
     derived: int = 0
+    measured: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.states) == len(self.flow) == len(self.flow_texts):

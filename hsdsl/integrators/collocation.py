@@ -42,6 +42,8 @@ class Coefficients:
         Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
     values, slope : tuple of Number
         Weights of the increments in the polynomial and in its derivative by s there.
+    end_slope : tuple of Number
+        Weights of the increments in the derivative by s at the step's end.
     """
 
     nodes: State
@@ -56,6 +58,7 @@ class Coefficients:
     share: Number
     values: State
     slope: State
+    end_slope: State
 
 
 @cache
@@ -83,6 +86,7 @@ def coefficients(arithmetic: Arithmetic) -> Coefficients:
         share,
         _weighted((share, share * share, share * share * share), powers),
         _weighted((one, 2 * share, 3 * share * share), powers),
+        _weighted((one, 2 * one, 3 * one), powers),
     )
 
 

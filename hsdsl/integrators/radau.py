@@ -36,16 +36,17 @@ def radau_stepper(
     scales: Sequence[Number],
     smooth: bool = True,
     pattern: Elimination | None = None,
+    measured: Sequence[int] = (),
 ) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
 
     ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump;
-    ``pattern`` is that of a sparse elimination.
+    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern)
+    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern, measured)
 
     def error(h: Number, stages: Stages, end: State) -> State:
         return stages[3]
@@ -73,8 +74,9 @@ class Steps:
         scales: Sequence[Number],
         smooth: bool = True,
         pattern: Elimination | None = None,
+        measured: Sequence[int] = (),
     ) -> None:
-        self._pattern = pattern
+        self._pattern, self._measured = pattern, measured
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
         self._largest, self._smooth = scales, smooth
         self._scales, self._floors = scales, list[Number]()
@@ -103,7 +105,26 @@ class Steps:
         if not x:
             return (), ((), (), (), ())
         found = self._solved(flow, t, h, x, exactly=True)
-        return tuple(_sum(x, found[2])), (*map(tuple, found), ())
+        end = tuple(_sum(x, found[2]))
+        if self._measured:
+            end = (*end[: -len(self._measured) - 1], *self._slopes(flow, t, h, x, end, found), self._one)
+        return end, (*map(tuple, found), ())
+
+    def _slopes(self, flow: Flow, t: Number, h: Number, x: State, end: State, z: Increments) -> Iterator[Number]:
+        """The slopes of measured states at a step's end.
+
+        There the polynomial has the flow's slope, so either gives it. What decays fast has a flow of large terms that
+        cancel: where their round-off is more than that of the increments over the step, the polynomial's is taken.
+        """
+        weights, rows = self._known.end_slope, self._rows
+        assert rows is not None
+        size, at_end = abs(weights[0]) + abs(weights[1]) + abs(weights[2]), flow(t + h, *end)
+        for i in self._measured:
+            terms = self._arithmetic.zero
+            for d, a in zip(rows[i], end, strict=True):
+                terms = terms + abs(d * a)
+            cancels = h * terms > size * max(abs(x[i]), abs(end[i]))
+            yield (weights[0] * z[0][i] + weights[1] * z[1][i] + weights[2] * z[2][i]) / h if cancels else at_end[i]
 
     def piece(
         self, flow: Flow, t: Number, h: Number, x: State, z: State, stages: Stages, slope: State, end: State

@@ -237,6 +237,7 @@ class LoweredMode:
             expressions=tuple(texts),
             diagnosis=print_routines(self._diagnosis(expressions), data),
             slides=mode.slides or (),
+            measured=mode.measured,
         )
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:

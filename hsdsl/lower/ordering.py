@@ -14,8 +14,12 @@ SPARSE = 4  # the dense factors have at least so many times as many entries
 
 
 def ordering(places: Sequence[int], n: int) -> tuple[int, ...]:
-    """The order with the fewest entries of the factors among some; empty where the dense elimination is used."""
-    if n < LEAST or SPARSE * len(places) > n * n:
+    """The order with the fewest entries of the factors among some; empty where the dense elimination is used.
+
+    States that do not flow cost the dense elimination as much as others, and the sparse one nothing.
+    """
+    flowing = len({k // n for k in places})
+    if not flowing or (n < LEAST and 2 * flowing > n) or SPARSE * len(places) > n * n:
         return ()
     fills = {order: filled(_moved(places, order), n) for order in _orders(places, n)}
     best = min(fills, key=fills.__getitem__)

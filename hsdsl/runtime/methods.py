@@ -59,6 +59,7 @@ def _collocation() -> Any:
         known.share,
         (c_double * 3)(*known.values),
         (c_double * 3)(*known.slope),
+        (c_double * 3)(*known.end_slope),
     )
 
 

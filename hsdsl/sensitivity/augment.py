@@ -11,6 +11,10 @@ Journal of Mechanics and Applied Mathematics 11, 1958). A transition on entry ke
 
 Each derivative has a state of its own, and each T has one that stays as it is between transitions; those that are zero
 in every run are left out.
+
+A stiff flow is a small difference of large terms, f = k (z - x): the last digit of x is k units of it. The end of an
+implicit step tells it without them, from the states' increments. So where an implicit method runs the system, L and
+R_x f take slopes that the method puts into states of their own.
 """
 
 from __future__ import annotations
@@ -27,7 +31,17 @@ from hsdsl.sensitivity.dependence import Dependence, Jump
 from hsdsl.sensitivity.derivatives import Derivatives
 from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.overrides import Overridden
-from hsdsl.sensitivity.state_names import ERROR, LAST, SPAN, UNIT, derivative_name, rate_name, shift_name
+from hsdsl.sensitivity.state_names import (
+    ERROR,
+    LAST,
+    MEASURED,
+    SPAN,
+    UNIT,
+    derivative_name,
+    rate_name,
+    shift_name,
+    slope_name,
+)
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, started
 
 
@@ -61,6 +75,7 @@ class _Writer:
         self.start = self._start(given, by)
         self.dependence = Dependence(self.of, self.start, self.base.initial.mode)
         self.columns = self.of.columns
+        self.flowing = {m.name: [x for x, f in zip(m.states, m.flow, strict=True) if f != 0] for m in self.base.modes}
 
     def system(self) -> HybridSystem:
         """The whole system."""
@@ -107,6 +122,24 @@ class _Writer:
         yield from (shift_name(self.labels[k]) for k in self._shifting(mode))
         if self.entries:
             yield LAST
+        if measured := self._measured(mode):
+            yield from (*map(slope_name, measured), MEASURED)
+
+    def _measured(self, mode: str) -> list[str]:
+        """The states of a mode whose slopes decide how its transitions move."""
+        jumps = self.dependence.jumps[mode] if self.implicit and self.dependence.times else ()
+        rows = [
+            row for j in jumps for row in (j.guard, *(r for r, leap in zip(j.resets, j.leaps, strict=True) if leap))
+        ]
+        return [x for x in self.flowing[mode] if any(symbol(x) in row for row in rows)]
+
+    def _slopes(self, mode: Mode) -> list[sp.Expr]:
+        """The flow of a mode at the end of an arc, measured where it is."""
+        measured, known = self._measured(mode.name), symbol(MEASURED)
+        return [
+            (1 - known) * f + known * symbol(slope_name(x)) if x in measured else f
+            for x, f in zip(mode.states, mode.flow, strict=True)
+        ]
 
     def _pairs(self, mode: str, names: Sequence[str]) -> list[tuple[str, int]]:
         return [(x, k) for x in names for k in self.columns if (mode, x, k) in self.dependence.states]
@@ -132,6 +165,7 @@ class _Writer:
         return replace(
             mode,
             derived=0 if self.implicit else len(states) - len(mode.states),
+            measured=tuple(map(mode.states.index, self._measured(mode.name))) if mode.states else (),
             states=states,
             flow=(*mode.flow, *derivatives, *still),
             flow_texts=(*mode.flow_texts, *(f"the {name}" for name in states[len(mode.flow) :])),
@@ -156,12 +190,16 @@ class _Writer:
     def _edge(self, mode: Mode, edge: Edge, jump: Jump) -> Edge:
         shifts, entered = self._shifts(mode, edge, jump), self.dependence.entered(mode, edge)
         rows = dict(zip(edge.target_states, zip(jump.resets, jump.leaps, strict=True), strict=True))
+        slopes, after = self._slopes(mode), dict(zip(edge.target_states, jump.after, strict=True))
+        leaps = {
+            x: self.of.along(row, mode, slopes) - after[x] if leap != 0 else leap for x, (row, leap) in rows.items()
+        }
         derivatives = [
-            self._total(rows[x][0], mode, k) + rows[x][1] * shifts[k]
-            for x, k in self._pairs(entered, edge.target_states)
+            self._total(rows[x][0], mode, k) + leaps[x] * shifts[k] for x, k in self._pairs(entered, edge.target_states)
         ]
         states = tuple(self._states(entered, edge.target_states))
         further = (*derivatives, *(shifts[k] for k in self._shifting(entered)), *([TIME] if self.entries else []))
+        further = (*further, *[sp.S.Zero] * (len(states) - len(edge.reset) - len(further)))  # nothing is measured yet
         texts = (*edge.reset_texts, *(f"the {name}" for name in states[len(edge.reset) :]))
         reset = (*edge.reset, *further)
         return replace(edge, target_states=states, reset=reset, reset_texts=texts, derived=len(further))
@@ -172,8 +210,9 @@ class _Writer:
         A surface that rises at the rate a and bends by b stays crossed while it moves by less than a**2 / (2 |b|).
         """
         (bends,) = self.of.rows([jump.rate], mode.states)
-        margin = jump.rate**2 - 2 * absolute(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
-        return jump.rate * maximum(sign(margin), sp.S.Zero)
+        rate = self.of.along(jump.guard, mode, self._slopes(mode))
+        margin = rate**2 - 2 * absolute(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
+        return rate * maximum(sign(margin), sp.S.Zero)
 
     def _sizes(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
         """The sizes of the numbers that a guard is computed from."""

@@ -17,12 +17,16 @@ from hsdsl.system import Edge, Mode
 
 @dataclass(frozen=True)
 class Jump:
-    """The derivatives of an edge: of its guard and each reset, the guard's rate, and R_t + R_x f - g of each state."""
+    """The derivatives of an edge: of its guard and each reset, the guard's rate, and R_t + R_x f - g of each state.
+
+    ``after`` is g, the flow where the reset leads.
+    """
 
     guard: Slopes
     resets: list[Slopes]
     rate: sp.Expr
     leaps: list[sp.Expr]
+    after: list[sp.Expr]
 
 
 class Dependence:
@@ -52,7 +56,7 @@ class Dependence:
         guard, *resets = self._of.rows([edge.surface.residual, *edge.reset], mode.states)
         after = self._flow_after(edge)
         leaps = [self._of.along(row, mode) - g for row, g in zip(resets, after, strict=True)]
-        return Jump(guard, resets, self._of.along(guard, mode), leaps)
+        return Jump(guard, resets, self._of.along(guard, mode), leaps, after)
 
     def _flow_after(self, edge: Edge) -> list:
         """The flow of the target where the reset leads; that of a final mode without one is zero."""

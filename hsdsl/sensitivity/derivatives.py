@@ -46,9 +46,9 @@ class Derivatives:
         through = (row.get(symbol(name), sp.S.Zero) * rise for name, rise in self._rises.items())
         return sp.Add(row.get(TIME, sp.S.Zero), *through)
 
-    def along(self, row: Slopes, mode: Mode) -> sp.Expr:
-        """The derivative of an expression along the flow of a mode."""
-        flow = zip(map(symbol, mode.states), mode.flow, strict=True)
+    def along(self, row: Slopes, mode: Mode, slopes: Sequence[sp.Expr] | None = None) -> sp.Expr:
+        """The derivative of an expression along the flow of a mode, or along slopes of its states."""
+        flow = zip(map(symbol, mode.states), slopes or mode.flow, strict=True)
         return sp.Add(self.by_time(row), *(row.get(x, sp.S.Zero) * f for x, f in flow))
 
     def _differentiate(self, given: SampledInput) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import landing, parted
-from hsdsl.sensitivity.state_names import derivative_name, own, rate_name, shift_name
+from hsdsl.sensitivity.state_names import MEASURED, derivative_name, own, rate_name, shift_name, slope_name
 from hsdsl.sensitivity.ties import Tie, ties
 from hsdsl.sensitivity.touching import touched
 from hsdsl.simulate import Prepared
@@ -264,6 +264,8 @@ class Sensitivity:
         if not any(moves != 0 for moves in time.values()):
             return found
         slope = self._flow(mode, t, [state[x] for x in names], after)
+        if state.get(MEASURED):  # at the end of an arc
+            slope = [state.get(slope_name(x), f) for x, f in zip(names, slope, strict=True)]
         return {x: {by: row[by] + f * time[by] for by in row} for (x, row), f in zip(found.items(), slope, strict=True)}
 
     def _flow(self, mode: str, t: Any, x: Sequence[Any], after: bool) -> Sequence[Any]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 UNIT, SPAN, ERROR = "unit round-off", "length of the run", "error of the run"  # parameters, given by numbers
 LAST = "time of the last transition"
+MEASURED = "slopes are measured"  # 1 where a step's end told them
 
 
 def own(names: Iterable[str]) -> tuple[str, ...]:
@@ -24,6 +25,11 @@ def derivative_name(state: str, by: str) -> str:
 def rate_name(output: str) -> str:
     """The derivative of an output along the flow."""
     return f"d {output} / d t"
+
+
+def slope_name(state: str) -> str:
+    """The slope of a state as the end of a step tells it."""
+    return f"slope of {state}"
 
 
 def shift_name(by: str) -> str:

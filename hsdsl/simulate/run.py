@@ -66,7 +66,8 @@ class Run(Problem):
             jacobian = self.kernel.jacobian(mode, here.segment.data)
             smooth, scales = not here.mode.jumps, here.arc.scales
             pattern = here.mode.jacobian.elimination
-            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, pattern)
+            own = pattern, here.mode.measured
+            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own)
         series = self.kernel.taylor(mode, here.segment.data)
         assert series is not None
         return taylor_stepper(method, series, self.arithmetic)

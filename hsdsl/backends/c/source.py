@@ -175,6 +175,8 @@ class _Writer:
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
+            str(len(mode.measured)),
+            self.table("int", "measured", list(map(str, mode.measured))),
         ]
         return f"{{{', '.join(fields)}}}"
 

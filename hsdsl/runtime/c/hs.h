@@ -96,6 +96,8 @@ typedef struct {
   int jumps;               /* whether the flow has `sign` or `floor` */
   const int *state;        /* for each state its number among those of all modes */
   int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
+  int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */
+  const int *measured;
 } hs_mode;
 
 typedef struct {

@@ -27,7 +27,7 @@ typedef struct {
   hs_real node[3], power[3][3];
   hs_real gamma, alpha, beta, mix[3][3], unmix[3][3];
   hs_real estimate[3];
-  hs_real share, value[3], slope[3];
+  hs_real share, value[3], slope[3], end_slope[3];
 } hs_collocation;
 
 /* Fields between `degree` and `collocation` are those of tables; `collocation` is that of Radau IIA. */

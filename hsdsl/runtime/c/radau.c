@@ -264,12 +264,40 @@ static int radau_step(hs_run *run, hs_time t, hs_real h) {
   }
 }
 
+/* The sum of the absolute terms of a state's derivative at run->z, as the flow's derivatives tell. */
+static hs_real terms_of(const hs_run *run, int state) {
+  const hs_sparse *const rows = &run->here.table->jacobian;
+  const int n = run->here.dimension, sparse = run->here.table->elimination != 0;
+  hs_real total = 0.0;
+  for (int i = 0; i < rows->count; i++) {
+    const int place = rows->place[i];
+    if (place / n == state) total = total + fabs(run->radau.rows[sparse ? i : place] * run->z[place % n]);
+  }
+  return total;
+}
+
+/* The slopes of measured states at a step's end, run->z, where they belong. See Steps._slopes. */
+static int radau_slopes(hs_run *run, hs_time t, hs_real h) {
+  const hs_mode *const mode = run->here.table;
+  const hs_real *const w = run->method->collocation->end_slope, size = fabs(w[0]) + fabs(w[1]) + fabs(w[2]);
+  hs_real *const *const z = run->radau.z, *const found = run->z + run->here.dimension - 1 - mode->measures;
+  if (!mode->measures) return 0;
+  if (mode->flow(run->here.p, t + h, run->z, run->at)) return NO_VALUE;
+  for (int k = 0; k < mode->measures; k++) {
+    const int i = mode->measured[k];
+    const int cancels = h * terms_of(run, i) > size * hs_max(fabs(run->x[i]), fabs(run->z[i]));
+    found[k] = cancels ? (w[0] * z[0][i] + w[1] * z[1][i] + w[2] * z[2][i]) / h : run->at[i];
+  }
+  found[mode->measures] = 1.0;
+  return 0;
+}
+
 /* Make a part of the last step, solved to round-off: its end, run->z, is a smooth function of its length. */
 static int radau_landing(hs_run *run, hs_time t, hs_real h) {
   const int status = solved_exactly(run, t, h);
   if (status) return status;
   for (int s = 0; s < run->here.dimension; s++) run->z[s] = run->x[s] + run->radau.z[2][s];
-  return 0;
+  return radau_slopes(run, t, h);
 }
 
 /* The polynomial through the increments. */
