@@ -74,6 +74,13 @@ class Experiment(NamedTuple):
         given = self._asdict()
         return values_of(given.pop("overrides")) | with_method(given) | more
 
+    def in_numbers(self) -> bool:
+        """Whether all values are numbers, and no expressions of the model's parameters."""
+        given = [self.until, self.step, self.tolerance, self.relaxation]
+        return all(
+            map(_is_number, [text for text in given if text] + [o.partition("=")[2] for o in self.overrides or ()])
+        )
+
 
 class Located(NamedTuple):
     """Options of runs whose derivatives are taken: an adaptive method by scheme `located`."""
@@ -117,6 +124,14 @@ def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None
     """Report errors, and apply the limits while the command runs."""
     with errors_reported(json), applied(limit_options(allow_path or (), limit or ())):
         yield
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:

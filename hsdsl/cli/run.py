@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Exit, Option
 
+from hsdsl import ahead
 from hsdsl.cli.console import progress, say
 from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, option
 from hsdsl.cli.shown import needed, shown_of, write_film
 from hsdsl.cli.texts import STATE, check_target, known_names, pairs_of
 from hsdsl.errors import UsageError
+from hsdsl.files import ModelFiles, read_bytes
 from hsdsl.interrupts import INTERRUPTED
 from hsdsl.names import visible
 from hsdsl.progress import running
@@ -52,7 +54,10 @@ def run(
     """Simulate a model and summarise what happened."""
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
-        loaded = _load(model, engine, precision, experiment.scheme)
+        text = read_bytes(model)
+        if outputs is None and plot is None and animate is None and experiment.in_numbers():
+            ahead.begin(ModelFiles.read(model, None, text))
+        loaded = _load(model, text, engine, precision, experiment.scheme)
         settings = experiment.settings(engine=engine, precision=precision)
         names = chosen_names(outputs, loaded.columns)
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
@@ -92,12 +97,10 @@ def _check_files(out: Path | None, plot: Path | None, animate: Path | None, outp
     check_target(animate, "--animate", (".gif", ".mp4"))
 
 
-def _load(path: Path, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:
+def _load(path: Path, text: bytes, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:
     """Load a model, and its compiled code at the same time."""
-    from hsdsl.files import read_bytes
     from hsdsl.model import engines, load
 
-    text = read_bytes(path)
     engines.begin(engine, precision, scheme)
     return load(path, text=text)
 

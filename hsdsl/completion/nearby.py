@@ -8,14 +8,16 @@ import math
 import random
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode
+
+if TYPE_CHECKING:
+    import numpy as np
 
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
@@ -116,6 +118,8 @@ def cancelled(value: sp.Expr) -> sp.Expr:
 
 def fixed_point(near: Nearby) -> Point | None:
     """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
+    import numpy as np  # few models need it
+
     equations, flows = [near.guard, *near.moved], near.flows()
     free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
     names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
@@ -142,10 +146,14 @@ def value_at(value: sp.Expr, at: Point) -> float:
 
 
 def _values_at(matrix: sp.Matrix, at: Point) -> np.ndarray:
+    import numpy as np
+
     return np.array([[value_at(value, at) for value in row] for row in matrix.tolist()]).reshape(matrix.shape)
 
 
 def rank(matrix: sp.Matrix, at: Point) -> int:
     """The rank of a matrix at a point; 0 where it has no finite value."""
+    import numpy as np
+
     numbers = _values_at(matrix, at)
     return int(np.linalg.matrix_rank(numbers, rtol=SMALL)) if np.all(np.isfinite(numbers)) else 0

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from hsdsl.sparsity import filled
 
 LEAST = 16  # unknowns: of fewer the dense elimination, which exchanges rows, is as fast
@@ -27,13 +25,13 @@ def ordering(places: Sequence[int], n: int) -> tuple[int, ...]:
 
 
 def _moved(places: Sequence[int], order: Sequence[int]) -> list[tuple[int, int]]:
-    n = len(order)
-    position = np.argsort(order).tolist()
+    n, position = len(order), {k: i for i, k in enumerate(order)}
     return [(position[k // n], position[k % n]) for k in places]
 
 
 def _orders(places: Sequence[int], n: int) -> Iterator[tuple[int, ...]]:
     """Orders of minimum degree and of small bandwidth; SuperLU gives the first as a permutation or its inverse."""
+    import numpy as np
     from scipy.sparse import csc_matrix, eye
     from scipy.sparse.csgraph import reverse_cuthill_mckee
     from scipy.sparse.linalg import splu

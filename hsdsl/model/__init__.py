@@ -3,7 +3,7 @@
 ================= ==========================================================================================
 ``model``         :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
 ``pipeline``      its stages, each made once: mathematics, program, kernels, compiled code
-``program_cache`` programs of models read before; ``call_cache`` runs prepared for the last calls
+``call_cache``    runs prepared for the last calls
 ``options``       options of the file, of ``--set`` and of a call
 ``values``        parameters, constants and initial states, of one run or of many instances
 ``settings``      the numbers of a run; ``automatic`` chooses its method, ``engines`` its loop

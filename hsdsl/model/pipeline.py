@@ -10,12 +10,13 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from hsdsl import ahead, program_cache
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
 from hsdsl.files import ModelFiles
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
-from hsdsl.model import automatic, engines, program_cache
+from hsdsl.model import automatic, engines
 from hsdsl.model.options import FILE, KEYS, Options, overrides_of, recorded, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
@@ -38,6 +39,12 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
     if cached is not None:
         program, files = cached
         return Pipeline(None, time.perf_counter() - began, files, program)
+    lowered = ahead.taken(files)
+    if lowered is not None:
+        program, files = lowered
+        made = Pipeline(None, time.perf_counter() - began, files, program)
+        made.keep(program)
+        return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
 
@@ -132,12 +139,13 @@ class Pipeline:
         system = self.system
         with self._stage():
             program = replace(lower(system), left_out=self._left_out)
-        if program.method in (None, "auto", *METHODS):  # else it is refused, with its place
-            self._keep(program, self._part)
+        self.keep(program, self._part)
         return program
 
-    def _keep(self, program: Program, part: program_cache.Part) -> None:
-        if self._files is not None and not self._slides:
+    def keep(self, program: Program, part: program_cache.Part = ()) -> None:
+        """Keep a program for later runs."""
+        known = program.method in (None, "auto", *METHODS)  # else it is refused, with its place
+        if known and self._files is not None and not self._slides:
             program_cache.keep(self._files, program, part)
 
     @property
@@ -241,7 +249,7 @@ class Pipeline:
 
         system = only(self.system, names)
         if system is self.system:
-            self._keep(self.program, part)
+            self.keep(self.program, part)
             return self
         spent = self.seconds["load"] + time.perf_counter() - began
         return Pipeline(system, spent, self._files, part=part, left_out=left_out(self.system, system))

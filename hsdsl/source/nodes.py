@@ -99,6 +99,10 @@ class Key(str):
         key.place = place
         return key
 
+    def __reduce__(self) -> tuple[type[str], tuple[str]]:
+        """Pickle the text: its place is of use only where the file is read."""
+        return str, (str(self),)
+
 
 @dataclass(frozen=True, eq=False)
 class Mapping:

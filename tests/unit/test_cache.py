@@ -19,11 +19,11 @@ import pytest
 from engines import alike, needs_compiler
 
 import hsdsl
-from hsdsl import cache
+from hsdsl import cache, program_cache
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
-from hsdsl.model import engines, program_cache
+from hsdsl.model import engines
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
 
@@ -331,7 +331,8 @@ def test_what_is_no_program_is_not_taken(folder: Path) -> None:
 def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
     command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
     said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
-    assert "sympy" in said[0][-1] and said[1][-1] == "[]"
+    by_another_process = program == LIGHT_COMMAND  # see `hsdsl.ahead`
+    assert ("sympy" in said[0][-1] or by_another_process) and said[1][-1] == "[]"
 
 
 PYTHON_LOOP = tuple(f"hsdsl.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching"))

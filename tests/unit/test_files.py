@@ -12,13 +12,12 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl import limits, store
+from hsdsl import limits, program_cache, store
 from hsdsl.cache import key_of
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.files import data, read_bytes
 from hsdsl.limits import Limits, applied
 from hsdsl.lint.fix import fix
-from hsdsl.model import program_cache
 
 posix = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX files")
 MODEL = """hsdsl: 1
@@ -47,8 +46,8 @@ def replaced(path: Path, text: str) -> None:
 
 
 # The name of a step of loading, and where it is looked up.
-STEPS = ["hsdsl.model.program_cache.find", "hsdsl.elaborate.decode", "hsdsl.elaborate.compose",
-         "hsdsl.model.program_cache.keep",
+STEPS = ["hsdsl.program_cache.find", "hsdsl.elaborate.decode", "hsdsl.elaborate.compose",
+         "hsdsl.program_cache.keep",
          "hsdsl.elaborate.define_inputs", "hsdsl.lower.lower", "hsdsl.cache.keep", "hsdsl.cache.find"]  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from hsdsl.backends.c import model_source
 from hsdsl.backends.c.pieces import LONGEST
 from hsdsl.integrators.sparse import sparse_factored, sparse_factored_complex
 from hsdsl.lower.ordering import ordering
-from hsdsl.model.program_cache import _rows
+from hsdsl.program_cache import _rows
 from hsdsl.sparsity import elimination
 
 SIZES = 70, 140

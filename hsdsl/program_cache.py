@@ -28,7 +28,7 @@ from hsdsl.files import DataRefused, ModelFiles
 from hsdsl.program import Program
 
 KIND = "programs"
-_PACKAGE = Path(__file__).parents[1]
+_PACKAGE = Path(__file__).parent
 # what a program depends on, besides the modules of the package itself
 _READERS = ("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model")
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
@@ -67,6 +67,12 @@ def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | Non
             if entry is not None:
                 return _verified(json.loads(entry.read_bytes()), files)
     return None
+
+
+def is_kept(files: ModelFiles) -> bool:
+    """Whether there seems to be an entry of a model: :func:`find` looks closer."""
+    supposed = files.with_data({}), files
+    return any((store.folder() / KIND / key_of(each)).is_dir() for each in supposed)
 
 
 def _verified(entry: dict[str, Any], files: ModelFiles) -> tuple[Program, ModelFiles]:

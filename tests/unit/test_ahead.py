@@ -1,0 +1,67 @@
+"""A model lowered in another process is the one lowered here, and its errors are the same."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from hsdsl import ahead
+from hsdsl.elaborate import elaborate_files
+from hsdsl.errors import ModelError
+from hsdsl.files import ModelFiles
+from hsdsl.lower import lower
+
+MODELS = Path(__file__).parents[2] / "models"
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no other process elsewhere")
+
+
+@pytest.fixture(autouse=True)
+def loaded(monkeypatch, tmp_path):
+    """Begin although much is loaded in this process, with nothing in the cache."""
+    monkeypatch.setattr(ahead, "_saves_time", lambda: True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def test_the_program_and_its_files_are_those_made_here():
+    files = ModelFiles.read(MODELS / "digital-control.yaml")
+    ahead.begin(files)
+    program, complete = ahead.taken(files) or pytest.fail("no answer")
+    system = elaborate_files(files).system
+    assert program == lower(system)
+    assert complete == files.with_data(system.files)
+    assert ahead.taken(files) is None
+
+
+def test_errors_are_those_found_here():
+    text = b"hsdsl: 1\nmodes: {a: {flow: {x: y + (}}}\ninitial: {mode: b, x: 0}\nexperiment: {until: 1}\n"
+    files = ModelFiles.read("bad.yaml", None, text)
+    ahead.begin(files)
+    with pytest.raises(ModelError) as there:
+        ahead.taken(files)
+    with pytest.raises(ModelError) as here:
+        elaborate_files(files)
+    assert there.value.diagnostics == here.value.diagnostics
+    assert len(here.value.diagnostics) > 1
+
+
+def test_without_an_answer_there_is_none():
+    files = ModelFiles.read(MODELS / "thermostat.yaml")
+    ahead.begin(files)
+    (other,) = ahead._begun
+    os.kill(other.process, signal.SIGKILL)
+    assert ahead.taken(files) is None
+
+
+def test_another_model_is_not_taken_for_it_and_nothing_is_left():
+    files = ModelFiles.read(MODELS / "thermostat.yaml")
+    ahead.begin(files)
+    (other,) = ahead._begun
+    assert ahead.taken(ModelFiles.read(MODELS / "bouncing-ball.yaml")) is None
+    ahead._end_all()
+    assert not ahead._begun
+    with pytest.raises(ProcessLookupError):
+        os.kill(other.process, 0)
