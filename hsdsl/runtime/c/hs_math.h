@@ -31,10 +31,24 @@ static inline hs_real hs_checked(hs_real r, hs_real x, int *bad) {
   return r;
 }
 
+/* Of a number these have a finite value or none: no branch is compiled for others. */
+static inline hs_real hs_sin(hs_real x, int *bad) {
+  const hs_real r = sin(x);
+  *bad |= (r != r) & (x == x);
+  return r;
+}
+static inline hs_real hs_cos(hs_real x, int *bad) {
+  const hs_real r = cos(x);
+  *bad |= (r != r) & (x == x);
+  return r;
+}
+static inline hs_real hs_sqrt(hs_real x, int *bad) {
+  *bad |= x < 0.0;
+  return sqrt(x);
+}
+
 #define HS_FUNCTION(name) \
   static inline hs_real hs_##name(hs_real x, int *bad) { return hs_checked(name(x), x, bad); }
-HS_FUNCTION(sin)
-HS_FUNCTION(cos)
 HS_FUNCTION(tan)
 HS_FUNCTION(asin)
 HS_FUNCTION(acos)
@@ -47,7 +61,6 @@ HS_FUNCTION(acosh)
 HS_FUNCTION(atanh)
 HS_FUNCTION(exp)
 HS_FUNCTION(log)
-HS_FUNCTION(sqrt)
 #undef HS_FUNCTION
 
 static inline hs_real hs_pow(hs_real x, hs_real y, int *bad) {

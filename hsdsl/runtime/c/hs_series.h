@@ -9,6 +9,11 @@
 #include "hs_math.h"
 
 #define HS_INTEGER_POWERS 64
+#if defined(__GNUC__)
+#define HS_CALLED __attribute__((noinline, unused)) /* as fast as copies, which take long to compile */
+#else
+#define HS_CALLED inline
+#endif
 
 static const hs_real hs_inverse[HS_MOST_ORDER + 2] = {
   0.0, 1.0 / 1, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10, 1.0 / 11, 1.0
@@ -24,9 +29,9 @@ static inline hs_real hs_pairs(int k, const hs_real *a, const hs_real *b, int fi
   return low + high;
 }
 
-static inline hs_real hs_product(int k, const hs_real *a, const hs_real *b) { return hs_pairs(k, a, b, 0); }
+static HS_CALLED hs_real hs_product(int k, const hs_real *a, const hs_real *b) { return hs_pairs(k, a, b, 0); }
 
-static inline hs_real hs_behind(int k, const hs_real *a, const hs_real *b) {
+static HS_CALLED hs_real hs_behind(int k, const hs_real *a, const hs_real *b) {
   return hs_pairs(k, a, b, 1) + a[k] * b[0];
 }
 
@@ -36,23 +41,23 @@ static inline hs_real hs_few(int k, const hs_real *a, const hs_real *b, int last
   return total;
 }
 
-static inline hs_real hs_symmetric(int k, const hs_real *a, int first) {
+static HS_CALLED hs_real hs_symmetric(int k, const hs_real *a, int first) {
   hs_real total = 0.0;
   for (int j = (k - 1) / 2; j >= first; j--) total = total + a[j] * a[k - j];
   total = 2 * total;
   return k % 2 ? total : total + a[k / 2] * a[k / 2];
 }
 
-static inline hs_real hs_square(int k, const hs_real *a) { return hs_symmetric(k, a, 0); }
+static HS_CALLED hs_real hs_square(int k, const hs_real *a) { return hs_symmetric(k, a, 0); }
 
 static inline hs_real hs_below(hs_real s, hs_real bound, hs_real a, hs_real b) { return s < bound ? a : b; }
 
-static inline hs_real hs_root(int k, const hs_real *z, hs_real a, int *bad) {
+static HS_CALLED hs_real hs_root(int k, const hs_real *z, hs_real a, int *bad) {
   return hs_div(a - hs_symmetric(k, z, 1), 2 * z[0], bad);
 }
 
 /* In place, from the last coefficient down: each asks for those before it only. */
-static inline hs_real hs_repeated(int k, const hs_real *a, int c) {
+static HS_CALLED hs_real hs_repeated(int k, const hs_real *a, int c) {
   hs_real z[HS_MOST_ORDER + 1] = {1.0};
   for (int n = 0; n < c; n++) {
     for (int i = k; i > 0; i--) z[i] = hs_product(i, a, z);
@@ -61,7 +66,7 @@ static inline hs_real hs_repeated(int k, const hs_real *a, int c) {
   return z[k];
 }
 
-static inline hs_real hs_power(int k, const hs_real *z, const hs_real *a, hs_real c, int *bad) {
+static HS_CALLED hs_real hs_power(int k, const hs_real *z, const hs_real *a, hs_real c, int *bad) {
   if (a[0] == 0) {
     *bad |= !hs_finite(c);
     if (c == trunc(c) && 0 <= c && c <= HS_INTEGER_POWERS) return hs_repeated(k, a, (int)c);
