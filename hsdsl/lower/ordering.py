@@ -30,7 +30,13 @@ def _moved(places: Sequence[int], order: Sequence[int]) -> list[tuple[int, int]]
 
 
 def _orders(places: Sequence[int], n: int) -> Iterator[tuple[int, ...]]:
-    """Orders of minimum degree and of small bandwidth; SuperLU gives the first as a permutation or its inverse."""
+    """Orders of minimum degree and of small bandwidth; SuperLU gives the first as a permutation or its inverse.
+
+    For few unknowns it is the written one and its reverse: to load SciPy would cost more than another order saves.
+    """
+    if n < LEAST:
+        yield from (tuple(range(n)), tuple(reversed(range(n))))
+        return
     import numpy as np
     from scipy.sparse import csc_matrix, eye
     from scipy.sparse.csgraph import reverse_cuthill_mckee
