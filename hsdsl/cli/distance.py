@@ -15,11 +15,13 @@ from hsdsl.cli.options import AllowPath, Json, Limit, Metric, answering, option,
 from hsdsl.cli.saved import run_of
 from hsdsl.cli.texts import check_target, names_of
 from hsdsl.errors import UsageError
+from hsdsl.metrics.table import CURVE_METRICS, POINT_METRICS
 
 SET = "Override a parameter. May be repeated."
 FIRST = "The model file, or a run: a saved one (.npz), or a model's own experiment."
 FROM = 'A mode and all its states: "free x=13 v=5"; values are expressions.'
-METRIC = "Between states: quotient or relaxed. Between runs: rho, rho-hat, sup, skorokhod or tau-epsilon."
+_OF_RUNS = [name for name in CURVE_METRICS if name not in POINT_METRICS]
+METRIC = f"Between states: {' or '.join(POINT_METRICS)}. Between runs: {', '.join(_OF_RUNS[:-1])} or {_OF_RUNS[-1]}."
 DEPTH = "Depth of the strips, for the relaxed metric; else the file's."
 PLOT = "Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg."
 HOPS = "The most passages of a path; else eight more than the fewest that connect the modes."
@@ -44,7 +46,7 @@ def distance(
 ) -> None:
     """Measure the distance between two states, or two runs, in the hybrid metric."""
     with answering(json, allow_path, limit):
-        parameters = _parameters(overrides)
+        parameters, metric = _parameters(overrides), metric and str(metric)
         options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
         check_target(plot, "--plot", (".png", ".svg"))
         if second is not None:

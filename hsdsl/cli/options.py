@@ -15,6 +15,7 @@ from hsdsl.cli.console import errors_reported, print_json
 from hsdsl.cli.texts import limit_options
 from hsdsl.integrators import METHODS
 from hsdsl.limits import NUMBERS, applied
+from hsdsl.metrics.table import CURVE_METRICS
 
 
 def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | None = None) -> Any:
@@ -25,11 +26,11 @@ def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | 
 Scheme = Literal["relaxed", "located", "paoli-schatzman"]
 Completion = Literal["contact", "auto", "none"]
 Engine = Literal["auto", "c", "python"]
-Metric = Literal["quotient", "relaxed", "rho", "rho-hat", "sup", "skorokhod", "tau-epsilon"]
 Format = Literal["text", "json", "sarif", "github"]
 if TYPE_CHECKING:
-    Method = str
+    Method = Metric = str
 else:
+    Metric = StrEnum("Metric", {name: name for name in CURVE_METRICS})
     Method = StrEnum("Method", {name: name for name in ("auto", *METHODS)})
 
 Model = Annotated[Path, Argument(metavar="MODEL", help="The model file.", autocompletion=model_files)]

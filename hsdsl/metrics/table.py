@@ -1,20 +1,21 @@
-"""The table of distances between executions: a name, and the function that computes it."""
+"""The table of distances between executions: a name, the function that computes it, and the options that it takes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
-from hsdsl.metrics.curves import CurveDistance, rho
-from hsdsl.metrics.labelled_sup import rho_hat, sup_norm
-from hsdsl.metrics.points import SpaceMetric
-from hsdsl.metrics.skorokhod import skorokhod
-from hsdsl.metrics.tau_epsilon import tau_epsilon
 from hsdsl.names import did_you_mean
 
-SpaceMaker = Callable[[float | None], SpaceMetric]  # the model's, relaxed or not
+if TYPE_CHECKING:
+    from hsdsl.execution import Execution
+    from hsdsl.metrics.curves import CurveDistance
+    from hsdsl.metrics.points import SpaceMetric
+
+SpaceMaker = Callable[[float | None], "SpaceMetric"]  # the model's, relaxed or not
 
 
 @dataclass(frozen=True)
@@ -29,35 +30,53 @@ class CurvePair:
     hops: int | None = None
 
 
-def _quotient(request: CurvePair) -> CurveDistance:
-    return rho(request.a, request.b, request.space(None))
+@dataclass(frozen=True)
+class CurveMetric:
+    """A distance: its function, in a module of `hsdsl.metrics`, and which fields of a pair it takes beyond the runs.
+
+    The module is imported when the distance is computed: the command line needs the names alone.
+    """
+
+    module: str
+    function: str
+    takes: tuple[str, ...] = ()
+
+    def __call__(self, pair: CurvePair) -> CurveDistance:
+        """Compute the distance."""
+        function = getattr(import_module(f"hsdsl.metrics.{self.module}"), self.function)
+        if "hops" in self.takes:
+            depth = _depth(pair) if self.relaxed(pair) else None
+            return function(pair.a, pair.b, pair.space(depth), relaxation=depth)
+        return function(pair.a, pair.b, *(getattr(pair, name) for name in self.takes))
+
+    def relaxed(self, pair: CurvePair) -> bool:
+        """Whether it measures on the relaxed space: always, or where the pair has a relaxation."""
+        return "relaxation" in self.takes and (pair.relaxation is not None or self is CURVE_METRICS["relaxed"])
 
 
-def _relaxed(request: CurvePair) -> CurveDistance:
-    relaxation = request.relaxation
+def _depth(pair: CurvePair) -> float:
+    relaxation = pair.relaxation
     if relaxation is None:
-        relaxation = max(float(run.settings.get("relaxation") or 0.0) for run in (request.a, request.b))
+        relaxation = max(float(run.settings.get("relaxation") or 0.0) for run in (pair.a, pair.b))
     if not relaxation > 0:
         raise UsageError("the relaxed space needs a positive relaxation, and these runs have none")
-    return rho(request.a, request.b, request.space(relaxation), relaxation=relaxation)
+    return relaxation
 
 
-def _rho(request: CurvePair) -> CurveDistance:
-    return _quotient(request) if request.relaxation is None else _relaxed(request)
-
-
-CURVE_METRICS: dict[str, Callable[[CurvePair], CurveDistance]] = {
-    "rho": _rho,  # largest quotient distance over time; with a relaxation, on the relaxed space
-    "quotient": _quotient,  # the same on the quotient space, a strip's points counting as the guard's
-    "relaxed": _relaxed,  # the same on the relaxed space, its strips as deep as the runs' own
-    "rho-hat": lambda r: rho_hat(r.a, r.b, r.coordinates),  # largest difference of states at the first run's samples
-    "sup": lambda r: sup_norm(r.a, r.b),  # largest difference of states, plus 1 in different modes
-    "skorokhod": lambda r: skorokhod(r.a, r.b),  # the same under the best retiming, which is paid for
-    "tau-epsilon": lambda r: tau_epsilon(r.a, r.b),  # closeness of hybrid arcs, jump by jump
+CURVE_METRICS = {
+    "rho": CurveMetric("curves", "rho", ("relaxation", "hops")),  # over time, as one of the next two
+    "quotient": CurveMetric("curves", "rho", ("hops",)),  # a strip's points count as the guard's
+    "relaxed": CurveMetric("curves", "rho", ("relaxation", "hops")),  # its strips as deep as the runs' own
+    "rho-hat": CurveMetric("labelled_sup", "rho_hat", ("coordinates",)),  # of states, at the first run's samples
+    "sup": CurveMetric("labelled_sup", "sup_norm"),  # largest difference of states, plus 1 in different modes
+    "skorokhod": CurveMetric("skorokhod", "skorokhod"),  # the same under the best retiming, which is paid for
+    "tau-epsilon": CurveMetric("tau_epsilon", "tau_epsilon"),  # closeness of hybrid arcs, jump by jump
 }
+POINT_METRICS = ("quotient", "relaxed")  # those that are also between points
 
-RELAXED = ("rho", "relaxed")
-ON_THE_SPACE = ("rho", "quotient", "relaxed")
+
+def _taking(option: str) -> list[str]:
+    return [name for name, metric in CURVE_METRICS.items() if option in metric.takes]
 
 
 def between(metric: str, request: CurvePair) -> CurveDistance:
@@ -65,12 +84,15 @@ def between(metric: str, request: CurvePair) -> CurveDistance:
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
     check_same_model(request.a, request.b)
-    if request.relaxation is not None and metric not in RELAXED:
-        raise UsageError(f"the distance '{metric}' has no relaxation", f"with one: {' or '.join(RELAXED)}")
-    if request.hops is not None and metric not in ON_THE_SPACE:
-        raise UsageError(f"the distance '{metric}' has no paths", f"hops are for {', '.join(ON_THE_SPACE)}")
-    if request.coordinates is not None and metric != "rho-hat":
-        raise UsageError(f"the distance '{metric}' takes all states; coordinates are for rho-hat")
+    takes = CURVE_METRICS[metric].takes
+    if request.relaxation is not None and "relaxation" not in takes:
+        raise UsageError(
+            f"the distance '{metric}' has no relaxation", f"with one: {' or '.join(_taking('relaxation'))}"
+        )
+    if request.hops is not None and "hops" not in takes:
+        raise UsageError(f"the distance '{metric}' has no paths", f"hops are for {', '.join(_taking('hops'))}")
+    if request.coordinates is not None and "coordinates" not in takes:
+        raise UsageError(f"the distance '{metric}' takes all states; coordinates are for {_taking('coordinates')[0]}")
     return replace(CURVE_METRICS[metric](request), metric=metric)
 
 

@@ -14,13 +14,12 @@ from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.geometry import TOLERANCE, Space
 from hsdsl.metrics.points import PointDistance, SpacePoint, coordinates, distance
 from hsdsl.metrics.space import make_space
-from hsdsl.metrics.table import CURVE_METRICS
+from hsdsl.metrics.table import CURVE_METRICS, POINT_METRICS
 from hsdsl.model.distances import check_hops
 from hsdsl.model.values import Values
 from hsdsl.names import did_you_mean
 from hsdsl.simulate.stops import show
 
-METRICS = ("quotient", "relaxed")
 _ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
@@ -35,12 +34,13 @@ def distance_of_points(
     plot: str | os.PathLike[str] | None = None,
 ) -> PointDistance:
     """Return how far apart two points of a model's space are; see `Model.distance`."""
-    if metric not in METRICS and metric in CURVE_METRICS:
+    if metric not in POINT_METRICS and metric in CURVE_METRICS:
         raise UsageError(
-            f"'{metric}' is a distance between runs, not between points", f"between points: {' or '.join(METRICS)}"
+            f"'{metric}' is a distance between runs, not between points",
+            f"between points: {' or '.join(POINT_METRICS)}",
         )
-    if metric not in METRICS:
-        raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, METRICS))
+    if metric not in POINT_METRICS:
+        raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, POINT_METRICS))
     if metric == "quotient" and relaxation is not None:
         raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
     depth = None if metric == "quotient" else _relaxation(values, relaxation)

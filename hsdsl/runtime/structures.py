@@ -2,13 +2,14 @@
 
 ``hs_task`` is the class :data:`Task`, a pointer in it an address, ``hs_arc`` also the NumPy type :data:`ARC`, and
 ``hs_reason`` the tuple :data:`REASONS` of its names in words: ``HS_UNTIL_IN_STRIP`` is "until in strip".
+:data:`STOPPED` has for each the word that an execution stops with.
 """
 
 from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from ctypes import c_double, c_int, c_int32, c_int64, c_void_p
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ HEADERS = ("hs.h", "hs_simulate.h", "hs_screen.h")
 FOLDER = Path(__file__).parent / "c"
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 ENUMERATION = re.compile(r"typedef enum \{([^}=]*)\} (\w+);")  # those that count from 0
+REASON = re.compile(r"\breason\(([A-Z_]+), (\w+)\)")  # of `HS_REASONS`
 STRUCTURE = re.compile(r"typedef struct(?: \w+)? \{([^}]*)\} (\w+);")
 CALLBACK = re.compile(r"int \(\*(\w+)\)\(([^)]*)\)")
 DECLARATOR = re.compile(r"(\**)(?:const )?(\**)(\w+)((?:\[\d+\])*)")
@@ -40,23 +42,25 @@ def _fields(text: str, types: dict[str, Any]) -> Iterator[tuple[str, Any]]:
             yield found[3], field
 
 
-def _read() -> tuple[dict[str, Any], dict[str, tuple[Any, ...]]]:
-    """Structures and enumerations by their names in C."""
+def _words(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(name.strip().removeprefix("HS_").lower().replace("_", " ") for name in names)
+
+
+def _read() -> tuple[dict[str, Any], dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Structures and enumerations by their names in C, and the words of :data:`STOPPED`."""
     text = COMMENT.sub("", "".join((FOLDER / name).read_text() for name in HEADERS))
+    names, stopped = zip(*REASON.findall(text), strict=True)
     types: dict[str, Any] = {"int": c_int, "int32_t": c_int32, "int64_t": c_int64}
     types |= dict.fromkeys(("double", "hs_real", "hs_time"), c_double)
     structures: dict[str, Any] = {}
     for body, name in STRUCTURE.findall(text):
         structure = type(name, (ctypes.Structure,), {"_fields_": [*_fields(body, types)]})
         types[name] = structures[name] = structure
-    words: dict[str, tuple[Any, ...]] = {
-        name: tuple(word.strip().removeprefix("HS_").lower().replace("_", " ") for word in body.split(","))
-        for body, name in ENUMERATION.findall(text)
-    }
-    return structures, words
+    words = {name: _words(body.split(",")) for body, name in ENUMERATION.findall(text)}
+    return structures, words | {"hs_reason": _words(names)}, stopped
 
 
-STRUCTURES, ENUMERATIONS = _read()
+STRUCTURES, ENUMERATIONS, STOPPED = _read()
 Mode, Edge, Model, Sparse = (STRUCTURES[f"hs_{name}"] for name in ("mode", "edge", "model", "sparse"))
 Row, Collocation, Method = (STRUCTURES[name] for name in ("hs_row", "hs_collocation", "hs_method"))
 Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline", "hs_interpolation", "hs_settings"))
@@ -68,15 +72,8 @@ ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_t
 METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, DOUBTS = (
     ENUMERATIONS[f"hs_{name}"]
     for name in (
-        "method_kind",
-        "interpolant",
-        "arc_kind",
-        "scheme",
-        "notice",
-        "reason",
-        "step_failure",
-        "operator",
-        "doubt",
+        *("method_kind", "interpolant", "arc_kind", "scheme", "notice"),
+        *("reason", "step_failure", "operator", "doubt"),
     )
 )
 

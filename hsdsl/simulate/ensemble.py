@@ -17,14 +17,6 @@ from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
 
 TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
-# why a run ends, by what the loop calls it; where it is stuck only its sentence tells
-ENDED = {
-    "until in strip": "until", "until on guard": "until", "limit": "transition_limit", "reset not finite": "not_finite",
-    "here not finite": "not_finite", "step not finite": "not_finite", "entered outside": "left_domain",
-    "left": "left_domain", "accumulated": "zeno",
-}  # fmt: skip
-
-
 LONGEST = f"U{max(map(len, REASONS))}"
 LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
 Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
@@ -115,7 +107,7 @@ class CompiledEnsemble:
         place.workspace.run_ensemble(table)
         if place.workspace.failed:
             raise place.workspace.failed[0]
-        known = np.array([*(ENDED.get(reason, reason) for reason in structures.REASONS), "interrupted"], LONGEST)
+        known = np.array([*structures.STOPPED, "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
         if kept.logs:
             kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))

@@ -1,7 +1,7 @@
 """Executions in NumPy's ``.npz``: arrays and one JSON text, nothing pickled, nothing lost.
 
 Multiprecision columns are decimal text with the digits that the stored precision (in bits) needs to read back the same
-numbers. The arcs are rows of integers: layout, kind, jump, first, last, where a layout is a mode with its states.
+numbers. The arcs are rows of integers: layout, kind, and their own, where a layout is a mode with its states.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from hsdsl.store.lossless import Lossless, numbers
 FORMAT = "hsdsl execution"
 VERSION = 1
 COLUMNS = {"times": 1, "values": 2, "outputs": 2, "depth": 1, "coefficients": 3}  # and their dimensions
+INTEGERS = tuple(field.name for field in fields(Arc) if field.type == "int")
 KINDS: tuple[Kind, ...] = ("flow", "strip")
 _TEXTS = ("model", "digest", "engine", "scheme", "method", "settings", "seconds", "digits", "title", "output_names")
 _BEGINNING = b"PK\x03\x04"
@@ -42,7 +43,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
     form = Lossless(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
     layouts = list(dict.fromkeys((arc.mode, arc.states) for arc in execution.arcs))
     order = {layout: i for i, layout in enumerate(layouts)}
-    arcs = [(order[a.mode, a.states], KINDS.index(a.kind), a.jump, a.first, a.last) for a in execution.arcs]
+    arcs = [(order[a.mode, a.states], KINDS.index(a.kind), *(getattr(a, n) for n in INTEGERS)) for a in execution.arcs]
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -112,8 +113,8 @@ def _read(archive: Mapping[str, Array]) -> Execution:
     form = Lossless(header["bits"], header["digits"])
     layouts = [(str(mode), tuple(states)) for mode, states in header["layouts"]]
     arcs = tuple(
-        Arc(*layouts[layout], KINDS[kind], jump, first, last)
-        for layout, kind, jump, first, last in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
+        Arc(*layouts[layout], KINDS[kind], *integers)
+        for layout, kind, *integers in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
     )
     fields: dict[str, Any] = {name: form.unpack(header[name]) for name in _TEXTS}
     fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have none

@@ -11,7 +11,6 @@ from typing import get_args
 import pytest
 
 from hsdsl.cli import options
-from hsdsl.metrics.table import CURVE_METRICS
 from hsdsl.model.engines import ENGINES
 from hsdsl.simulate import SCHEMES
 
@@ -86,7 +85,6 @@ def test_codes(shell: str) -> None:
 def test_choices_are_what_there_is() -> None:
     assert get_args(options.Scheme) == tuple(SCHEMES)
     assert get_args(options.Engine) == ENGINES
-    assert set(get_args(options.Metric)) == set(CURVE_METRICS)
 
 
 @pytest.mark.parametrize(("shell", "script"), [("bash", ".bash_completions/hsdsl.sh"), ("zsh", ".zfunc/_hsdsl")])

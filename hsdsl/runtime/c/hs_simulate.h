@@ -139,22 +139,25 @@ typedef struct {
   int64_t *slot; /* one more than the place of a state, or 0 */
 } hs_visited;
 
-typedef enum {
-  HS_UNTIL,
-  HS_UNTIL_IN_STRIP,
-  HS_UNTIL_ON_GUARD,
-  HS_FINAL,
-  HS_ZENO,
-  HS_LIMIT,
-  HS_RESET_NOT_FINITE,
-  HS_HERE_NOT_FINITE,
-  HS_ENTERED_OUTSIDE,
-  HS_STUCK,
-  HS_INTERRUPTED,
-  HS_LEFT,
-  HS_STEP_NOT_FINITE,
-  HS_ACCUMULATED
-} hs_reason;
+/* Why a run ends: what the loop calls it, and the word for its users. Where it is stuck only the sentence tells. */
+#define HS_REASONS(reason)                \
+  reason(UNTIL, until)                    \
+  reason(UNTIL_IN_STRIP, until)           \
+  reason(UNTIL_ON_GUARD, until)           \
+  reason(FINAL, final)                    \
+  reason(ZENO, zeno)                      \
+  reason(LIMIT, transition_limit)         \
+  reason(RESET_NOT_FINITE, not_finite)    \
+  reason(HERE_NOT_FINITE, not_finite)     \
+  reason(ENTERED_OUTSIDE, left_domain)    \
+  reason(STUCK, stuck)                    \
+  reason(INTERRUPTED, interrupted)        \
+  reason(LEFT, left_domain)               \
+  reason(STEP_NOT_FINITE, not_finite)     \
+  reason(ACCUMULATED, zeno)
+#define HS_REASON_NAME(name, word) HS_##name,
+#define HS_REASON_WORD(name, word) #word,
+typedef enum { HS_REASONS(HS_REASON_NAME) HS_REASON_COUNT } hs_reason;
 
 typedef enum {
   HS_CLEAR,

@@ -176,20 +176,6 @@ static const char *stuck_word(const hs_stop *stop) {
 }
 
 const char *hs_stop_word(const hs_stop *stop) {
-  switch (stop->reason) {
-    case HS_UNTIL:
-    case HS_UNTIL_IN_STRIP:
-    case HS_UNTIL_ON_GUARD: return "until";
-    case HS_FINAL: return "final";
-    case HS_ZENO:
-    case HS_ACCUMULATED: return "zeno";
-    case HS_LIMIT: return "transition_limit";
-    case HS_RESET_NOT_FINITE:
-    case HS_HERE_NOT_FINITE:
-    case HS_STEP_NOT_FINITE: return "not_finite";
-    case HS_ENTERED_OUTSIDE:
-    case HS_LEFT: return "left_domain";
-    case HS_INTERRUPTED: return "interrupted";
-    default: return stuck_word(stop);
-  }
+  static const char *const words[] = {HS_REASONS(HS_REASON_WORD)};
+  return stop->reason == HS_STUCK ? stuck_word(stop) : words[stop->reason];
 }

@@ -41,7 +41,7 @@ function stopped(run) {
     "interrupted": `interrupted at ${time(t)}: a run in a page may take 10 s and 256 MB`,
     "accumulated": `zeno: ${run.notes.length ? noted(run.notes[run.notes.length - 1]) : time(t)}`,
   };
-  return sentences[model.reasons[reason]];
+  return sentences[model.reasons[reason]] ?? `${model.reasons[reason]} at ${time(t)}`;
 }
 
 function noted({kind, mode, surface, number, time: t, other}) {
