@@ -1,11 +1,14 @@
-"""What is known of the implicit method by its name; how it steps is in `hsdsl.integrators.radau`."""
+"""What is known of implicit methods by their names; how each steps is in a module that is imported by its run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from hsdsl.arithmetic import Arithmetic, Number
+
+if TYPE_CHECKING:
+    from hsdsl.integrators.stepper import Stepper
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,12 @@ class RadauMethod:
     def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> RadauMethod:
         """Return the method for a tolerance: itself."""
         return self
+
+    def stepper(self, *arguments: Any) -> Stepper:
+        """Make its step functions, as `hsdsl.integrators.radau.radau_stepper` does."""
+        from hsdsl.integrators.radau import radau_stepper
+
+        return radau_stepper(*arguments)
 
 
 RADAU = RadauMethod()

@@ -42,11 +42,11 @@ def _fields(text: str, types: dict[str, Any]) -> Iterator[tuple[str, Any]]:
             yield found[3], field
 
 
-def _words(names: Iterable[str]) -> tuple[str, ...]:
+def _words(names: Iterable[str]) -> tuple[Any, ...]:
     return tuple(name.strip().removeprefix("HS_").lower().replace("_", " ") for name in names)
 
 
-def _read() -> tuple[dict[str, Any], dict[str, tuple[str, ...]], tuple[str, ...]]:
+def _read() -> tuple[dict[str, Any], dict[str, tuple[Any, ...]], tuple[str, ...]]:
     """Structures and enumerations by their names in C, and the words of :data:`STOPPED`."""
     text = COMMENT.sub("", "".join((FOLDER / name).read_text() for name in HEADERS))
     names, stopped = zip(*REASON.findall(text), strict=True)

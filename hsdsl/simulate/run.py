@@ -60,17 +60,14 @@ class Run(Problem):
         if method.kind == "table":
             return stepper(method, len(here.x), self.arithmetic)
         mode = here.flow
-        if method.kind == "radau":
-            from hsdsl.integrators.radau import radau_stepper
-
-            jacobian = self.kernel.jacobian(mode, here.segment.data)
-            smooth, scales = not here.mode.jumps, here.arc.scales
-            pattern = here.mode.jacobian.elimination
-            own = pattern, here.mode.measured
-            return radau_stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own)
-        series = self.kernel.taylor(mode, here.segment.data)
-        assert series is not None
-        return taylor_stepper(method, series, self.arithmetic)
+        if method.kind == "taylor":
+            series = self.kernel.taylor(mode, here.segment.data)
+            assert series is not None
+            return taylor_stepper(method, series, self.arithmetic)
+        jacobian = self.kernel.jacobian(mode, here.segment.data)
+        smooth, scales = not here.mode.jumps, here.arc.scales
+        own = here.mode.jacobian.elimination, here.mode.measured
+        return method.stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own)
 
     def place(
         self,

@@ -32,20 +32,16 @@ static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
   const int again = run->here.t == control->failed_at;
   control->failed_at = run->here.t;
   if (!control->closer && !again) return ratio;
-  if (run->method->kind == HS_RADAU) {
-    radau_scales(run, run->here.t, h, 1);
-    ratio = ratio_to(run, h, run->radau.scales);
-  } else {
-    if (resolved(run, run->here.t, h, run->x, 0)) return ratio;
-    ratio = ratio_to(run, h, run->resolved);
-  }
+  const hs_real *const scales = closer_scales(run, h);
+  if (!scales) return ratio;
+  ratio = ratio_to(run, h, scales);
   control->closer = ratio <= 1;
   return ratio;
 }
 
 /* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */
 HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
-  const hs_real ratio = ratio_to(run, h, run->method->kind == HS_RADAU ? run->radau.scales : run->scales);
+  const hs_real ratio = ratio_to(run, h, error_scales(run));
   return !(ratio > 1) || run->here.table->jumps ? ratio : ratio_closer(run, h, ratio);
 }
 

@@ -82,7 +82,7 @@ static int blur(hs_run *run, int n, hs_time t1) {
   return 0;
 }
 
-/* Try a step of a table or of Radau IIA, or say what is in its way. */
+/* Try a step of a table or of an implicit method, or say what is in its way. */
 HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time t1) {
   hs_span *const span = &run->span;
   const hs_mode *mode = run->here.table;
@@ -103,11 +103,11 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
   }
   if (method_piece(run, span->t, h, &span->piece) || curves_along(run)) return HS_NOT_FINITE;
   if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
-  const int blurred = run->method->kind == HS_RADAU && run->control.tolerance > 0;
+  const int blurred = run->control.implicit && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
-/* Make one step of a table or of Radau IIA: rejected by the error estimate, halved where something has no value. */
+/* Make one step of a table or of an implicit method: rejected by the error estimate, halved where something has no value. */
 HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
   hs_control *const control = &run->control;
   const hs_time t = run->here.t;

@@ -78,15 +78,8 @@ static void sparse_solve_complex(int n, const hs_elimination *of, const hs_real 
                                  const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b,
                                  hs_real *restrict one, hs_real *restrict two);
 
-/* radau.c */
+/* newton.c, and what it calls of the implicit method */
 HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h);
-static void radau_forget(hs_radau *radau);
-static void radau_scales(hs_run *run, hs_time t, hs_real h, int closer);
-static int radau_step(hs_run *run, hs_time t, hs_real h);
-static int radau_landing(hs_run *run, hs_time t, hs_real h);
-static void radau_piece(const hs_run *run, hs_polynomial *piece);
-
-/* newton.c */
 HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h);
 HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h);
 
@@ -95,6 +88,10 @@ HS_INLINE int step(hs_run *run, int n, hs_time t, hs_real h);
 HS_INLINE int part_of_step(hs_run *run, int n, hs_time t, hs_real h);
 static int method_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece);
 static void local_error(hs_run *run, hs_real h);
+static const hs_real *error_scales(const hs_run *run);
+static const hs_real *closer_scales(hs_run *run, hs_real h);
+static int is_implicit(const hs_method *method);
+static void lay_out_method(hs_run *run, hs_store *store);
 static void forget_steps(hs_run *run);
 
 /* control.c */

@@ -15,7 +15,6 @@
 #endif
 #include "linear.c"
 #include "sparse.c"
-#include "radau.c"
 #include "newton.c"
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
@@ -60,20 +59,6 @@ static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
   return piece;
 }
 
-static void lay_out_radau(hs_radau *radau, int w, int factors, hs_store *store) {
-  hs_real **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
-  hs_real **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
-  for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
-  for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
-  radau->largest = numbers(store, w);
-  radau->error = numbers(store, w);
-  radau->least = numbers(store, w);
-  radau->scratch[0] = numbers(store, w);
-  radau->scratch[1] = numbers(store, w);
-  radau->order = take(store, w, sizeof(int));
-  radau->turned = take(store, w, sizeof(int));
-}
-
 /* Give every array of a run its place. */
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
@@ -92,9 +77,7 @@ static void lay_out(hs_run *run, hs_store *store) {
     if (store->numbers) run->k[i] = stage;
   }
   if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
-  if (run->method->kind == HS_TAYLOR)
-    run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
-  if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, w, run->model->factors, store);
+  lay_out_method(run, store);
   run->values = numbers(store, m);
   run->ahead = numbers(store, m);
   run->magnitudes = numbers(store, m);
@@ -213,7 +196,7 @@ static hs_run open_run(hs_task *task) {
   run.control.least = hs_max(task->settings.tolerance, sqrt((hs_real)HS_UNIT)) * task->settings.largest;
   run.control.order = task->method->order;
   run.control.failed_at = NAN;
-  run.control.implicit = task->method->kind == HS_RADAU;
+  run.control.implicit = is_implicit(task->method);
   run.steps_to_poll = run.poll_steps = 64;
 #if !defined(HS_NO_CLOCK)
   run.polled = clock();

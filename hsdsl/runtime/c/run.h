@@ -125,6 +125,10 @@ typedef struct {
   int lifted;
 } hs_radau;
 
+/* Numbers that lay_out_method() takes of it, as a constant: see workspace.h. */
+#define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
+#define HS_IMPLICIT_SPACE(kind, w, factors) ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0)
+
 typedef struct {
   hs_time reached;
   int idle, creeping;

@@ -17,10 +17,9 @@
 #define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
 #define HS_STAGES(w, all) (HS_TAKEN(all, hs_real *) + ((all)-1) * HS_NUMBERS(w))
 #define HS_SPAN(w, degree) (2 * HS_NUMBERS(w) + HS_PIECE(w, degree))
-#define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
 #define HS_SPACE(w, m, e, lines, states, factors, kind, stages, extra, order, degree)                              \
   (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
-   ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0) + \
+   ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + HS_IMPLICIT_SPACE(kind, w, factors) +                 \
    5 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 3 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
    2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
