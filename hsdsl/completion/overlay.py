@@ -3,7 +3,7 @@
 """All motions of a mode along its guards in one copy of the mode, in which numbers choose the guards in contact.
 
 Contacts are independent where none changes what another one depends on. Each chooses its own rows of the flow, so any
-subset costs as much as all of them. Of the others each connected set has rows of its own (`together`).
+subset costs as much as all of them. Of the others each connected set has rows of its own (`coupled_contacts`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.coupled_contacts import Pairs, connected_sets, coupled_flow, neighbours
 from hsdsl.completion.nearby import along
-from hsdsl.completion.together import Pairs, connected_sets, flow_together, neighbours
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.program import HELD, LOOKED_AT
@@ -82,7 +82,7 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
         for few in sets or ():
             seen |= few
             members = sorted(few)
-            rows = flow_together([contacts[k] for k in members], pairs)
+            rows = coupled_flow([contacts[k] for k in members], pairs)
             choose(members, rows or {i: _NAN for k in members for i in contacts[k].rows})
         if sets is None:
             for i in contacts[first].rows:

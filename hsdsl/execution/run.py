@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,20 @@ from hsdsl.names import visible, without_memory
 Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
 Assessment = Callable[..., Verdict]
+
+
+class CompiledRecord(Protocol):
+    """What the loop in C wrote of a run; columns and transitions are made of it when they are first used."""
+
+    @property
+    def made(self) -> int:
+        """How many transitions were made."""
+        ...
+
+    @property
+    def enters_beyond(self) -> bool:
+        """Whether one fired at once on entry."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +77,8 @@ class Execution(Deferred):
         ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.simulate.refinement`).
     differentiation : callable or None
         ``differentiation(wrt) -> Sensitivity``: its derivatives.
+    compiled : CompiledRecord or None
+        Of a run made in C: what its loop wrote, sooner known than the transitions.
     look : callable or None
         ``look() -> dict``: what a picture shows of its model, as options of `hsdsl.plot.View`.
     """
@@ -94,9 +110,11 @@ class Execution(Deferred):
     repetition: Callable[[Execution], Execution] | None = field(default=None, compare=False)
     differentiation: Callable[[Any], Any] | None = field(default=None, compare=False)
     look: Callable[[], dict[str, Any]] | None = field(default=None, compare=False)
+    compiled: CompiledRecord | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "sampler", None)  # it reads a compiled run's own columns, and these may be others
+        for name in ("sampler", "compiled"):  # they read a compiled run's own columns, and these may be others
+            object.__setattr__(self, name, None)
         self.check()
 
     def check(self) -> None:
@@ -128,14 +146,8 @@ class Execution(Deferred):
 
     def __getstate__(self) -> dict[str, Any]:
         """Give what can travel: a copy, or what is read from a pickle, is as one that was saved and read."""
-        return super().__getstate__() | {
-            "output_function": None,
-            "sampler": None,
-            "assessment": None,
-            "repetition": None,
-            "differentiation": None,
-            "look": None,
-        }
+        local = [each.name for each in fields(self) if not each.compare and each.name != "seconds"]
+        return super().__getstate__() | dict.fromkeys(local)
 
     def __repr__(self) -> str:
         start, end = self.time_span
@@ -175,14 +187,12 @@ class Execution(Deferred):
     @property
     def made(self) -> int:
         """How many transitions were made; of a long run that is sooner known than the transitions."""
-        counted = self.__dict__.get("_made")
-        return len(self.transitions) if counted is None else counted
+        return len(self.transitions) if self.compiled is None else self.compiled.made
 
     @property
     def enters_beyond(self) -> bool:
         """Whether a transition fired at once on entry; of a compiled run that is sooner known than the transitions."""
-        known: Callable[[Execution], bool] | None = self.__dict__.get("_enters_beyond")
-        return any(made.entry for made in self.transitions) if known is None else known(self)
+        return any(made.entry for made in self.transitions) if self.compiled is None else self.compiled.enters_beyond
 
     @property
     def time_span(self) -> tuple[Any, Any]:

@@ -71,19 +71,25 @@ def written(
         assessment=partial(_assessment_of, under_way),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        _of=_Written(under_way, columns),
-        _made=under_way.made,
-        _enters_beyond=_enters_beyond,
+        compiled=_Written(under_way, columns),
     )
 
 
 class _Written(NamedTuple):
+    """What the compiled loop wrote: a `CompiledRecord`."""
+
     under_way: CompiledRun
     columns: Columns
 
+    @property
+    def made(self) -> int:
+        """How many transitions."""
+        return self.under_way.made
 
-def _enters_beyond(execution: Execution) -> bool:
-    return execution.made > 0 and bool(_of(execution).columns["transition"]["entry"].any())
+    @property
+    def enters_beyond(self) -> bool:
+        """Whether one fired on entry."""
+        return self.made > 0 and bool(self.columns["transition"]["entry"].any())
 
 
 def _assessment_of(
@@ -97,7 +103,8 @@ def _column(name: str) -> Callable[[Execution], Any]:
 
 
 def _of(execution: Execution) -> _Written:
-    return execution.__dict__["_of"]
+    assert isinstance(execution.compiled, _Written)
+    return execution.compiled
 
 
 def _settings(execution: Execution) -> dict[str, Any]:

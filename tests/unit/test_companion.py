@@ -33,7 +33,7 @@ experiment: {{until: {until}, scheme: located, method: taylor}}
 
 
 def view(run: Any, **options: Any) -> RunView:
-    return RunView(run.__dict__["_of"].under_way.plan.problem, run, **options)
+    return RunView(run.compiled.under_way.plan.problem, run, **options)
 
 
 @pytest.mark.parametrize("name", PAIRS)

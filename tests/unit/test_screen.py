@@ -58,7 +58,7 @@ def run_of(loaded: Any, method: str, tolerance: float) -> Any:
 
 
 def screen_of(run: Any) -> Screen:
-    screen = screened(run.__dict__["_of"].under_way.plan.problem, run, run.finer)
+    screen = screened(run.compiled.under_way.plan.problem, run, run.finer)
     assert screen is not None
     return screen
 

@@ -26,7 +26,7 @@ from hsdsl.system import Edge, Mode, Surface
 DEEPEST = 3  # transitions at one instant that are followed
 
 
-def together(dynamics: Dynamics, first: Edge, second: Edge) -> tuple[Clause, ...]:
+def overlap_of(dynamics: Dynamics, first: Edge, second: Edge) -> tuple[Clause, ...]:
     """Where two guards of a mode overlap, as alternatives."""
     one, other = dynamics.guard(first) or (), dynamics.guard(second) or ()
     return tuple(tuple(dict.fromkeys((*a, *b))) for a, b in product(one, other))

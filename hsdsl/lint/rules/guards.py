@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.lint.analysis.commutation import commute, matters, meeting, speeds, together
+from hsdsl.lint.analysis.commutation import commute, matters, meeting, overlap_of, speeds
 from hsdsl.lint.analysis.crossing import passes_by, uncrossed
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.landing import entered_beyond
@@ -140,7 +140,7 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
         for first, second in combinations(part.edges, 2):
             if _ordered(first.edge, second.edge):
                 continue
-            overlaps = together(subject.dynamics, first.edge, second.edge)
+            overlaps = overlap_of(subject.dynamics, first.edge, second.edge)
             if not any(subject.dynamics.ask(part.mode, overlap).somewhere for overlap in overlaps):
                 continue
             if not left:

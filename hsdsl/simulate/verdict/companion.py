@@ -74,7 +74,7 @@ class Accompanied(Errors):
 
 def is_compiled(run: Execution) -> bool:
     """Whether a run was made in C, where it is followed as well."""
-    return run.__dict__.get("_of") is not None
+    return run.compiled is not None
 
 
 def order_of(method: Any) -> int:

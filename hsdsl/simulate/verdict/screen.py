@@ -139,8 +139,8 @@ def screened(problem: Problem, run: Execution, finer: Execution | None) -> Scree
         return None
     if not all(map(is_compiled, (run, finer or run))) or any(mode.slides for mode in problem.program.modes):
         return None
-    one: Any = run.__dict__["_of"]
-    other: Any = finer and finer.__dict__["_of"]
+    one: Any = run.compiled
+    other: Any = finer and finer.compiled
     if not run.stop.complete or (finer and finer.stop.reason != run.stop.reason):
         return None
     if one.columns.notes or (other and other.columns.notes):

@@ -60,7 +60,7 @@ def connected_sets(near: Sequence[set[int]], first: int) -> list[frozenset[int]]
     return found
 
 
-def flow_together(contacts: Sequence[Contact], pairs: dict[int, Pairs]) -> dict[int, sp.Expr] | None:
+def coupled_flow(contacts: Sequence[Contact], pairs: dict[int, Pairs]) -> dict[int, sp.Expr] | None:
     """The rows of the flow along the guards of a connected set, by states' numbers; None where that is not one flow.
 
     ``pairs`` keeps what is known of contacts, by their edges.
