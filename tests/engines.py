@@ -9,12 +9,13 @@ from dataclasses import fields, replace
 from typing import Any
 
 import pytest
+from compiled_kernel import CompiledKernel
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution.records import same
 from hsdsl.model import Model
 from hsdsl.runtime.compiler import NoCompiler, find_compiler
-from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+from hsdsl.runtime.kernel import CompiledModel
 
 try:
     find_compiler()

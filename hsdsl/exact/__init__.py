@@ -3,7 +3,6 @@
 ==================  ===========================================================================================
 `references`        the stored execution that solves a model
 `residual`          whether an execution solves a model as it is written
-`closed_form`       a formula between jumps -> Execution
 `interpolation`     a stretch of a formula as polynomial pieces with a bound on their error
 `refined`           any other model: runs in many digits, refined until they agree
 ==================  ===========================================================================================

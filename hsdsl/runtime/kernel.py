@@ -1,34 +1,19 @@
-"""A program's compiled routines as a `Kernel`: what the Python loop takes in place of the Python kernel.
-
-A call goes through ctypes and costs more than the Python routine would; this kernel is here to tell a fault of the code
-generator from one of the compiled loop. Constants and diagnoses are evaluated by the Python kernel in every engine.
-"""
+"""The hand-written runtime, and programs compiled to libraries that it runs."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from contextlib import suppress
 from contextvars import copy_context
 from functools import cache
 from threading import Lock, Thread
 from typing import Any
 
-from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.python import PythonKernel, changed, conjunction, spread_out
-from hsdsl.kernel import ModeKernel, Routine, Series, Taylor, Vector
-from hsdsl.program import Program, Tape
+from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
 from hsdsl.runtime.library import LOOP, is_kept, load
-
-Address = int | None
-Double = ctypes.c_double
-Doubles = ctypes.POINTER(ctypes.c_double)
-RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Doubles)
-SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Doubles, Doubles)
-SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
-
 
 LARGE = 1 << 17  # characters of a program
 SYMBOL = "hs_the_model"
@@ -129,94 +114,3 @@ def _source(program: Program) -> str:
     from hsdsl.backends.c import model_source  # what is compiled already needs none
 
     return model_source(program)
-
-
-class CompiledKernel(PythonKernel):
-    """A compiled program for the Python loop; constants, switches and diagnoses are Python's."""
-
-    def __init__(self, program: Program, compiled: CompiledModel) -> None:
-        super().__init__(program, FLOAT64)
-        self._compiled = compiled
-
-    def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
-        """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
-        tape = self._program.flows[mode].tape
-        return None if tape is None else _taylor(self._compiled.mode(mode), tape, data)
-
-    def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
-        """Return the derivatives of a mode's flow by its states, row by row."""
-        table, program = self._compiled.mode(mode), self._program.flows[mode]
-        n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
-        rows = table.jacobian
-        return spread_out(_routine(rows.values, numbers, n, rows.count), program.jacobian.places, n * n, 0.0)
-
-    def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
-        """Bind a mode to parameter values and input segments."""
-        table, outputs = self._compiled.mode(mode), len(self._program.outputs)
-        n, m = table.dimension, table.surfaces
-        numbers = (Double * max(1, len(data)))(*data)
-        edges, program = structures.array_at(structures.Edge, table.edge, table.edges), self._program.flows[mode]
-        pairs = list(zip(edges, program.edges, strict=True))
-        gradients = structures.array_at(structures.Sparse, table.gradients, m)
-        rates = structures.addresses(table.rates, m)
-
-        def bound(address: Address, results: int, arguments: int = n) -> Routine:
-            return _routine(address, numbers, arguments, results)
-
-        return ModeKernel(
-            flow=bound(table.flow, n),
-            surfaces=bound(table.values, m),
-            magnitudes=bound(table.magnitudes, m),
-            outputs=bound(table.outputs, outputs),
-            gradients=tuple(
-                spread_out(bound(row.values, row.count), places, n + 1, 0.0)
-                for row, places in zip(gradients, program.slopes, strict=True)
-            ),
-            rates=tuple(bound(rate, 1) for rate in rates),
-            conditions=tuple(
-                conjunction([bound(part, 1) for part in structures.addresses(e.condition, e.parts)]) for e in edges
-            ),
-            resets=tuple(changed(bound(e.reset, e.changes), edge, 1) for e, edge in pairs),
-            spreads=tuple(changed(bound(e.spread, e.changes, 2 * n), edge, n + 1) for e, edge in pairs),
-        )
-
-
-def _taylor(table: Any, tape: Tape, data: Sequence[Number]) -> Taylor:
-    numbers = (Double * max(1, len(data)))(*data)
-    own = 1 + table.dimension + tape.needed
-    every = 1 + table.dimension + len(tape.operations)
-    assert table.series is not None and table.surface_series is not None
-    write, write_surfaces = SeriesPointer(table.series), SurfaceSeriesPointer(table.surface_series)
-
-    def flow(order: int, t: Number, x: Vector) -> tuple[Series, ...]:
-        length = order + 2
-        found = (Double * (length * every))()
-        if write(numbers, order, t, (Double * max(1, len(x)))(*x), found):
-            raise ValueError("no finite value")
-        return tuple(found[i * length : (i + 1) * length - (i > table.dimension)] for i in range(own))
-
-    def surfaces(order: int, lines: tuple[Series, ...]) -> tuple[Series | None, ...]:
-        length = order + 2
-        found = (Double * (length * every))()
-        for i, line in enumerate(lines):
-            found[i * length : i * length + len(line)] = line
-        if write_surfaces(numbers, order, found):
-            raise ValueError("no finite value")
-        rows = (None if line is None else line * length for line in tape.surfaces)
-        return tuple(None if start is None else found[start : start + order + 1] for start in rows)
-
-    return Taylor(flow, surfaces)
-
-
-def _routine(address: Address, data: ctypes.Array[Double], arguments: int, results: int) -> Routine:
-    assert address is not None
-    function = RoutinePointer(address)
-    given, found = (Double * max(1, arguments)), (Double * max(1, results))
-
-    def call(t: Number, *x: Number) -> Vector:
-        out = found()
-        if function(data, t, given(*x), out):
-            raise ValueError("no finite value")
-        return tuple(out[:results])
-
-    return call

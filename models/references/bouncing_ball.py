@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from hsdsl.errors import UsageError
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.execution import Execution, Verdict
+from references.closed_form import ClosedForm, as_execution
 from references.rests import UNRESOLVED, rest, tail
 
 SOURCE = "closed form: flights of 2 v/g from bounce to bounce, summed to the Zeno point sqrt(2 h/g) (1 + e)/(1 - e)"

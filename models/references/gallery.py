@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Number, Stretch, mp
 from hsdsl.execution import Execution, Verdict
+from references.closed_form import ClosedForm, as_execution
 from references.gallery_balls import BALLS
 from references.gallery_series import lorenz_section, stick_slip
 from references.gallery_swings import SWINGS

@@ -7,9 +7,9 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Number, Stretch, mp
 from hsdsl.execution import Execution, Verdict
+from references.closed_form import ClosedForm, as_execution
 from references.terms import Terms, polynomial, stretch, wave
 
 SLIDING = "(sliding)"

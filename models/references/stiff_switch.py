@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 from hsdsl.errors import UsageError
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.execution import Execution, Verdict
+from references.closed_form import ClosedForm, as_execution
 
 SOURCE = "closed form: two exponentials a mode; its switches by Newton's method in eighty digits"
 DEGREE = 8

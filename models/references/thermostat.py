@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from hsdsl.errors import UsageError
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.execution import Execution, Verdict
+from references.closed_form import ClosedForm, as_execution
 
 SOURCE = "closed form: exponentials, and logarithms for the times between switches"
 DEGREE = 8

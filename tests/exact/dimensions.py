@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from hsdsl.exact.closed_form import ClosedForm, as_execution
+from references.closed_form import ClosedForm, as_execution
+
 from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.execution import Verdict
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from references.closed_form import ClosedForm, as_execution
 from references.impact_oscillator import Flight, Motion
 from references.rests import rest
 
-from hsdsl.exact.closed_form import ClosedForm, as_execution
 from hsdsl.exact.interpolation import Stretch, mp
 from hsdsl.execution import Arc, Verdict
 

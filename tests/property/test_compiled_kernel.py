@@ -6,6 +6,7 @@ import ast
 from itertools import product
 
 import pytest
+from compiled_kernel import CompiledKernel
 from engines import needs_compiler, outcome
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,7 +18,7 @@ from hsdsl.elaborate import elaborate
 from hsdsl.functions import FUNCTIONS
 from hsdsl.kernel import ModeKernel
 from hsdsl.model import Model
-from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+from hsdsl.runtime.kernel import CompiledModel
 
 pytestmark = needs_compiler
 SPECIAL = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, 3.0, 710.0, -746.0, 1e-310, 1e200, -1e308, float("inf"), float("nan")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from compiled_kernel import CompiledKernel
 from engines import bits, needs_compiler
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +16,7 @@ from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
 from hsdsl.kernel import Taylor
 from hsdsl.model import Model
-from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+from hsdsl.runtime.kernel import CompiledModel
 
 pytestmark = needs_compiler
 DATA = [0.35, 1.0, 0.2, 0.0]

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from compiled_kernel import CompiledKernel
 from engines import alike, needs_compiler
 
 import hsdsl
@@ -25,7 +26,7 @@ from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
 from hsdsl.model import engines
 from hsdsl.runtime import kernel, library
-from hsdsl.runtime.kernel import CompiledKernel, CompiledModel
+from hsdsl.runtime.kernel import CompiledModel
 
 ROOT = Path(__file__).parents[2]
 MODELS = sorted((ROOT / "models").glob("*.yaml"))

@@ -24,99 +24,21 @@ def checked(value, *arguments):
     return jnp.where(finite & jnp.isinf(value), NAN, value)
 
 
-def f_sin(x):
-    """Sine."""
-    return jnp.sin(x)
+def with_checks(function):
+    """A function that is not-a-number where its value is infinite for finite arguments."""
+    return lambda *arguments: checked(function(*arguments), *arguments)
 
 
-def f_cos(x):
-    """Cosine."""
-    return jnp.cos(x)
-
-
-def f_tan(x):
-    """Tangent."""
-    return jnp.tan(x)
-
-
-def f_asin(x):
-    """Inverse sine."""
-    return jnp.arcsin(x)
-
-
-def f_acos(x):
-    """Inverse cosine."""
-    return jnp.arccos(x)
-
-
-def f_atan(x):
-    """Inverse tangent."""
-    return jnp.arctan(x)
-
-
-def f_sinh(x):
-    """Hyperbolic sine."""
-    return checked(jnp.sinh(x), x)
-
-
-def f_cosh(x):
-    """Hyperbolic cosine."""
-    return checked(jnp.cosh(x), x)
-
-
-def f_tanh(x):
-    """Hyperbolic tangent."""
-    return jnp.tanh(x)
-
-
-def f_asinh(x):
-    """Inverse hyperbolic sine."""
-    return jnp.arcsinh(x)
-
-
-def f_acosh(x):
-    """Inverse hyperbolic cosine."""
-    return jnp.arccosh(x)
-
-
-def f_atanh(x):
-    """Inverse hyperbolic tangent."""
-    return checked(jnp.arctanh(x), x)
-
-
-def f_exp(x):
-    """Exponential."""
-    return checked(jnp.exp(x), x)
+f_sin, f_cos, f_tan, f_asin, f_acos, f_atan = jnp.sin, jnp.cos, jnp.tan, jnp.arcsin, jnp.arccos, jnp.arctan
+f_tanh, f_asinh, f_acosh, f_sqrt, f_abs, f_sign = jnp.tanh, jnp.arcsinh, jnp.arccosh, jnp.sqrt, jnp.abs, jnp.sign
+f_atan2 = jnp.arctan2  # its derivative at the origin is none
+f_sinh, f_cosh, f_atanh = with_checks(jnp.sinh), with_checks(jnp.cosh), with_checks(jnp.arctanh)
+f_exp, f_pow = with_checks(jnp.exp), with_checks(jnp.power)
 
 
 def f_log(x):
     """Logarithm."""
     return jnp.where(x > 0, jnp.log(jnp.where(x > 0, x, 1.0)), NAN)
-
-
-def f_sqrt(x):
-    """Square root."""
-    return jnp.sqrt(x)
-
-
-def f_pow(x, y):
-    """Power."""
-    return checked(jnp.power(x, y), x, y)
-
-
-def f_atan2(y, x):
-    """Angle of a point; its derivative at the origin is none."""
-    return jnp.arctan2(y, x)
-
-
-def f_abs(x):
-    """Absolute value."""
-    return jnp.abs(x)
-
-
-def f_sign(x):
-    """Sign."""
-    return jnp.sign(x)
 
 
 def f_heaviside(x):
