@@ -71,7 +71,7 @@ def written(
         assessment=partial(_assessment_of, under_way),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        compiled=_Written(under_way, columns),
+        compiled=_Written(under_way, columns, under_way.made),
     )
 
 
@@ -80,11 +80,7 @@ class _Written(NamedTuple):
 
     under_way: CompiledRun
     columns: Columns
-
-    @property
-    def made(self) -> int:
-        """How many transitions."""
-        return self.under_way.made
+    made: int
 
     @property
     def enters_beyond(self) -> bool:
