@@ -87,7 +87,7 @@ typedef struct {
   const hs_timeline *timeline;
   const hs_formulas *formulas; /* of each mode */
   hs_record run, finer;
-  int32_t order;            /* of the series of a companion; 0 where the run is held against a finer one */
+  int32_t order;            /* the most of a companion's series; 0 where the run is held against a finer one */
   double *measured;         /* (row, width): how far each is from the companion; 0 where there is none */
   double *late;             /* (transition): how far they are from the companion's, up to each; 0 likewise */
   double until, relaxation, tolerance;

@@ -1,11 +1,20 @@
-"""Errors of a run by Taylor series without another run: a companion takes the same steps by series of more terms.
+"""Errors of a run by Taylor series without another run: a companion takes the same steps, closer to the solution.
 
 The companion starts where the run does. Each of its steps begins where it is itself, and takes as long as the run's.
 It makes each transition where it crosses the same surface. Its distance to the run is the sum of what the run's series
-left out, carried along by the flow and by jumps, as long as that is small. The last term and the first that is left out
-choose the step size, so two more terms show what was left out. Round-off of the flow is much the same for both, so each
-step moves the companion further away from the run by the most that it may do. The companion looks for no other surface:
-enclosures wider than the errors decide along the run's own steps that none is reached.
+left out, carried along by the flow and by jumps, as long as that is small.
+
+- What a step's polynomial leaves out follows from how badly it solves the equation at the end, as when its size was
+  chosen. The first two terms that are left out are found so: an even or odd solution is no trap.
+- What a step makes of the distance before is the difference of two series. The run has recorded one of them. The other
+  has fewer terms: a distance needs few digits. Where its last two terms, times the number of steps, exceed all of a
+  state's terms together, more are made from there on, up to as many as the run has. So growth that the run does not
+  show is seen.
+- Round-off of the flow is much the same for both, so each step moves the companion further away from the run by the
+  most that it may do.
+
+The companion looks for no other surface: enclosures wider than the errors decide along the run's own steps that none
+is reached.
 """
 
 from __future__ import annotations
@@ -24,7 +33,6 @@ from hsdsl.simulate.verdict.agreement import Errors
 from hsdsl.simulate.verdict.follower import Follower, Lost
 
 Array = NDArray[np.float64]
-MORE = 2  # terms
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
 
 
@@ -78,8 +86,8 @@ def is_compiled(run: Execution) -> bool:
 
 
 def order_of(method: Any) -> int:
-    """The order of the companion's series, which have one coefficient more."""
-    return method.order + MORE - 1
+    """The most that the order of the companion's series may be: with one coefficient more, as many as the run's."""
+    return method.order - 1
 
 
 def has_companion(problem: Problem, run: Execution) -> bool:

@@ -1,12 +1,16 @@
-"""The companion of a run on its way, in Python: its mode, time and state, moved by what round-off may do."""
+"""The companion of a run on its way, in Python: its mode, time and state, and how far it is from the run.
+
+Along a step its series differ from the run's by less and less from term to term. Only so many terms are made that all
+steps of the run together leave out little of the difference; of the others it has the run's own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsdsl.enclosures import Range, as_range
 from hsdsl.execution import Arc, Execution, Transition
@@ -15,59 +19,130 @@ from hsdsl.integrators.taylor import terms
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.problem import Problem
 
+Array = NDArray[np.float64]
 MOST_ROUNDS = 8  # of Newton's method
 CLOSED_IN = 2.0**-10  # of the tie tolerance: a crossing's time is found
+FEWEST, FURTHER = 3, 2  # the order of the first series, and by how much it grows where that is not enough
 
 
 class Lost(ValueError):
     """The companion cannot follow."""
 
 
+class Course(NamedTuple):
+    """The companion along one step.
+
+    Attributes
+    ----------
+    length : float
+        Of the run's step.
+    terms : array, shape (number, states)
+        Of the run's series in shares of the step, from that of power 0 on.
+    end : array, shape (states,)
+        The run's state where the step ends.
+    away : array, shape (number, states)
+        How far the companion's terms are from the run's.
+    moved : array, shape (states,)
+        By how much it is further away at the end.
+    """
+
+    length: float
+    terms: Array
+    end: Array
+    away: Array
+    moved: Array
+
+    def at(self, time: float) -> State:
+        """Where the companion is some time after the step began."""
+        share = time / self.length
+        run = self.end if share == 1 else share ** np.arange(len(self.terms)) @ self.terms
+        return tuple((run + share ** np.arange(len(self.away)) @ self.away + self.moved).tolist())
+
+
 class Follower:
-    """The companion on its way: its mode, time and state, and the series from there."""
+    """The companion on its way: its mode, time and state; ``order`` is the most that its series have."""
 
     def __init__(self, problem: Problem, run: Execution, order: int) -> None:
-        self.problem, self.run, self.order = problem, run, order
+        self.problem, self.run, self.most, self.order = problem, run, order, min(FEWEST, order)
         self.modes = {mode.name: k for k, mode in enumerate(problem.program.modes)}
         self.apart = np.zeros((len(run.times), run.values.shape[1]))
         self.times: list[float] = run.times.tolist()
         self.late: list[float] = []
         self.t: float = float(run.times[0])
         self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
-        self.stages: Sequence[State] = ()
+        self.data = self.problem.timeline.segments[0].data
         self.enclosing: dict[int, ModeKernel] = {}
 
     def follow(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
-        times = self.times
+        times, mode = self.times, self.modes[arc.mode]
         shift = self.t - times[arc.first]
         for row in range(arc.first, arc.last + 1):
             h = times[row] - times[row - 1] if row > arc.first else 0.0
-            if h > 0:
-                self._round(arc, self.run.values[row - 1].tolist(), h)
-            if h > 0 or (made and row == arc.last):
-                self._expand(arc)
-            y = self._at(h) if h > 0 else self.x
+            jumps = made if row == arc.last else None
+            course = self._course(mode, row - 1, h) if h > 0 else self._start(mode) if jumps else None
+            y = course.at(h) if course else self.x
             self._compare(row, self.run.values[row], y)
-            if made and row == arc.last:
-                self._jump(arc, made, h, y)
+            if jumps and course:
+                self._jump(arc, jumps, course, h)
             elif h > 0:
                 self.x, self.t = y, times[row] + shift
 
-    def _round(self, arc: Arc, x: State, h: float) -> None:
-        """Move away from the run, which is at x, by what round-off of the flow may do in a step."""
-        box = [Range(float(value), float(value)) for value in (self.t, *self.x)]
-        flow = map(as_range, self._enclosing(self.modes[arc.mode]).flow(*box))
-        moved = [h * float(f.high - f.low) / 2 for f in flow]
-        if not all(map(isfinite, moved)):
-            raise Lost
-        self.x = tuple(a - e if a < b else a + e for a, b, e in zip(self.x, x, moved, strict=False))
+    def _start(self, mode: int) -> Course:
+        """Its course from where it is, without a step of the run."""
+        x = np.array(self.x)
+        return Course(1.0, x[None, :], x, np.vstack([0 * x, self._expanded(mode)]), 0 * x)
 
-    def _enclosing(self, mode: int) -> ModeKernel:
+    def _course(self, mode: int, row: int, h: float) -> Course:
+        """Its course along the run's step from a row."""
+        n = len(self.x)
+        x, end = (np.asarray(self.run.values[k, :n], dtype=float) for k in (row, row + 1))
+        piece = np.asarray(self.run.coefficients[row][:, :n], dtype=float)
+        slope, noise = self._enclosed(mode, self.times[row + 1], end)
+        left = self._left_out(mode, self.times[row + 1], end, piece, h, slope)
+        course = Course(h, np.vstack([x, piece]), end, self._away(mode, x, piece, h), left)
+        further = np.where(np.array(course.at(h)) < end, -h * noise, h * noise)
+        return course._replace(moved=left + further)
+
+    def _away(self, mode: int, x: Array, piece: Array, h: float) -> Array:
+        """How far its terms are from the run's, so many that all steps together leave out little of it."""
+        while True:
+            stages = self._expanded(mode)
+            powers = np.cumprod(np.full(len(stages), h))  # as the run in C does
+            away = np.vstack([np.array(self.x) - x, stages * powers[:, None] - piece[: len(stages)]])
+            sizes = np.abs(away)
+            settled = np.all(len(self.times) * sizes[-2:].sum(axis=0) <= sizes.sum(axis=0))
+            if settled or self.order == self.most:
+                return away
+            self.order = min(self.order + FURTHER, self.most)
+
+    def _expanded(self, mode: int) -> Array:
+        series = self.problem.kernel.taylor(mode, self.data)
+        if series is None:
+            raise Lost
+        return np.array(terms(series, self.order, self.t, self.x), dtype=float).reshape(self.order + 1, len(self.x))
+
+    def _enclosed(self, mode: int, t: float, x: Array) -> tuple[Array, Array]:
+        """The run's flow at a point, and what round-off may make of it."""
         if mode not in self.enclosing:
-            data = [Range(float(value), float(value)) for value in self.problem.timeline.segments[0].data]
+            data = [Range(float(value), float(value)) for value in self.data]
             self.enclosing[mode] = self.problem.kernel.enclosing.bind(mode, data)
-        return self.enclosing[mode]
+        flow = map(as_range, self.enclosing[mode].flow(*(Range(value, value) for value in (t, *x.tolist()))))
+        ends = np.array([(float(f.low), float(f.high)) for f in flow]).reshape(-1, 2)
+        if not np.isfinite(ends).all():
+            raise Lost
+        return ends.sum(axis=1) / 2, (ends[:, 1] - ends[:, 0]) / 2
+
+    def _left_out(self, mode: int, t: float, x: Array, piece: Array, h: float, slope: Array) -> Array:
+        """What the run's polynomial X leaves out by the end of its step, where the flow is ``slope``.
+
+        With d = X' - f(X) at the end and J the derivatives of f, e' = J e - d for what is left out, e: it is close to
+        -h d/order, and what follows from J e is close to h (J e)/(order + 1).
+        """
+        order = len(piece) + 1
+        e = (h * slope - np.arange(1, order) @ piece) / order
+        flow = self.problem.kernel.bind(mode, self.data).flow(t, *(x + e).tolist())
+        return e + h * (np.array(flow) - slope) / (order + 1)
 
     def _compare(self, row: int, x: Any, y: State) -> None:
         if not all(map(isfinite, y)):
@@ -75,22 +150,10 @@ class Follower:
         away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
         self.apart[row, : len(y)] = np.fmax(self.apart[row, : len(y)], away)
 
-    def _expand(self, arc: Arc) -> None:
-        series = self.problem.kernel.taylor(self.modes[arc.mode], self.problem.timeline.segments[0].data)
-        if series is None:
-            raise Lost
-        self.stages = terms(series, self.order, self.t, self.x)
-
-    def _at(self, s: float) -> State:
-        z = self.stages[-1] if self.x else ()
-        for c in reversed((self.x, *self.stages[:-1])):
-            z = tuple(a + s * b for a, b in zip(c, z, strict=True))
-        return z
-
-    def _jump(self, arc: Arc, made: Transition, s: float, y: State) -> None:
-        """Make a transition where the companion crosses its surface, close to the time s of its series."""
-        mode = self.problem.program.modes[self.modes[arc.mode]]
-        kernel = self.problem.kernel.bind(self.modes[arc.mode], self.problem.timeline.segments[0].data)
+    def _jump(self, arc: Arc, made: Transition, course: Course, s: float) -> None:
+        """Make a transition where the companion crosses its surface, close to the time s of its course."""
+        mode, y = self.problem.program.modes[self.modes[arc.mode]], course.at(s)
+        kernel = self.problem.kernel.bind(self.modes[arc.mode], self.data)
         found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
         tie, change = float(self.problem.tie(self.t)), np.inf
@@ -100,7 +163,7 @@ class Follower:
                 raise Lost
             change = value / rate
             s -= change
-            y = self._at(s)
+            y = course.at(s)
             if abs(change) <= CLOSED_IN * tie:
                 break
         if not abs(change) <= tie:
