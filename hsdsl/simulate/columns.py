@@ -179,8 +179,9 @@ class Packed:
     @property
     def made(self) -> Made:
         """Where transitions are."""
-        _, arcs, k, notes, _ = self._counts
-        transition = self.where.arc + NUMBER * ARC_NUMBERS * arcs
+        n, arcs, k, notes, _ = self._counts
+        by_row = 2 + self._shape.outputs + self._width * (1 + self._shape.degree)
+        transition = self._start + NUMBER * (n * by_row + ARC_NUMBERS * arcs)
         before = transition + NUMBER * TRANSITION_NUMBERS * k
         after = before + NUMBER * k * self._shape.width
         behind = after + NUMBER * (k * self._shape.width + NOTE_NUMBERS * notes)

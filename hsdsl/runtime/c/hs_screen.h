@@ -88,14 +88,14 @@ typedef struct {
   const hs_formulas *formulas; /* of each mode */
   hs_record run, finer;
   int32_t order;            /* the most of a companion's series; 0 where the run is held against a finer one */
-  double *measured;         /* (row, width): how far each is from the companion; 0 where there is none */
-  double *late;             /* (transition): how far they are from the companion's, up to each; 0 likewise */
   double until, relaxation, tolerance;
   int32_t taylor;           /* whether pieces are Taylor polynomials */
-  double *workspace;        /* hs_screen_room() numbers */
+  double *workspace;        /* hs_screen_room() numbers, in which what is found begins: */
   int32_t *crossing;        /* (transition): HS_LOOK_AT_... and HS_COMMUTES */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
+  double *measured;         /* (row, width): how far each is from the companion; 0 where there is none */
+  double *late;             /* (transition): how far they are from the other run's or the companion's, up to each */
   int32_t marks;            /* those of `crossing` together */
   int32_t doubts;
   int64_t crossed;          /* transitions that the flow made; of these: */

@@ -92,6 +92,17 @@ static void look_at_all(hs_view *v) {
   }
 }
 
+static void lay_out_found(hs_screen *s, hs_store *store) {
+  const int64_t rows = s->run.rows, arcs = s->run.arcs, transitions = s->run.transitions;
+  s->crossing = take(store, transitions, sizeof(int32_t));
+  s->landing = take(store, arcs, sizeof(int32_t));
+  s->ending = take(store, arcs, sizeof(int32_t));
+  s->turning = take(store, rows, sizeof(int32_t));
+  s->changing = take(store, rows, sizeof(int32_t));
+  s->measured = s->order ? numbers(store, rows * s->run.width) : 0;
+  s->late = numbers(store, transitions);
+}
+
 static hs_view make_view(hs_screen *s, hs_store *store) {
   const hs_model *model = s->model;
   const int w = model->width, m = model->surfaces > 0 ? model->surfaces : 1, d = s->run.degree;
@@ -101,10 +112,11 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
     registers = own > registers ? own : registers;
   }
   hs_view v = {.s = s, .mode = -1};
+  lay_out_found(s, store);
   v.error = numbers(store, model->states);
   v.size = numbers(store, model->states);
   v.floor = numbers(store, 2 * (int64_t)model->states);
-  v.late = s->late ? s->late : numbers(store, s->run.transitions);
+  v.late = s->late;
   v.lines = numbers(store, s->order ? (int64_t)model->lines * (s->order + 2) : 0);
   v.tied = take(store, s->run.transitions + 1, sizeof(int64_t));
   double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,

@@ -43,8 +43,8 @@ class Companion:
     Attributes
     ----------
     apart : array, shape (rows, states of the largest mode)
-    late : array, shape (transitions + 1,)
-        How far the times of transitions are apart, up to each; the last entry has no meaning.
+    late : array, shape (transitions,)
+        How far the times of transitions are apart, up to each.
     lost : float or None
         From when on it could not follow.
     """
@@ -68,7 +68,7 @@ class Accompanied(Errors):
     @cached_property
     def late(self) -> Array:
         """How far times of transitions are apart, up to each of them; shape (transitions,)."""
-        return self.companion.late[:-1]
+        return self.companion.late
 
     @cached_property
     def measured(self) -> Array:
@@ -124,5 +124,5 @@ def accompany(problem: Problem, run: Execution) -> Companion:
             lost = float(run.times[arc.first])
             break
     late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *companion.late])[1:]
-    missing = np.full(len(run.transitions) + 1 - len(late), np.inf)
+    missing = np.full(len(run.transitions) - len(late), np.inf)
     return Companion(companion.apart, np.append(late, missing), lost)

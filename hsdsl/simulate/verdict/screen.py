@@ -37,54 +37,31 @@ class Screen:
     """
 
     def __init__(self, problem: Problem, run: Any, finer: Any) -> None:
-        plan = run.under_way.plan
-        model = plan.compiled
-        formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
-        record = _record(run.columns)
-        method = problem.settings.method
-        assert method is not None
-        self.table = table = structures.Screen(
-            model=ctypes.addressof(model.table),
-            timeline=plan.timeline,
-            formulas=ctypes.addressof(formulas.table),
-            run=record,
-            until=problem.settings.until,
-            relaxation=problem.settings.relaxation,
-            tolerance=problem.settings.tolerance,
-            taylor=method.kind == "taylor",
-        )
-        if finer is None:
-            table.order = order_of(method)
-        else:
+        common: dict[bool, Any] = run.under_way.plan.of_screens
+        if (finer is None) not in common:
+            common[finer is None] = _common(problem, run.under_way.plan, finer is None)
+        self.table = table = structures.Screen.from_buffer_copy(common[finer is None])
+        table.run = _record(run.columns)
+        if finer is not None:
             table.finer = _record(finer.columns)
-        self._reserve(record, finer is None)
-        runtime().hs_look(ctypes.addressof(table))
+        where, library = ctypes.addressof(table), runtime()
+        self._memory = np.empty(library.hs_screen_room(where))
+        table.workspace = structures.start_of(self._memory)
+        library.hs_look(where)
         self._columns = run.columns
         self._modes: tuple[ModeProgram, ...] = problem.program.modes
-
-    def _reserve(self, record: Any, accompanied: bool) -> None:
-        """Give the table memory for what it finds: columns of marks, then what a companion is apart, and scratch."""
-        table, rows, arcs, made = self.table, record.rows, record.arcs, record.transitions
-        self._ends = 0, made, made + arcs, made + 2 * arcs, made + 2 * arcs + rows, made + 2 * (arcs + rows)
-        self._sizes = (self._ends[-1] + 1) // 2, rows * record.width, made + 1
-        room = runtime().hs_screen_room(ctypes.addressof(table))
-        self._memory = np.empty(sum(self._sizes if accompanied else self._sizes[:1]) + room)
-        start = self._memory.ctypes.data
-        table.crossing, table.landing, table.ending, table.turning, table.changing = (
-            start + 4 * end for end in self._ends[:-1]
-        )
-        table.workspace = start + 8 * self._sizes[0]
-        if accompanied:
-            table.measured = table.workspace
-            table.late = table.measured + 8 * self._sizes[1]
-            table.workspace = table.late + 8 * self._sizes[2]
 
     @property
     def companion(self) -> Companion:
         """How far the run is from its companion; only of a run that is held against one."""
-        first, apart, late = self._sizes
-        of_rows, rest = np.split(self._memory[first : first + apart + late], [apart])
-        return Companion(of_rows.reshape(self.table.run.rows, self.table.run.width), rest)
+        run = self.table.run
+        measured = self._found("measured", run.rows * run.width, np.float64)
+        return Companion(measured.reshape(run.rows, run.width), self._found("late", run.transitions, np.float64))
+
+    def _found(self, name: str, count: int, kind: Any) -> Array:
+        """Numbers of a column that was found."""
+        start = getattr(self.table, name) - self.table.workspace
+        return self._memory.view(np.uint8)[start : start + count * np.dtype(kind).itemsize].view(kind)
 
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
@@ -94,9 +71,9 @@ class Screen:
 
     def marked(self, name: str) -> Array:
         """The marks of a column by transition, arc or row."""
-        place = ("crossing", "landing", "ending", "turning", "changing").index(name)
-        marks = self._memory[: self._sizes[0]].view(np.int32)
-        return marks[self._ends[place] : self._ends[place + 1]]
+        run = self.table.run
+        counts = {"crossing": run.transitions, "landing": run.arcs, "ending": run.arcs}
+        return self._found(name, counts.get(name, run.rows), np.int32)
 
     @cached_property
     def first_rows(self) -> Array:
@@ -147,6 +124,23 @@ def screened(problem: Problem, run: Execution, finer: Execution | None) -> Scree
         return None
     screen = Screen(problem, one, other)
     return None if screen.doubts("parted", "accumulation") else screen
+
+
+def _common(problem: Problem, plan: Any, accompanied: bool) -> Any:
+    """The table that screens of all runs by a plan begin with."""
+    model, settings, method = plan.compiled, problem.settings, problem.settings.method
+    formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
+    assert method is not None
+    return structures.Screen(
+        model=ctypes.addressof(model.table),
+        timeline=plan.timeline,
+        formulas=ctypes.addressof(formulas.table),
+        order=order_of(method) if accompanied else 0,
+        until=settings.until,
+        relaxation=settings.relaxation,
+        tolerance=settings.tolerance,
+        taylor=method.kind == "taylor",
+    )
 
 
 def _record(columns: Any) -> Any:
