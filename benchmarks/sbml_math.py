@@ -219,7 +219,7 @@ def _piecewise(writer: Writer, node: Node, arguments: list[Node]) -> str:
         condition = arguments[i + 1]
         holds = writer.chooses(writer, condition)
         value = writer.number(arguments[i])
-        text = value if holds == "1" else text if holds == "0" else f"({holds}*{value} + (1 - {holds})*{text})"
+        text = value if holds == "1" else text if holds == "0" else f"select({holds}, {value}, {text})"
     return text
 
 

@@ -17,7 +17,7 @@ from sbml_math import Node, NotExpressible, Writer, children
 
 FUNCTIONS = {
     *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
-    *("exp", "log", "sqrt", "abs", "sign", "floor", "min", "max"),
+    *("exp", "log", "sqrt", "abs", "sign", "floor", "min", "max", "select"),
 }
 TAKEN = {"t", "pi", "since", "index", "and", "or", "not", "true", "false", "sum", "count", "mode", *FUNCTIONS}
 

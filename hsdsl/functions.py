@@ -78,7 +78,8 @@ class maximum(_Kinked):
 class below(_Kinked):
     """The third of four where the first is below the second, a number; else the fourth.
 
-    The first is constant along a flow: the number of a part's mode, or a truth in a reset. So it jumps nowhere.
+    The first is constant along a flow: the number of a part's mode, or a truth in a reset. So it jumps nowhere, but for
+    what `select` chooses by, which is a sign.
     """
 
     nargs = 4
@@ -188,5 +189,6 @@ FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
     "floor": (floor, 1, 1),
     "min": (minimum, 2, None),
     "max": (maximum, 2, None),
+    "select": (below, 3, 3),  # of a number, and what is chosen where it is positive and where not
 }
 CONSTANTS = {"pi": sp.pi}

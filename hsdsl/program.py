@@ -21,7 +21,7 @@ from hsdsl.parts import Part
 from hsdsl.sparsity import Elimination, elimination
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
-JUMPS = re.compile(r"\b(?:sign|floor|atan2)\(")
+JUMPS = re.compile(r"\b(?:sign|floor|atan2|select)\(")
 STEEP = ("sqrt", "asin", "acos", "acosh")
 WHOLE = re.compile(r"q_m?\d+_1|\d+")
 MOVING = re.compile(r"t|[xv]\d+")

@@ -12,7 +12,7 @@ from hsdsl.expression.tokens import LARGEST_INTEGER
 from hsdsl.functions import FUNCTIONS
 from hsdsl.system import Surface
 
-_NAMES = {function: name for name, (function, *_) in FUNCTIONS.items()}
+_NAMES = {function: name for name, (function, *_) in FUNCTIONS.items()}  # `below` apart
 _MOST_PLACES = 12
 
 
@@ -22,6 +22,10 @@ class _Printer(StrPrinter):
     def _print_Function(self, expr: Any) -> str:
         name = _NAMES.get(expr.func, expr.func.__name__)
         return f"{name}({', '.join(map(self._print, expr.args))})"
+
+    def _print_below(self, expr: Any) -> str:
+        number, bound, one, other = expr.args
+        return f"select({', '.join(map(self._print, (bound - number, one, other)))})"
 
     def _print_Exp1(self, expr: Any) -> str:
         return "exp(1)"

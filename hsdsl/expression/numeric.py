@@ -21,6 +21,7 @@ _FUNCTIONS = {
     "floor": _context.floor,
     "min": min,
     "max": max,
+    "select": lambda number, one, other: one if number > 0 else other,
 }
 
 

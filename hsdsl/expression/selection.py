@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.functions import below, rebuilt, solution
+from hsdsl.functions import below, rebuilt, sign, solution
 
 _HALF = sp.Rational(1, 2)
 _SAFE: dict[str, Any] = {
@@ -58,6 +58,26 @@ def select(truth: Any, yes: Any, no: Any) -> Any:
     if isinstance(truth, below) and truth.args[2:] == (1, 0):
         return below(*truth.args[:2], yes, no)
     return below(truth, _HALF, no, yes)
+
+
+def chosen(number: Any, yes: Any, no: Any) -> Any:
+    """One expression where a number is positive, else another one, which then needs no value: `select`."""
+    if number.is_Rational:
+        return yes if number > 0 else no
+    against = -sign(number)
+    yes = total(yes, lambda e, safe: below(against, ZERO, e, safe), frozenset())
+    return below(against, ZERO, yes, total(no, lambda e, safe: below(against, ZERO, safe, e), frozenset()))
+
+
+def by_constants(expr: Any, constants: frozenset[Any]) -> Any:
+    """An expression whose choices by ``constants`` alone are by numbers that do not jump."""
+
+    def number(against: Any, *rest: Any) -> Any:
+        if isinstance(-against, sign) and against.free_symbols <= constants:
+            against = -(-against).args[0]
+        return below(against, *rest)
+
+    return expr.replace(below, number) if isinstance(expr, sp.Basic) and expr.has(below) else expr
 
 
 def truth_of(condition: Any) -> Any:

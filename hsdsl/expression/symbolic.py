@@ -11,6 +11,7 @@ from hsdsl import functions
 from hsdsl.expression import bounds, numeric, syntax
 from hsdsl.expression.expression_hints import CASES
 from hsdsl.expression.scope import Function, Scope, Value
+from hsdsl.expression.selection import chosen
 from hsdsl.expression.syntax import CONDITIONS, ExpressionError, Tree, children
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import shown
@@ -155,6 +156,8 @@ class _Builder:
         if tree.function == "exp" and bounds.large_exponent(exprs[0]):
             sentence = f"is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
             raise ExpressionError.at(tree, "HS119", f"`{self.text_of(tree)}` {sentence}")
+        if tree.function == "select":
+            return self.value(tree, self.made(tree, chosen, *exprs), number, values)
         function: Any = FUNCTIONS[tree.function][0]
         pairwise = tree.function in ("min", "max")
         expr = self.made(tree, _pairwise, function, exprs) if pairwise else self.made(tree, function, *exprs)

@@ -22,7 +22,8 @@ Number = Any  # an mpmath number; NaN where there is no value
 Point = Mapping[sp.Symbol, Number]
 
 ROUND_OFF = 32 * 2.0**-53  # of a surface, relative to its sides: the unit of float64 as in the meaning of a model
-_NAMES: dict[Any, str] = {function: name for name, (function, *_) in FUNCTIONS.items() if name != "sqrt"}
+_OWN = ("sqrt", "select")  # made of other functions
+_NAMES: dict[Any, str] = {function: name for name, (function, *_) in FUNCTIONS.items() if name not in _OWN}
 _NAMES |= {sp.Abs: "abs"}
 _COMPARED = {sp.Eq: "__eq__", sp.Ne: "__ne__", sp.Lt: "__lt__", sp.Le: "__le__", sp.Gt: "__gt__", sp.Ge: "__ge__"}
 

@@ -26,7 +26,7 @@ _NAMES = {
     "below": "below",
     "Min": "min",
     "Max": "max",
-    **{name: name for name in FUNCTIONS if name not in ("abs", "min", "max", "sqrt")},
+    **{name: name for name in FUNCTIONS if name not in ("abs", "min", "max", "sqrt", "select")},
 }
 
 # SymPy makes these by itself: tan(pi/3 - x) becomes cot(x + pi/6)

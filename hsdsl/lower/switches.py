@@ -17,6 +17,7 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
+from hsdsl.expression.selection import by_constants
 from hsdsl.functions import absolute, floor, maximum, minimum, rebuilt, sign
 from hsdsl.lower.routines import Definition
 from hsdsl.lower.straight import Gradient, replaced
@@ -95,8 +96,15 @@ def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     inputs = {symbol(i.name): i.hold for i in system.inputs if i.given is None}  # others may be driven from outside
     moving = frozenset({TIME, *(name for name, hold in inputs.items() if hold == "linear")})
     switches = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
-    modes = tuple(_mode(mode, switches.out_of) for mode in system.modes)
+    modes = tuple(_mode(_steady(mode, system), switches.out_of) for mode in system.modes)
     return replace(system, modes=modes), switches
+
+
+def _steady(mode: Mode, system: HybridSystem) -> Mode:
+    """A mode whose choices by parameters and states that do not flow are smooth."""
+    still = (symbol(x) for x, f in zip(mode.states, mode.flow, strict=True) if f == 0)
+    constants = frozenset((*system.parameter_symbols, *still))
+    return _mode(mode, lambda expr: by_constants(expr, constants))
 
 
 def _mode(mode: Mode, out_of: Callable[[Any], Any]) -> Mode:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hsdsl.enclosures import RESTRICTED, Range, hull, whole_power
 from hsdsl.functions import FUNCTIONS
 
-_NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name != "sqrt"}
+_NAMES: dict[Any, str] = {entry[0]: name for name, entry in FUNCTIONS.items() if name not in ("sqrt", "select")}
 _NAMES |= {sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor", sp.Min: "min", sp.Max: "max"}  # where SymPy makes its own
 _NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
 _NUMPY |= {"asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh", "pow": "power"}

@@ -150,6 +150,9 @@ class Walk:
         if tree.function in _ALIKE:
             found = self._alike(list(tree.arguments), "compared with")
             return ONE if tree.function == "atan2" else found
+        if tree.function == "select":
+            self.measure(tree.arguments[0])
+            return self._alike(list(tree.arguments[1:]), "chosen in place of")
         if tree.function in _KEPT:
             return self.measure(tree.arguments[0])
         if tree.function == "sqrt":
