@@ -16,7 +16,7 @@ from typing import NoReturn
 from hsdsl import interrupts, program_cache
 from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
-from hsdsl.limits import applied
+from hsdsl.limits import applied, cores
 from hsdsl.program import Program
 
 Answer = tuple[Program, ModelFiles] | ModelError | None
@@ -73,7 +73,7 @@ def _saves_time() -> bool:
     """Whether this process has one thread, nothing large is loaded, and there are two processors or more."""
     return (
         sys.platform == "linux"  # elsewhere a copy may not use the libraries of the system, or there is none
-        and len(os.sched_getaffinity(0)) > 1
+        and cores() > 1
         and not sys.modules.keys() & {"numpy", "sympy"}
         and len(os.listdir("/proc/self/task")) == 1
     )

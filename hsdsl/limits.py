@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -53,6 +54,11 @@ class Limits:
 NUMBERS = tuple(f.name for f in fields(Limits) if f.name != "folders")
 DEFAULT = Limits()
 _current: ContextVar[Limits] = ContextVar("limits", default=DEFAULT)
+
+
+def cores() -> int:
+    """The number of cores of this process."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def current() -> Limits:

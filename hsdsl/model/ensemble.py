@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Ensemble, Execution, TransitionTable
 from hsdsl.execution.sampling import columns_by_name
+from hsdsl.limits import cores
 from hsdsl.model.ensemble_request import EnsembleRequest
 from hsdsl.model.options import KEYS, Options
 from hsdsl.model.settings import check_memory, setting_columns, whole
@@ -210,8 +210,3 @@ def run_ensemble(
     request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
     completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
     return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
-
-
-def cores() -> int:
-    """The number of cores of this process."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

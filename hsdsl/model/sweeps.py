@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
+from hsdsl.limits import cores
 from hsdsl.model.chunk_work import ChunkWork, chunk_size
-from hsdsl.model.ensemble import cores
 from hsdsl.model.ensemble_request import INITIAL
 from hsdsl.model.options import KEYS, as_written, check_arguments, overrides_of
 from hsdsl.model.values import with_parameters

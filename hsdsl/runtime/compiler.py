@@ -56,31 +56,40 @@ class Compiler:
     ) -> None:
         """Compile sources to a file in a folder for temporary files, with so much effort to make it fast.
 
-        :data:`FLAGS` make a shared library of them.
+        :data:`FLAGS` make a shared library of them. Several are compiled at the same time.
 
         Raises
         ------
         NoCompiler
             It fails, does not end, or makes no file; the message holds the first error that it prints.
         """
-        from hsdsl.runtime import process  # what is compiled already needs none
-
         if _responding.get(self) is False:
             raise NoCompiler(self._endless())
-        seconds = limits.current().compile
         options = (effort, *flags, *(f"-I{folder}" for folder in includes))
-        command = [*self.command, *options, "-o", str(target), *map(str, sources), "-lm"]
-        try:
-            done = process.run(command, target.parent, seconds, lambda: _responds(self))
-        except OSError as error:
-            raise NoCompiler(f"{self} cannot be run: {error.strerror}") from None
-        if done.code is None:
-            slow = f"{self} takes more than {seconds:g} s; --limit compile={10 * seconds:g} allows more"
-            raise TooSlow(slow) if _responding.get(self, True) else NoCompiler(self._endless())
-        if done.code:
-            raise NoCompiler(f"{self} failed: {_complaint(done, target.parent)}")
+        objects = [str(target.with_name(f"{source.stem}.o")) for source in sources]
+        if len(sources) > 1:
+            given = zip(objects, map(str, sources), strict=True)
+            self._run([[*self.command, *options, "-c", "-o", made, source] for made, source in given], target.parent)
+        inputs = objects if len(sources) > 1 else map(str, sources)
+        self._run([[*self.command, *options, "-o", str(target), *inputs, "-lm"]], target.parent)
         if not target.is_file():
             raise NoCompiler(f"{self} made no library")
+
+    def _run(self, commands: Sequence[Sequence[str]], folder: Path) -> None:
+        """Run commands at the same time, and raise NoCompiler where one fails or does not end."""
+        from hsdsl.runtime import process  # what is compiled already needs none
+
+        seconds = limits.current().compile
+        try:
+            ends = process.run(commands, folder, seconds, lambda: _responds(self))
+        except OSError as error:
+            raise NoCompiler(f"{self} cannot be run: {error.strerror}") from None
+        for done in ends:
+            if done.code is None:
+                slow = f"{self} takes more than {seconds:g} s; --limit compile={10 * seconds:g} allows more"
+                raise TooSlow(slow) if _responding.get(self, True) else NoCompiler(self._endless())
+            if done.code:
+                raise NoCompiler(f"{self} failed: {_complaint(done, folder)}")
 
     def _endless(self) -> str:
         return f"{self} does not end: it takes longer than a few seconds for an empty function"
@@ -101,7 +110,8 @@ def _responds(compiler: Compiler) -> bool:
             source = folder / "empty.c"
             source.write_text("void hs_empty(void) {}\n")
             command = [*compiler.command, "-c", "-o", str(folder / "empty.o"), str(source)]
-            _responding[compiler] = process.run(command, folder, TRIAL, lambda: True).code is not None
+            (done,) = process.run([command], folder, TRIAL, lambda: True)
+            _responding[compiler] = done.code is not None
     return _responding[compiler]
 
 

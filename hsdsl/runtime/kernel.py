@@ -10,6 +10,7 @@ from functools import cache
 from threading import Lock, Thread
 from typing import Any
 
+from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
@@ -36,7 +37,7 @@ def runtime() -> ctypes.CDLL:
 @cache
 def _runtime() -> ctypes.CDLL:
     text, symbol, effort = LOOP
-    library = load(text, symbol, lambda: text, effort)
+    library = load(text, symbol, lambda: [text], effort)
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -110,7 +111,7 @@ def _longest(program: Program) -> str:
     return f"the longest expression is {where}, with {len(text):,} characters"
 
 
-def _source(program: Program) -> str:
-    from hsdsl.backends.c import model_source  # what is compiled already needs none
+def _source(program: Program) -> list[str]:
+    from hsdsl.backends.c import model_parts  # what is compiled already needs none
 
-    return model_source(program)
+    return model_parts(program, limits.cores())

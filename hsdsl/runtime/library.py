@@ -10,7 +10,7 @@ import ctypes
 import os
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -41,7 +41,7 @@ def ship(folder: Path) -> Path:
     """
     text, symbol, effort = LOOP
     library = folder / _shipped(text, effort).name
-    _compile(find_compiler(), text, library, effort)
+    _compile(find_compiler(), [text], library, effort)
     _tried(find_compiler(), library, symbol)
     return library
 
@@ -51,10 +51,11 @@ def _shipped(content: str, effort: Effort) -> Path:
     return SHIPPED / f"{key_of(content, _our_text(), ' '.join((effort, *FLAGS)), _processor())}.so"
 
 
-def load(content: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
+def load(content: str, symbol: str, source: Callable[[], Sequence[str]], effort: Effort) -> ctypes.CDLL:
     """Load the library that ``source`` compiles to and that has ``symbol``.
 
-    ``content`` is the source's name in the cache; the source is written only where it must be compiled.
+    ``content`` is the source's name in the cache; the source, one text or several that are compiled at the same time,
+    is written only where it must be compiled.
 
     Raises
     ------
@@ -113,7 +114,9 @@ def _processor() -> str:
     return f"{sys.platform} {platform.machine()} {sys.maxsize}"
 
 
-def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], str], effort: Effort) -> ctypes.CDLL:
+def _made(
+    compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]], effort: Effort
+) -> ctypes.CDLL:
     """Compile a library, try it, and keep it where anything can be kept."""
     from hsdsl.runtime.process import workshop
 
@@ -121,12 +124,12 @@ def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], str], 
     if not is_loop and (seconds := _given_up(key)) >= allowed:
         again = f"--limit compile={10 * seconds:g} allows more, hsdsl doctor --forget has it tried again"
         raise TooSlow(f"{compiler} took more than {seconds:g} s before; {again}")
-    text = source()
+    texts = source()
     try:
         with workshop() as folder:
             library = folder / "model.so"
             try:
-                _compile(compiler, text, library, effort)
+                _compile(compiler, texts, library, effort)
             except TooSlow:
                 if not is_loop:  # which is compiled in seconds, unless much else runs
                     _give_up(key, allowed)
@@ -152,10 +155,11 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-def _compile(compiler: Compiler, source: str, library: Path, effort: Effort) -> None:
-    text = library.with_name("model.c")
-    text.write_text(source)
-    compiler.build([text], [RUNTIME], library, effort, FLAGS)
+def _compile(compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort) -> None:
+    sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
+    for source, text in zip(sources, texts, strict=True):
+        source.write_text(text)
+    compiler.build(sources, [RUNTIME], library, effort, FLAGS)
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:

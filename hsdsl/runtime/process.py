@@ -1,4 +1,4 @@
-"""A command run to its end: in a process group and a folder of its own, for a limited time."""
+"""Commands run to their end: in process groups and a folder of their own, for a limited time."""
 
 from __future__ import annotations
 
@@ -38,16 +38,45 @@ def workshop() -> Generator[Path]:
         yield Path(folder)
 
 
-def run(command: Sequence[str], folder: Path, seconds: float, responds: Callable[[], bool]) -> Done:
-    """Run a command whose temporary files go to ``folder``; it reads nothing.
+def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, responds: Callable[[], bool]) -> list[Done]:
+    """Run commands at the same time, whose temporary files go to ``folder``; they read nothing.
 
-    After :data:`PATIENCE` it goes on only if ``responds``. All that it started is ended with it where it is ended.
+    After :data:`PATIENCE` they go on only if ``responds``. All that they started is ended with them where they are
+    ended.
 
     Raises
     ------
     OSError
-        It cannot be started.
+        One cannot be started.
     """
+    began = monotonic()
+    begun: list[_Begun] = []
+    try:
+        for command in commands:
+            begun.append(_begin(command, folder))
+        codes = [
+            _wait(each.process, each.listener, max(0.0, seconds - (monotonic() - began)), responds) for each in begun
+        ]
+    finally:
+        for each in begun:
+            _end(each.process)
+            del _running[each.process]
+    for each in begun:
+        each.listener.join(1.0)  # what it left running may hold the stream open
+    said = [b"".join(each.said).decode(errors="replace") for each in begun]
+    return list(map(Done, codes, said))
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A command that is under way, and who keeps what it says."""
+
+    process: subprocess.Popen[bytes]
+    listener: Thread
+    said: list[bytes]
+
+
+def _begin(command: Sequence[str], folder: Path) -> _Begun:
     process = subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -60,13 +89,7 @@ def run(command: Sequence[str], folder: Path, seconds: float, responds: Callable
     said: list[bytes] = []
     listener = Thread(target=_listen, args=(process.stderr, said), daemon=True)
     listener.start()
-    try:
-        code = _wait(process, listener, seconds, responds)
-    finally:
-        _end(process)
-        del _running[process]
-    listener.join(1.0)  # what it left running may hold the stream open
-    return Done(code, b"".join(said).decode(errors="replace"))
+    return _Begun(process, listener, said)
 
 
 def _wait(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +14,16 @@ from engines import needs_compiler
 from scipy.special import jv
 
 import hsdsl
-from hsdsl.backends.c import model_source
+from hsdsl.backends.c import model_parts, model_source
 from hsdsl.backends.c.pieces import LONGEST
 from hsdsl.integrators.sparse import sparse_factored, sparse_factored_complex
 from hsdsl.lower.ordering import ordering
 from hsdsl.program_cache import _rows
+from hsdsl.runtime.kernel import SYMBOL
 from hsdsl.sparsity import elimination
 
 SIZES = 70, 140
+RUNNER = Path(__file__).parents[2] / "models" / "pronking-runner.yaml"
 FUNCTION = re.compile(r"^static .*?^}$", re.MULTILINE | re.DOTALL)
 
 
@@ -162,3 +165,14 @@ experiment: {{until: 5, method: taylor}}
     assert len(run.times) < 400
     for i in (middle, middle + 1, middle - 3, n):
         assert run.final.state[f"x{i}"] == pytest.approx(jv(2 * (i - middle), 10), abs=1e-9)
+
+
+def test_files_of_a_program_hold_each_function_once() -> None:
+    program = hsdsl.load(RUNNER).program
+    functions = re.compile(r"^(?:static )?(?:HS_APART )?int (\w+)\([^{;]*\) \{", re.MULTILINE)
+    whole = functions.findall(model_source(program))
+    for most in (1, 2, 3):
+        parts = model_parts(program, most)
+        assert len(parts) == most
+        assert sorted(name for part in parts for name in functions.findall(part)) == sorted(whole)
+        assert [SYMBOL in part for part in parts] == [True] + [False] * (most - 1)

@@ -18,6 +18,8 @@ from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines,
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"^ +[px]\d+ = given\[\d+\]\n", re.MULTILINE)
+_SIGNATURE = re.compile(r"^int \w+\([^{]*\)(?= \{)", re.MULTILINE)
+PART = 1 << 14  # characters of functions that are worth a file of their own
 _HEAD = """\
 /* Generated from a model; see hs.h for what the tables mean. */
 
@@ -66,6 +68,30 @@ static int NAME(const hs_real *p, int order, hs_real *lines) {{
 
 def model_source(program: Program) -> str:
     """Write a program as C99, to be compiled together with the headers of `hsdsl/runtime/c`."""
+    writer, table = _written(program)
+    return "".join((_HEAD, *writer.functions.values(), *writer.tables, table))
+
+
+def model_parts(program: Program, most: int) -> list[str]:
+    """Write a program as up to so many files, which can be compiled at the same time and linked to a library."""
+    writer, table = _written(program)
+    functions = sorted(map(_visible, writer.functions.values()), key=len, reverse=True)
+    parts: list[list[str]] = [[] for _ in range(max(1, min(most, sum(map(len, functions)) // PART)))]
+    for text in functions:
+        min(parts, key=lambda part: sum(map(len, part))).append(text)
+    head = _HEAD + "".join(f"{_SIGNATURE.findall(text)[-1]};\n" for text in functions)
+    parts[0] += [*writer.tables, table]
+    return [head + "".join(part) for part in parts]
+
+
+def _visible(function: str) -> str:
+    """A function that other files call; its pieces, which come before it, are its own."""
+    start = function.rindex("\nstatic int ") + 1 if "\nstatic int " in function else 0
+    return function[:start] + function[start:].removeprefix("static ")
+
+
+def _written(program: Program) -> tuple[_Writer, str]:
+    """The functions and tables of a program, and the last of them."""
     writer = _Writer(program)
     modes = [writer.mode(k, mode) for k, mode in enumerate(program.flows)]
     table = writer.table("hs_mode", "modes", modes)
@@ -76,7 +102,7 @@ def model_source(program: Program) -> str:
         f"{len(program.outputs)}, {len(writer.data) - program.contact_count}, {program.contact_count}, "
         f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {table}}};\n"
     )
-    return "".join((_HEAD, *writer.functions.values(), *writer.tables, model))
+    return writer, model
 
 
 def width(program: Program) -> int:

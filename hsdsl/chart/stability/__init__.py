@@ -20,6 +20,7 @@ from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell, Tool
 from hsdsl.chart.stability.limits import eigenvalues, largest_step
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
+from hsdsl.limits import cores
 from hsdsl.model import Model
 from hsdsl.processes import Lost, in_processes
 
@@ -104,7 +105,7 @@ def stability_map(
         k, j, i = place
         return bench.run(tools[k], _merged(x.arguments(x.values[i]), y.arguments(y.values[j])))
 
-    for index, answer in in_processes(work, places, processes or _cores(), patience):
+    for index, answer in in_processes(work, places, processes or cores(), patience):
         lost = isinstance(answer, Lost)
         found[places[index]] = Cell(STUCK, why=f"it {answer.word}") if lost else answer
         watch(len(found), len(places))
@@ -116,10 +117,6 @@ def stability_map(
         Panel(tool, cells, _limit(model, base, tool, x, y)) for tool, cells in zip(tools, grids, strict=True)
     )
     return StabilityMap(os.path.basename(model.program.path).removesuffix(".yaml"), x, y, panels)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
