@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any
@@ -49,11 +49,16 @@ def record(row: Row) -> dict[str, Any]:
 
 
 def as_csv(rows: Iterable[Row]) -> str:
-    """The table as CSV, with a header."""
+    """The rows as CSV, with a header."""
+    return csv_text(COLUMNS, map(record, rows))
+
+
+def csv_text(columns: Sequence[str], records: Iterable[Mapping[str, Any]]) -> str:
+    """Records as CSV, with a header."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(record(row) for row in rows)
+    writer.writerows(records)
     return text.getvalue()
 
 

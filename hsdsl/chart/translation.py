@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
 """A model's mathematics as functions for another tool, with numbers for parameters and symbols for states."""
 

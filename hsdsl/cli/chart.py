@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
-from hsdsl.cli.console import progress, say
+from hsdsl.cli.console import progress, say, write_table
 from hsdsl.cli.options import Answer, option
 from hsdsl.cli.texts import check_target, known_names, names_of
 from hsdsl.errors import UsageError
@@ -98,15 +98,9 @@ def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) ->
 
 def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:
     from hsdsl.chart.rows import as_csv, as_text, panels, record
-    from hsdsl.store import forget_sidecar
-    from hsdsl.store.atomic import replacing
 
     rows = [row for _, group in charted for row in group]
-    if out is not None:
-        with replacing(out) as file:
-            file.write(as_csv(rows).encode())
-            forget_sidecar(out)
-        say(f"wrote {out}")
+    write_table(out, lambda: as_csv(rows))
     if plot is not None:
         from hsdsl.plot.work_precision import plot_work_precision
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from hsdsl.errors import STEP_AND_TOLERANCE, Diagnostic, ModelError, UsageError
@@ -61,6 +62,18 @@ def print_json(content: Any) -> None:
     from hsdsl.report import dumps
 
     print(dumps(content))
+
+
+def write_table(target: Path | None, text: Callable[[], str]) -> None:
+    """Write a table where a file is given for it, and say so; a sidecar of an earlier one is no longer its own."""
+    from hsdsl.store import forget_sidecar
+    from hsdsl.store.atomic import replacing
+
+    if target is not None:
+        with replacing(target) as file:
+            file.write(text().encode())
+            forget_sidecar(target)
+        say(f"wrote {target}")
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from typer import Option
 
-from hsdsl.cli.console import progress, say
+from hsdsl.cli.console import progress, say, write_table
 from hsdsl.cli.options import Answer, Model, option, overriding, values_of
 from hsdsl.cli.texts import check_target, known_names
 from hsdsl.errors import UsageError
@@ -66,14 +66,8 @@ def stability(
 
 def _report(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
     from hsdsl.chart.stability.table import as_csv, as_plain, as_text, axis, panels, shaded
-    from hsdsl.store import forget_sidecar
-    from hsdsl.store.atomic import replacing
 
-    if out is not None:
-        with replacing(out) as file:
-            file.write(as_csv(found).encode())
-            forget_sidecar(out)
-        say(f"wrote {out}")
+    write_table(out, lambda: as_csv(found))
     if plot is not None:
         from hsdsl.plot.stability import plot_stability
 

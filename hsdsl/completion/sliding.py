@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false
 """Sliding: the flow on a surface that two modes press on (Filippov 1988, doi:10.1007/978-94-015-7793-3).
 

@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportOperatorIssue=false
 """Conditions of events: comparisons with their surfaces, joined by `and` and `or`; `not` is moved into comparisons."""
 

@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportCallIssue=false
 """Switches of time: what jumps or bends at times that no state decides, as numbers that stay the same between them.
 

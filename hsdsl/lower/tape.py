@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """Expressions -> the tape that Taylor coefficients are computed from: one elementary operation a line.
 

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots."""
 
 from __future__ import annotations

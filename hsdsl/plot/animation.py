@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """The scene of a run as a film: GIF by Pillow, MP4 by ffmpeg; the mode and the time are below the shapes."""
 
 from __future__ import annotations

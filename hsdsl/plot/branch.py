@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """A branch of periodic orbits over a parameter: stable orbits solid, others dashed, bifurcations marked."""
 
 from __future__ import annotations

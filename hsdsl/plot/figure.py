@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """The figure of one run or of several: its panels, their sizes, headings and legend."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Measurements and the run that was fitted to them, a panel for each column."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Distances of runs from nearby over their radius, log-log, a colour for each sequence of transitions."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Runs and ensembles as notebooks display them: a summary, and a picture inside the text; nothing is fetched."""
 
 from __future__ import annotations

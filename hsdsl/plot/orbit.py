@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """A periodic orbit in the plane of two states, and its multipliers beside the unit circle."""
 
 from __future__ import annotations

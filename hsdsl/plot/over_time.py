@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """A picture of distances over time: lower and upper bounds, on a logarithmic scale."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """One state or output over time."""
 
 from __future__ import annotations

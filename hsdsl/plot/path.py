@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """A picture of a shortest path through modes of two coordinates: a panel for each mode, passages as numbered jumps."""
 
 from __future__ import annotations

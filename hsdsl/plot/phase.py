@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Two states or outputs against each other."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """The shapes of a scene at one time, from the outputs of a run, and how they look."""
 
 from __future__ import annotations

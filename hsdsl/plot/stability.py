@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Outcomes over a plane, a panel for each tool: colours tell what came, shades how near converged runs are."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Settings and colours of every picture, and pictures as files."""
 
 from __future__ import annotations

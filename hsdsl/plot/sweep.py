@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Pictures of sweeps: a curve over one name, a map or points over two, a bifurcation diagram."""
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
 # pyright: reportUnknownMemberType=false
-# (matplotlib's stubs leave the keyword arguments untyped)
 """Time against error, log-log: a column for each scene, a line for each method; crosses mark wrong results."""
 
 from __future__ import annotations

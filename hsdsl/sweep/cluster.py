@@ -1,4 +1,3 @@
-# distributed has no types.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false
 """Chunks of a sweep made by the workers of a Dask cluster; this process writes what they send.
 

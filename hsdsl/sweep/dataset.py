@@ -1,4 +1,3 @@
-# pyarrow has no types.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """A sweep's dataset: a folder with a manifest, and a Parquet file for each chunk of rows that was run.
 

@@ -1,4 +1,3 @@
-# pyarrow has no types.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """What a picture of a sweep is of: which columns, over which of the names that vary.
 

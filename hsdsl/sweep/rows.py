@@ -1,4 +1,3 @@
-# pyarrow has no types.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """The columns of a sweep's dataset, and an ensemble as a table of them.
 

@@ -1,4 +1,3 @@
-# pyarrow has no types.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """A sweep's dataset in a few lines, or as JSON: what varies, how far it is, how runs ended, ranges of numbers."""
 

@@ -1,4 +1,3 @@
-# The peers are optional and untyped.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """CasADi: its Rosenbrock integrator on the samples' grid, with zero-crossing functions and a transition function.
 

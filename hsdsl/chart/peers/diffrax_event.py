@@ -1,4 +1,3 @@
-# The peers are optional and untyped.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """diffrax: ``diffeqsolve`` (Tsit5, PID steps) with an event that a Newton solve locates, compiled, mode by mode."""
 

@@ -1,4 +1,3 @@
-# The peers are optional and untyped.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """heyoka: an adaptive Taylor integrator a mode with terminal events; a reset to the same mode is its callback.
 

@@ -1,4 +1,3 @@
-# The peers are optional and untyped.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
 """SciPy: ``solve_ivp`` with terminal events that rise through zero, restarted after each; DOP853."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator
 from math import isfinite, log10
 from typing import Any
 
+from hsdsl.chart.rows import csv_text
 from hsdsl.chart.stability import Axis, Panel, StabilityMap
 from hsdsl.chart.stability.cells import CONVERGED, WORDS, Cell
 from hsdsl.plot import stability as picture
@@ -32,12 +31,8 @@ def _plain(panel: Panel, cell: Cell) -> dict[str, Any]:
 
 
 def as_csv(found: StabilityMap) -> str:
-    """The table with a header, a line for each run."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, (found.x.name, found.y.name, *COLUMNS), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(records(found))
-    return text.getvalue()
+    """The map as CSV, a line for each run."""
+    return csv_text((found.x.name, found.y.name, *COLUMNS), records(found))
 
 
 def as_plain(found: StabilityMap) -> dict[str, Any]:

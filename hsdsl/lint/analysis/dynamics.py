@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
 """Surfaces, rates, domains and guards of a model with the values of its parameters, and questions about them.
 

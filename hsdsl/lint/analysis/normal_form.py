@@ -1,4 +1,3 @@
-# SymPy's types are wider than what it takes and returns.
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
 """Normal forms: expressions as polynomials in which equal values look equal, and back.
 
