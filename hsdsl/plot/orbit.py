@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hsdsl.execution import Array, Execution
-from hsdsl.plot.style import FAINT, PALETTE, save
+from hsdsl.plot.style import FAINT, PALETTE, to_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,24 +20,17 @@ POINTS = 2000
 LETTERS = 90  # of a line of the title
 
 
-def plot_orbit(
-    path: str | os.PathLike[str], run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str
-) -> None:
+@to_file
+def plot_orbit(run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str) -> Figure:
     """Draw a run over one period; jumps are dotted."""
+    from matplotlib.figure import Figure
 
-    def draw() -> Figure:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(10, 4.6), layout="constrained")
-        left, right = figure.subplots(1, 2)
-        _draw_run(left, run, states, period)
-        draw_circle(right, multipliers)
-        figure.suptitle(
-            textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False
-        )
-        return figure
-
-    save(draw, path)
+    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _draw_run(left, run, states, period)
+    draw_circle(right, multipliers)
+    figure.suptitle(textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
+    return figure
 
 
 def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) -> None:

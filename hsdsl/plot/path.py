@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ from hsdsl.metrics.formulas import Formula
 from hsdsl.metrics.geometry import Array, Domain, Gate, Space
 from hsdsl.metrics.line import interval_of
 from hsdsl.metrics.paths import PathPiece
-from hsdsl.plot.style import ALARM, FAINT, INK, save
+from hsdsl.plot.style import ALARM, FAINT, INK, to_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +22,8 @@ GRID = 160  # points of a panel's side at which domains and curved guards are ev
 MARGIN = 0.25  # of a path's extent, around it
 
 
-def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[PathPiece], title: str) -> None:
+@to_file
+def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
     """Draw domains, guards, their images and the pieces of a path.
 
     Raises
@@ -32,22 +32,18 @@ def plot_path(path: str | os.PathLike[str], space: Space, pieces: Sequence[PathP
         No path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be written.
     """
     modes = _visited(space, pieces)
+    from matplotlib.figure import Figure
 
-    def draw() -> Figure:
-        from matplotlib.figure import Figure
-
-        columns = min(3, len(modes))
-        rows = -(-len(modes) // columns)
-        figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")
-        axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
-        for axis, mode in zip(axes, modes, strict=False):
-            _panel(axis, space, mode, pieces)
-        for axis in axes[len(modes) :]:
-            axis.set_visible(False)
-        figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-        return figure
-
-    save(draw, path)
+    columns = min(3, len(modes))
+    rows = -(-len(modes) // columns)
+    figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axis, mode in zip(axes, modes, strict=False):
+        _panel(axis, space, mode, pieces)
+    for axis in axes[len(modes) :]:
+        axis.set_visible(False)
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
+    return figure
 
 
 def _visited(space: Space, pieces: Sequence[PathPiece]) -> list[int]:

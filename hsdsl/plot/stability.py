@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.plot.style import save
+from hsdsl.plot.style import to_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,14 +55,9 @@ class Panel:
     limit: Sequence[float | None] | None
 
 
-def plot_stability(
-    path: str | os.PathLike[str], name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str = "rho"
-) -> None:
+@to_file
+def plot_stability(name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str = "rho") -> Figure:
     """Draw the panels to a .png or .svg file; ``shaded`` says what the shades are of."""
-    save(lambda: _figure(name, x, y, panels, shaded), path)
-
-
-def _figure(name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str) -> Figure:
     from matplotlib.figure import Figure
 
     columns = min(3, len(panels))

@@ -8,9 +8,10 @@ import sys
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
+from functools import wraps
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Concatenate, ParamSpec
 
 from hsdsl.errors import UsageError
 from hsdsl.names import visible_lines
@@ -20,6 +21,7 @@ from hsdsl.store.atomic import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
+P = ParamSpec("P")
 # The salt makes the SVG's ids repeatable.
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "hsdsl",
@@ -65,6 +67,16 @@ def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
         for path in targets:
             with replacing(path) as file:
                 write_figure(figure, file, path.suffix[1:].lower())
+
+
+def to_file(draw: Callable[P, Figure]) -> Callable[Concatenate[str | os.PathLike[str], P], None]:
+    """Make a function that draws a figure one that writes it to a file, its first argument; see :func:`save`."""
+
+    @wraps(draw)
+    def plot(path: str | os.PathLike[str], /, *args: P.args, **kwargs: P.kwargs) -> None:
+        save(lambda: draw(*args, **kwargs), path)
+
+    return plot
 
 
 def check_suffixes(*paths: str | os.PathLike[str], formats: Sequence[str] = FORMATS) -> list[Path]:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.plot.style import FAINT, PALETTE, curve, save
+from hsdsl.plot.style import FAINT, PALETTE, curve, to_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,77 +42,68 @@ class Quantity:
         return [] if self.values.dtype != object else sorted({str(v) for v in self.values if v is not None})
 
 
-def plot_curve(path: str | os.PathLike[str], x: Axis, of: Quantity, title: str) -> None:
+@to_file
+def plot_curve(x: Axis, of: Quantity, title: str) -> Figure:
     """Draw a number over a name, in the order of the name; words as dots on lines of their own."""
-
-    def content(figure: Figure) -> Axes:
-        axes = figure.subplots()
-        order = np.argsort(x.values, kind="stable")
-        if of.words:
-            numbers = [of.words.index(str(v)) if v is not None else np.nan for v in of.values[order]]
-            axes.plot(x.values[order], numbers, ".", color=curve(PALETTE[5]))
-            axes.set_yticks(range(len(of.words)), of.words, parse_math=False)
-        else:
-            line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
-            axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
-        axes.set_ylabel(of.label, parse_math=False)
-        return axes
-
-    _save(path, content, x, title)
+    figure, axes = _empty()
+    order = np.argsort(x.values, kind="stable")
+    if of.words:
+        numbers = [of.words.index(str(v)) if v is not None else np.nan for v in of.values[order]]
+        axes.plot(x.values[order], numbers, ".", color=curve(PALETTE[5]))
+        axes.set_yticks(range(len(of.words)), of.words, parse_math=False)
+    else:
+        line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
+        axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
+    axes.set_ylabel(of.label, parse_math=False)
+    return _labelled(figure, axes, x, title)
 
 
-def plot_dots(path: str | os.PathLike[str], x: Axis, of: Quantity, where: Any, title: str) -> None:
+@to_file
+def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
     """Draw every number of rows with lists; ``where`` has the row of each."""
-
-    def content(figure: Figure) -> Axes:
-        axes, many = figure.subplots(), len(of.values) > DOT
-        size, alpha = (0.4, 0.35) if many else (1.2, 0.8)
-        dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
-        axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
-        axes.set_ylabel(of.label, parse_math=False)
-        if len(x.values):
-            axes.set_xlim(x.values.min(), x.values.max())
-        return axes
-
-    _save(path, content, x, title)
+    (figure, axes), many = _empty(), len(of.values) > DOT
+    size, alpha = (0.4, 0.35) if many else (1.2, 0.8)
+    dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
+    axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
+    axes.set_ylabel(of.label, parse_math=False)
+    if len(x.values):
+        axes.set_xlim(x.values.min(), x.values.max())
+    return _labelled(figure, axes, x, title)
 
 
-def plot_map(path: str | os.PathLike[str], x: Axis, y: Axis, of: Quantity, title: str) -> None:
+@to_file
+def plot_map(x: Axis, y: Axis, of: Quantity, title: str) -> Figure:
     """Draw a number or a word over two names: cells where both have grids, else dots; grey where there is none."""
-
-    def content(figure: Figure) -> Axes:
-        axes = figure.subplots()
-        axes.set_facecolor("#dddddd")
-        shades: dict[str, Any] = {"cmap": "viridis"}
-        values = of.values
-        if of.words:
-            values, shades = _by_words(of)
-        if x.grid is None or y.grid is None:
-            drawn: Any = axes.scatter(x.values, y.values, c=values, s=6, linewidths=0, **shades)
-        else:
-            drawn = axes.pcolormesh(*_cells(x, y, values), rasterized=True, **shades)
-        _legend(figure, axes, drawn, of)
-        axes.set_ylabel(y.label, parse_math=False)
-        if y.logarithmic:
-            axes.set_yscale("log")
-        return axes
-
-    _save(path, content, x, title)
+    figure, axes = _empty()
+    axes.set_facecolor("#dddddd")
+    shades: dict[str, Any] = {"cmap": "viridis"}
+    values = of.values
+    if of.words:
+        values, shades = _by_words(of)
+    if x.grid is None or y.grid is None:
+        drawn: Any = axes.scatter(x.values, y.values, c=values, s=6, linewidths=0, **shades)
+    else:
+        drawn = axes.pcolormesh(*_cells(x, y, values), rasterized=True, **shades)
+    _legend(figure, axes, drawn, of)
+    axes.set_ylabel(y.label, parse_math=False)
+    if y.logarithmic:
+        axes.set_yscale("log")
+    return _labelled(figure, axes, x, title)
 
 
-def _save(path: str | os.PathLike[str], content: Callable[[Figure], Axes], x: Axis, title: str) -> None:
-    def draw() -> Figure:
-        from matplotlib.figure import Figure
+def _empty() -> tuple[Figure, Axes]:
+    from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(8, 5), layout="constrained")
-        axes = content(figure)
-        if x.logarithmic:
-            axes.set_xscale("log")
-        axes.set_xlabel(x.label, parse_math=False)
-        axes.set_title(title, loc="left", fontsize=10, parse_math=False)
-        return figure
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    return figure, figure.subplots()
 
-    save(draw, path)
+
+def _labelled(figure: Figure, axes: Axes, x: Axis, title: str) -> Figure:
+    if x.logarithmic:
+        axes.set_xscale("log")
+    axes.set_xlabel(x.label, parse_math=False)
+    axes.set_title(title, loc="left", fontsize=10, parse_math=False)
+    return figure
 
 
 def _by_words(of: Quantity) -> tuple[Any, dict[str, Any]]:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.plot.style import FAINT, PALETTE, save
+from hsdsl.plot.style import FAINT, PALETTE, to_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,26 +49,23 @@ class Panel:
     lines: Sequence[Line]
 
 
-def plot_work_precision(path: str | os.PathLike[str], columns: Sequence[Sequence[Panel]]) -> None:
+@to_file
+def plot_work_precision(columns: Sequence[Sequence[Panel]]) -> Figure:
     """Draw panels, a column for each scene."""
     labels = list(dict.fromkeys(line.label for column in columns for panel in column for line in panel.lines))
     groups = {line.label: line.group for column in columns for panel in column for line in panel.lines}
     places, down, across = _places(columns)
+    from matplotlib.figure import Figure
 
-    def draw() -> Figure:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
-        axes = figure.subplots(down, across, squeeze=False)
-        for place, axis in np.ndenumerate(axes):
-            if place in places:
-                _draw(axis, places[place], labels, groups, ylabel=place[1] == 0)
-            else:
-                axis.axis("off")
-        _legend(figure, labels, groups)
-        return figure
-
-    save(draw, path)
+    figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
+    axes = figure.subplots(down, across, squeeze=False)
+    for place, axis in np.ndenumerate(axes):
+        if place in places:
+            _draw(axis, places[place], labels, groups, ylabel=place[1] == 0)
+        else:
+            axis.axis("off")
+    _legend(figure, labels, groups)
+    return figure
 
 
 def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:

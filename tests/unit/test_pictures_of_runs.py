@@ -289,29 +289,25 @@ def test_a_failed_run_says_so_in_every_picture():
     assert data_of(page([failed], View()))[1][0]["failed"]
 
 
-def test_the_legend_of_many_sequences_is_short(tmp_path, monkeypatch):
+def test_the_legend_of_many_sequences_is_short():
     from hsdsl.plot import nearby
 
-    figures = []
-    monkeypatch.setattr(nearby, "save", lambda draw, path: figures.append(draw()))
     points = [(10.0**-k, 10.0**-k, (f"a_transition_with_a_name_{j}",) * 9) for k in (2, 3) for j in range(40)]
-    nearby.plot_nearby(tmp_path / "n.png", points, "title")
-    texts = [text.get_text() for text in figures[0].legends[0].get_texts()]
+    figure = nearby.plot_nearby.__wrapped__(points, "title")
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert len(texts) == nearby.MOST + 2 and texts[-1] == "and 28 other sequences"
-    figures[0].draw_without_rendering()
-    (axis,) = figures[0].axes
-    assert axis.get_window_extent().height > figures[0].bbox.height / 3
-    assert not axis.get_window_extent().overlaps(figures[0].legends[0].get_window_extent())
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    assert axis.get_window_extent().height > figure.bbox.height / 3
+    assert not axis.get_window_extent().overlaps(figure.legends[0].get_window_extent())
 
 
-def test_a_branch_says_which_lines_are_stable(tmp_path, monkeypatch):
+def test_a_branch_says_which_lines_are_stable():
     from hsdsl.plot import branch
 
-    figures = []
-    monkeypatch.setattr(branch, "save", lambda draw, path: figures.append(draw()))
     points = [(0.1 * k, float(k), k not in (4, 5, 6)) for k in range(12)]
-    branch.plot_branch(tmp_path / "b.png", "c", "x", points, [("fold", 0.3, 3.0)], "title")
-    assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["stable", "unstable", "fold"]
+    figure = branch.plot_branch.__wrapped__("c", "x", points, [("fold", 0.3, 3.0)], "title")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["stable", "unstable", "fold"]
 
 
 @pytest.mark.parametrize(("states", "jump"), [(["s", "w"], [(1, 0), (0, 0)]), (["s"], [(1, 1), (1, 0)])])
