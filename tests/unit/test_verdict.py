@@ -188,6 +188,25 @@ def test_a_pulse_is_integrated_or_named(tmp_path, middle, width, clock, method):
     assert right or run.verdict.theorem == "unknown"
 
 
+SUNK = [  # pulses in other motion, and what they add to the state
+    ("0.3*cos(s) + exp(-((s - 2.71)/1e-2)**2)", 0.3 * math.sin(5) + 1e-2 * math.sqrt(math.pi), "dop853", 1e-9),
+    ("cos(s) + 0.2*exp(-((s - 2.9)/2e-3)**2)", math.sin(5) + 4e-4 * math.sqrt(math.pi), "taylor", 1e-5),
+    ("cos(7*s)*exp(-((s - 2.03)/5e-3)**2)", -6.446981978969e-4, "taylor", 1e-9),
+    ("1 + (sin(s) + exp(-((s - 2.5)/1e-3)**2)) - sin(s)", 5 + 1e-3 * math.sqrt(math.pi), "taylor", 1e-9),
+    ("cos(s) + 0.1*tanh((s - 2.1)/1e-4)", math.sin(5) + 0.08, "dop853", 1e-7),
+]
+
+
+@pytest.mark.parametrize(("flow", "end", "method", "tolerance"), SUNK)
+def test_a_pulse_in_other_motion_is_integrated_or_named(flow: str, end: float, method: str, tolerance: float) -> None:
+    model = hsdsl.loads(
+        f"hsdsl: 1\nmodes: {{m: {{flow: {{s: 1, x: '{flow}'}}}}}}\ninitial: {{mode: m, s: 0, x: 0}}\n"
+        "experiment: {until: 5}\n"
+    )
+    run = model.simulate(method=method, tolerance=tolerance, scheme="located")
+    assert abs(run.final["x"] - end) < 30 * tolerance or run.verdict.theorem == "unknown", run.final["x"] - end
+
+
 NARROW = [("cos(s - 3.76)**400 >= 0.41", 12), ("exp(-((s - 7.7)/0.02)**2) >= 1/2", 20), ("abs(s - 5) <= 0.003", 31)]
 
 

@@ -3,7 +3,7 @@
 
 #include "screen_parts.h"
 
-/* How far the enclosed flow lies beyond the derivatives of the states on a part, and how far these vary there. */
+/* How far the enclosed flow and the derivatives of states lie beyond each other on a part, and how far these vary. */
 static double flow_beyond(const hs_view *v, int level, int i, double width, double *varies) {
   const int d = v->s->run.degree;
   const double *const b = coefficients_at(v, level) + i * (d + 1);
@@ -12,7 +12,7 @@ static double flow_beyond(const hs_view *v, int level, int i, double width, doub
   below *= d / width, above *= d / width;
   const hs_range f = v->range[v->f->flow.result[i]];
   *varies = above - below;
-  return hs_max(f.high - above, below - f.low);
+  return hs_max(fabs(f.high - above), fabs(below - f.low));
 }
 
 /* Enclose the flow on a part of a step, without errors. */
@@ -21,15 +21,44 @@ static void enclose_flow(hs_view *v, int64_t row, int level, double start, doubl
   range_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->range);
 }
 
-/* How much a step shows of each state's slope: an eighth of it, or of the enclosure's own width, is no pulse. */
+/* What is between two others. */
+static double median(double a, double b, double c) { return hs_max(hs_min(a, b), hs_min(hs_max(a, b), c)); }
+
+/* How much the terms of the flow change by along a step, as a short piece around a place of it shows. */
+static void look_at_piece(hs_view *v, int64_t row, double share, double *change) {
+  const hs_record *run = &v->s->run;
+  const double *x = recorded_row(run, row), *c = recorded_piece(run, row);
+  const double length = run->times[row + 1] - run->times[row], t = run->times[row] + share * length;
+  v->range[0] = outwards(t - length * SHORT / 2, t + length * SHORT / 2, 0x1p-52);
+  for (int i = 0; i < v->n; i++) {
+    double at = 0.0, slope = 0.0;
+    for (int k = run->degree - 1; k >= 0; k--) {
+      slope = slope * share + (k + 1) * c[k * run->width + i];
+      at = at * share + c[k * run->width + i];
+    }
+    const double middle = x[i] + at * share, wide = fabs(slope) * SHORT / 2;
+    v->range[1 + i] = outwards(middle - wide, middle + wide, 0x1p-52);
+  }
+  range_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->range);
+  for (int i = 0; i < v->n; i++) {
+    const hs_range f = v->range[v->f->flow.result[i]];
+    change[i] = hs_finite(f.high - f.low) ? (f.high - f.low) / SHORT : 0.0;
+  }
+}
+
+/* How much a step shows of the flow: an eighth of that is no pulse. What varies is the derivative of its polynomial, or
+   terms of the flow at two places out of three; the flow is not known to vary more than its enclosure does. */
 static void look_at_whole(hs_view *v, int64_t row) {
+  double *const at[3] = {v->y, v->z, v->slope};
+  for (int k = 0; k < 3; k++) look_at_piece(v, row, k / 2.0, at[k]);
   for (int i = 0; i < v->n; i++) v->cut[i] = 1;
   whole_step(v, row);
   enclose_flow(v, row, 0, 0.0, 1.0);
   for (int i = 0; i < v->n; i++) {
+    const hs_range f = v->range[v->f->flow.result[i]];
     double varies;
-    const double beyond = flow_beyond(v, 0, i, v->s->run.times[row + 1] - v->s->run.times[row], &varies);
-    v->enough[i] = hs_max(beyond, varies) / RESOLVED;
+    flow_beyond(v, 0, i, v->s->run.times[row + 1] - v->s->run.times[row], &varies);
+    v->enough[i] = hs_min(hs_max(varies, median(at[0][i], at[1][i], at[2][i])), f.high - f.low) / RESOLVED;
     v->unseen[i] = 1;
   }
 }
@@ -37,14 +66,14 @@ static void look_at_whole(hs_view *v, int64_t row) {
 /* Whether the flow may be on a part what the polynomial does not show: halves are looked at until they tell. */
 static int flow_open(hs_view *v, int64_t row, int level, double start, double width) {
   const int w = v->s->model->width;
-  const double length = width * (v->s->run.times[row + 1] - v->s->run.times[row]);
+  const double length = v->s->run.times[row + 1] - v->s->run.times[row];
   int *const before = v->unseen + level * w, *const open = before + w, any = 0;
   if (++v->looks > MOST_LOOKS) return 1;
   if (level) enclose_flow(v, row, level, start, width);
   for (int i = 0; i < v->n; i++) {
     double varies;
-    const double beyond = flow_beyond(v, level, i, length, &varies);
-    open[i] = before[i] && !(beyond <= v->enough[i] || beyond * length <= v->own[i]);
+    const double beyond = flow_beyond(v, level, i, width * length, &varies);
+    open[i] = before[i] && !(beyond <= v->enough[i] || beyond * length <= RESOLVED * hs_max(v->own[i], HS_NOTHING));
     any |= open[i];
   }
   if (!any) return 0;

@@ -13,7 +13,8 @@
 #define LEVELS 10           /* a step is cut in halves */
 #define END_LEVELS 6        /* the part at its end, where a surface is crossed */
 #define MOST_LOOKS 128      /* at parts of one step */
-#define RESOLVED 8          /* changes of a flow smaller than this share of what its step shows are seen */
+#define RESOLVED 8          /* the flow is as it seems where it varies by so much more, or moves by so many errors */
+#define SHORT 0x1p-10      /* of a step: a piece that shows how fast enclosures of the flow widen */
 #define PLACES 64           /* of a mode where the round-off of its flow is looked at */
 #define ROUNDS 48           /* of closing in on a turning point */
 #define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */

@@ -1,8 +1,8 @@
 """The flow along steps: does it vary where no step looked, jump, or have no bound on its slope?
 
 A step's polynomial knows the flow at a few points. The flow is enclosed on parts of the step and held against the
-polynomial's own derivative: what sticks out is a pulse that was not seen, unless it is the enclosure's own width, which
-halves with the part.
+polynomial's own derivative: what sticks out is a pulse that was not seen, unless it is small against what the step
+shows, or the enclosure's own width, which halves with the part.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.enclosures import as_range
+from hsdsl.arithmetic import NOTHING
+from hsdsl.bernstein import halving
+from hsdsl.enclosures import Range, hull
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS
@@ -22,7 +24,8 @@ from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 14
-RESOLVED = 8  # an enclosure's own width has fallen by so much after three halvings
+RESOLVED = 8  # the flow is as it seems where it varies by so much more, or may move a state by at most so many errors
+SHORT = 2.0**-10  # of a step: a piece that shows how fast enclosures of the flow widen
 Array = NDArray[np.float64]
 
 
@@ -34,9 +37,9 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
         return found, []
     for steps in steps_of(run, doubtful="changing"):
         with np.errstate(all="ignore"):
-            found += _named(run, "a change of the flow", "may not have been seen", *_unseen(run, steps))
-            if run.problem.program.modes[steps.mode].steep:
-                found += _named(run, "the slope of the flow", "has no bound", *_steep(run, steps))
+            steep = run.problem.program.modes[steps.mode].steep
+            unbounded = [*_named(run, "the slope of the flow", "has no bound", *_steep(run, steps))] if steep else []
+            found += unbounded or _named(run, "a change of the flow", "may not have been seen", *_unseen(run, steps))
     return found, []
 
 
@@ -58,25 +61,59 @@ def _unseen(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     """Parts of steps on which the flow may be what the step's polynomial does not show."""
     number = np.zeros(int(steps.row.max(initial=0)) + 1, dtype=int)
     number[steps.row] = np.arange(len(steps))
-    below, above = steps.slopes()
-    enough = np.maximum(_beyond(run, steps), above - below) / RESOLVED
+    enough = _shown(run, steps) / RESOLVED
     names = run.problem.program.modes[steps.mode].states
     digits = ROUNDOFF_UNITS * float(run.arithmetic.unit) * np.array([run.sizes.get(name, 0.0) for name in names])
 
     def decides(parts: Parts) -> NDArray[np.bool_]:
         beyond = _beyond(run, parts)
-        effect = beyond * (parts.width * parts.length)[:, None]
-        return ~((beyond <= enough[number[parts.row]]) | (effect <= np.maximum(parts.error, digits)))
+        effect = beyond * parts.length[:, None]  # of all parts of a step together
+        error = np.maximum(np.maximum(parts.error, digits), NOTHING)
+        return ~((beyond <= enough[number[parts.row]]) | (effect <= RESOLVED * error))
 
     return undecided(steps, decides, HALVINGS)
 
 
+def _shown(run: RunView, steps: Parts) -> Array:
+    """How much steps show of the flow; shape (N, n).
+
+    What varies is the derivative of the polynomial, or terms of the flow: those of an enclosure do not cancel, and it
+    widens with a piece. The median of three places leaves out a pulse at one. Neither counts for more than what the
+    flow may be along the whole step.
+    """
+    below, above = steps.slopes()
+    least, most = _enclosed(run, steps, steps.times, steps.states())
+    return np.minimum(np.maximum(above - below, np.median(_widening(run, steps), axis=0)), most - least)
+
+
+def _widening(run: RunView, steps: Parts) -> list[Array]:
+    """How much wider the flow's enclosures of short pieces become by the step's length; shape (N, n), three places."""
+    whole, degree = steps.bernstein, steps.bernstein.shape[2] - 1
+    half = whole @ halving(degree)[0]
+    ends = [(0.0, whole[..., 0], whole[..., 1] - whole[..., 0]), (1.0, whole[..., -1], whole[..., -1] - whole[..., -2])]
+    found = list[Array]()
+    for share, middle, slope in (*ends, (0.5, half[..., -1], 2 * (half[..., -1] - half[..., -2]))):
+        time, short = steps.time + share * steps.length, SHORT * steps.length
+        wide = degree * SHORT * np.abs(slope)
+        states = hull(middle - wide / 2, middle + wide / 2)
+        least, most = _enclosed(run, steps, Range(time - short / 2, time + short / 2), states)
+        found.append(np.where(np.isfinite(most - least), (most - least) / SHORT, 0.0))
+    return found
+
+
 def _beyond(run: RunView, parts: Parts) -> Array:
-    """How far the enclosed flow lies beyond the derivatives of the polynomials; shape (N, n)."""
-    n, (below, above) = len(parts), parts.slopes()
-    flow = [as_range(f) for f in parts.bound(run).flow(parts.times, *parts.states())]
-    sides = [np.maximum(high(f, n) - above[:, i], below[:, i] - low(f, n)) for i, f in enumerate(flow)]
-    return np.stack(sides, axis=1) if sides else np.zeros((n, 0))
+    """How far the enclosed flow and the derivatives of the polynomials lie beyond each other; shape (N, n)."""
+    below, above = parts.slopes()
+    least, most = _enclosed(run, parts, parts.times, parts.states())
+    return np.maximum(np.abs(most - above), np.abs(below - least))
+
+
+def _enclosed(run: RunView, parts: Parts, times: Range, states: Sequence[Range]) -> tuple[Array, Array]:
+    """The least and the largest the flow may be; shape (N, n) each."""
+    flow, n = parts.bound(run).flow(times, *states), len(parts)
+    if not flow:
+        return np.zeros((n, 0)), np.zeros((n, 0))
+    return np.stack([low(f, n) for f in flow], axis=1), np.stack([high(f, n) for f in flow], axis=1)
 
 
 def _steep(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
