@@ -136,9 +136,9 @@ def _text(execution: Execution, estimated: Any) -> str:
 
 
 def _record(execution: Execution, names: list[str] | None, estimated: Any) -> dict[str, Any]:
-    from hsdsl.report import as_json
+    from hsdsl.report import record
 
-    result = as_json(execution)
+    result = record(execution)
     if names is not None:
         chosen = result["final"]["outputs"]
         result["final"]["outputs"] = {name: value for name, value in chosen.items() if name in names}

@@ -24,11 +24,16 @@ _encoded = json.JSONEncoder().encode
 
 
 def as_json(execution: Execution) -> dict[str, Any]:
-    """Return the object of `run --json`, to be printed by :func:`dumps`.
+    """Return the object of `run --json`, of values that JSON has.
 
     Its keys, in this order: ``model``, ``engine``, ``scheme``, ``method``, ``settings``, ``overrides``, ``stop``,
     ``transitions``, ``final``, ``verdict``, ``seconds``, and ``left_out`` where states were not integrated.
     """
+    return plain(record(execution))
+
+
+def record(execution: Execution) -> dict[str, Any]:
+    """Return the object of `run --json` with the run's own values, to be printed by :func:`dumps`."""
     settings = dict(execution.settings)
     left_out = {"left_out": settings.pop("left_out")} if "left_out" in settings else {}
     run = _named(execution, "model", "engine", "scheme", "method") | {
@@ -40,7 +45,7 @@ def as_json(execution: Execution) -> dict[str, Any]:
         "verdict": _named(execution.verdict, "theorem", "reasons"),
         "seconds": {stage: execution.seconds.get(stage) for stage in STAGES},
     }
-    return plain(run | left_out)
+    return run | left_out
 
 
 def _named(value: object, *names: str) -> dict[str, Any]:
