@@ -139,15 +139,15 @@ class OutputBuffers:
 
 
 def arcs_of(whole: Columns, program: Program, layouts: StateLayouts) -> Iterator[Arc]:
-    """Make the arcs of whole columns; what `hs_arc` has beyond its first four fields are further fields of `Arc`."""
+    """Make the arcs of whole columns."""
     rows = len(whole["times"])
-    opened: list[tuple[int, ...]] = whole["arc"].tolist()
+    opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
     ends = [first - 1 for first, *_ in opened[1:]] + [rows - 1]
     found: list[int] = layouts.of_arcs(whole["arc"]["mode"]).tolist()
-    for (first, jump, index, kind, *further), last, number in zip(opened, ends, found, strict=True):
+    names, states, kinds = [mode.name for mode in program.modes], layouts.kinds, structures.KINDS
+    for (first, jump, index, kind), last, number in zip(opened, ends, found, strict=True):
         if first <= last:
-            kinds = layouts.kinds[number], structures.KINDS[kind]
-            yield Arc(program.modes[index].name, *kinds, jump, first, last, *further)
+            yield Arc(names[index], states[number], kinds[kind], jump, first, last)
 
 
 def transitions_of(whole: Columns, program: Program) -> Iterator[Transition]:
