@@ -89,7 +89,6 @@ typedef struct {
   hs_record run, finer;
   int32_t order;            /* the most of a companion's series; 0 where the run is held against a finer one */
   double until, relaxation, tolerance;
-  int32_t taylor;           /* whether pieces are Taylor polynomials */
   double *workspace;        /* hs_screen_room() numbers, in which what is found begins: */
   int32_t *crossing;        /* (transition): HS_LOOK_AT_... and HS_COMMUTES */
   int32_t *landing, *ending; /* (arc), likewise */

@@ -139,7 +139,6 @@ def _common(problem: Problem, plan: Any, accompanied: bool) -> Any:
         until=settings.until,
         relaxation=settings.relaxation,
         tolerance=settings.tolerance,
-        taylor=method.kind == "taylor",
     )
 
 
