@@ -4,7 +4,7 @@
    that is infinite where nothing is known. What is added to it for rounding is far more than rounding does, that of C's
    library too. `shown` is the size of its slope at the middle, where no terms cancel. */
 
-#include "ranges.c"
+#include "roundoff.c"
 
 #define EXPANDED 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
 

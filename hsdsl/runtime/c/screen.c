@@ -133,6 +133,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.unseen = take(store, (int64_t)(LEVELS + 2) * w, sizeof(int));
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
+  v.rounded = take(store, registers, sizeof(hs_rounded));
   v.around = take(store, registers, sizeof(hs_expansion));
   v.slopes = take(store, w, sizeof(hs_expansion));
   v.nearest = take(store, model->modes, sizeof(hs_near_miss));

@@ -63,7 +63,7 @@ static void companion_at(const hs_view *v, const hs_companion *c, double s, doub
   }
 }
 
-/* What the run's polynomial X leaves out by the end of its step, to `moved`, where `range` holds the flow there.
+/* What the run's polynomial X leaves out by the end of its step, to `moved`, where `rounded` holds the flow there.
 
    With d = X' - f(X) at the end and J the derivatives of f, e' = J e - d for what is left out, e: it is close to
    -h d/order, and what follows from J e is close to h (J e)/(order + 1). */
@@ -73,10 +73,9 @@ static int leave_out(hs_view *v, const hs_companion *c) {
   const int order = run->degree + 1;
   double *const e = c->moved, *const beyond = v->enough, *const there = v->own;
   for (int i = 0; i < v->n; i++) {
-    const hs_range f = v->range[v->f->flow.result[i]];
     double slope = 0.0;
     for (int k = run->degree - 1; k >= 0; k--) slope += (k + 1) * piece[k * run->width + i];
-    there[i] = (f.low + f.high) / 2;
+    there[i] = v->rounded[v->f->flow.result[i]].value;
     e[i] = (c->h * there[i] - slope) / order;
     beyond[i] = x[i] + e[i];
   }
@@ -91,13 +90,12 @@ static int move_companion(hs_view *v, const hs_companion *c) {
   const hs_record *const run = &v->s->run;
   const double *const x = recorded_row(run, c->row + 1);
   const hs_formula *const flow = &v->f->flow;
-  v->range[0].low = v->range[0].high = run->times[c->row + 1];
-  for (int i = 0; i < v->n; i++) v->range[1 + i].low = v->range[1 + i].high = x[i];
-  range_operations(v->f, flow->first, flow->last, first_register(v), v->range);
+  v->rounded[0] = rounded(run->times[c->row + 1], 0.0, 0.0);
+  for (int i = 0; i < v->n; i++) v->rounded[1 + i] = rounded(x[i], 0.0, 0.0);
+  rounded_operations(v->f, flow->first, flow->last, first_register(v), v->rounded);
   if (!leave_out(v, c)) return 0;
   for (int i = 0; i < v->n; i++) {
-    const hs_range f = v->range[flow->result[i]];
-    const double noise = c->h * (f.high - f.low) / 2;
+    const double noise = c->h * v->rounded[flow->result[i]].off;
     if (!hs_finite(noise)) return 0;
     c->moved[i] += c->y[i] + c->moved[i] < 0 ? -noise : noise;
     c->y[i] += x[i] + c->moved[i];

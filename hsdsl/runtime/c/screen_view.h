@@ -43,6 +43,7 @@ typedef struct {
   int *open, *unseen;
   int *cut; /* whether a state is, where a step is cut in halves */
   hs_range *range;
+  hs_rounded *rounded;
   hs_expansion *around, *slopes;
   double *beyond; /* how far the flow may be from the slopes of states along the step */
   hs_near_miss *nearest; /* of each mode */
@@ -87,8 +88,10 @@ static void bind_formulas(hs_view *v) {
     const hs_range value = {i < constants ? v->p[i - data] : c[0], i < constants ? v->p[i - data] : c[1]};
     v->range[i] = value;
     v->around[i] = constant_expansion((value.low + value.high) / 2);
+    v->rounded[i] = rounded((value.low + value.high) / 2, (value.high - value.low) / 2, 0.0);
   }
   range_operations(v->f, 0, v->f->fixed, base, v->range);
+  rounded_operations(v->f, 0, v->f->fixed, base, v->rounded);
   expand_operations(v->f, 0, v->f->fixed, base, v->around);
 }
 
