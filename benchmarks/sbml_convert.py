@@ -248,8 +248,10 @@ class Converter(Facts):
         if reset:
             transition["reset"] = reset
         if event.isSetDelay() and event.getDelay().isSetMath():
-            if not event.getUseValuesFromTriggerTime() or any(map(self.held_amount, values)):
-                raise NotExpressible("values of the time of execution, with a delay")
+            if not event.getUseValuesFromTriggerTime():
+                transition["values"] = "execution"
+            elif any(map(self.held_amount, values)):
+                raise NotExpressible("values of the time of the trigger in a volume of the time of execution")
             transition["delay"] = self.running.number(event.getDelay().getMath())
         elif event.getUseValuesFromTriggerTime() and self.depends_on_others(event):
             transition["delay"] = 0  # its values are those of its trigger, before what other events do then

@@ -94,7 +94,8 @@ class Event:
 
     ``initially`` is what the condition counts as before the mode is entered. With a ``delay`` the edge is made later;
     if it is not ``persistent``, only where the condition holds until then. The states of ``given`` get values of
-    before. At most ``waiting`` executions wait at a time. ``priority`` is an expression; None where it is the edge's.
+    before: ``at_execution`` those of where the edge is made, else those of where the condition turned true. At most
+    ``waiting`` executions wait at a time. ``priority`` is an expression; None where it is the edge's.
     """
 
     trigger: Trigger
@@ -106,6 +107,7 @@ class Event:
     waiting: int = 1
     priority: sp.Expr | None = None
     delay_text: str = ""
+    at_execution: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
+from hsdsl.expression.selection import by_constants
 from hsdsl.expression.trigger import Trigger, comparisons
 from hsdsl.functions import floor, sign
 from hsdsl.names import SINCE, did_you_mean, shown
@@ -74,7 +76,9 @@ def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
 
 def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:
     resolver = symbols.resolver
-    event = event_of(symbols, transition, scope)
+    flow = symbols.document.modes[source].flow or {}  # pyright: ignore[reportArgumentType]
+    still = frozenset(symbol(str(state)) for state, rate in flow.items() if rate.value.strip() == "0")
+    event = event_of(symbols, transition, scope, still)
     crossed = surface(resolver, transition.when, scope, "when") if transition.event is None else NOWHERE
     condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
     values = symbols.numbers(transition.reset.values(), scope)
@@ -110,11 +114,18 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
 
 def of_events(transition: TransitionDocument) -> list[str]:
     """The keys of a transition that only events have."""
-    return [key for key in ("delay", "persistent", "initially", "waiting") if key in transition.model_fields_set]
+    return [
+        key for key in ("delay", "values", "persistent", "initially", "waiting") if key in transition.model_fields_set
+    ]
 
 
-def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope) -> Event | None:
-    """What a transition has that fires where a condition turns true; None for another one, and where it has faults."""
+def event_of(
+    symbols: SymbolTable, transition: TransitionDocument, scope: Scope, still: frozenset[Any] = frozenset()
+) -> Event | None:
+    """What a transition has that fires where a condition turns true; None for another one, and where it has faults.
+
+    States that are ``still`` do not flow: what a condition chooses by them does not jump by itself.
+    """
     given = transition.event
     if given is None:
         for key in of_events(transition):
@@ -136,24 +147,40 @@ def event_of(symbols: SymbolTable, transition: TransitionDocument, scope: Scope)
     if not comparisons(trigger):
         symbols.report(given.place, "HS323", "a condition that never changes is no event", "write an inequality")
         return None
-    if not _continuous(symbols, given, trigger):
+    if not _continuous(symbols, given, trigger, still):
         return None
     if not 1 <= transition.waiting <= MOST_WAITING:
         message = f"`waiting`: expected a number from 1 to {MOST_WAITING}, got {transition.waiting}"
         symbols.report(given.place, "HS323", message, "so many executions of an event can wait at a time")
         return None
+    if delay is None and transition.values == "execution":
+        message = "only a transition with `delay` has `values`"
+        hint = "without a delay an event has the values where it is made: leave it out"
+        symbols.report(given.place, "HS323", message, hint)
+        return None
     after = None if delay is None else delay.expr
     text = transition.delay.value if transition.delay else ""
     flags = transition.persistent, transition.initially
     rank = None if priority is None else priority.expr
-    return Event(trigger, given.value, after, *flags, waiting=transition.waiting, priority=rank, delay_text=text)
+    return Event(
+        trigger,
+        given.value,
+        after,
+        *flags,
+        waiting=transition.waiting,
+        priority=rank,
+        delay_text=text,
+        at_execution=transition.values == "execution",
+    )
 
 
-def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger) -> bool:
+def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger, still: frozenset[Any]) -> bool:
     """Whether no comparison of an event jumps by itself; one that does is reported."""
+    constants = still | {symbol(str(name)) for name in symbols.document.parameters}
     sampled = {symbol(str(name)) for name in symbols.document.inputs}
     for part in comparisons(trigger):
-        if part.residual.free_symbols & sampled or part.residual.has(sign, floor):
+        residual = by_constants(part.residual, constants)
+        if residual.free_symbols & sampled or residual.has(sign, floor):
             message = f"`{shown(part.text, 40)}` may jump, and an event is not looked for at jumps of samples or steps"
             symbols.report(given.place, "HS323", message, "use `when`, which fires on entry there")
             return False

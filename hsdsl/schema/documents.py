@@ -29,6 +29,7 @@ from hsdsl.schema.fields import (
     StateTable,
     Table,
     Text,
+    ValuesOf,
     Version,
     Whole,
     Word,
@@ -146,7 +147,13 @@ class TransitionDocument(Document):
         default=0,
     )
     delay: OptionalExpression = optional(
-        "With `event`: how long after its condition turned true the transition is made, with the values of then.", 2
+        "With `event`: how long after its condition turned true the transition is made; see `values`.", 2
+    )
+    values: ValuesOf = optional(
+        "With `delay`: whether the `reset` has the values of the `trigger`, where the condition turned true, or those "
+        "of the `execution`, where the transition is made.",
+        "execution",
+        default="trigger",
     )
     persistent: Flag = optional(
         "With `event`: whether the transition is made even if its condition turns false before.",

@@ -262,6 +262,11 @@ Hold = Annotated[
     PlainValidator(lambda value: choice("zero", "linear")(value).value),
     WithJsonSchema({"type": "string", "enum": ["zero", "linear"]}),
 ]
+ValuesOf = Annotated[
+    Literal["trigger", "execution"],
+    PlainValidator(lambda value: choice("trigger", "execution")(value).value),
+    WithJsonSchema({"type": "string", "enum": ["trigger", "execution"]}),
+]
 
 Name = Annotated[Key, PlainValidator(_name), WithJsonSchema({"type": "string"})]
 

@@ -80,7 +80,7 @@ def test_hover_and_completion_find_every_key_of_a_transition():
 
     mode = resolved(schema["properties"]["modes"]["additionalProperties"])
     transition = resolved(mode["properties"]["transitions"]["items"])
-    of_events = {"event", "delay", "persistent", "initially", "waiting"}
+    of_events = {"event", "delay", "values", "persistent", "initially", "waiting"}
     assert set(transition["properties"]) == {"when", "if", "to", "reset", "name", "priority"} | of_events
     assert transition["anyOf"] == [{"required": ["when", "to"]}, {"required": ["event"]}]
     assert "surface" in transition["properties"]["when"]["description"]

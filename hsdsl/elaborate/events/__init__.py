@@ -44,7 +44,9 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     flow |= dict(zip(map(symbol, mode.states), mode.flow, strict=True))
     drafts = [Event(edge, mode, timed, flow, constants) for edge in mode.edges if edge.event is not None]
     index, jumps = Memory(drafts), set[str]()
-    for meaning in (new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts):
+    changes = [new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts]
+    stored = [slot.values for event in drafts for slot in event.slots[:1]]  # which may be that of a state itself
+    for meaning in [*changes, *({symbol(x): symbol(name) for x, name in values.items()} for values in stored)]:
         jumps |= {event.edge.name for event in index.concerned(meaning) if event.touched(meaning)}
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
 

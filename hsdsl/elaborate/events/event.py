@@ -47,8 +47,8 @@ class Event:
         if self.delay is None:
             return ()
         given = dict(zip(self.edge.target_states, self.edge.reset, strict=True))
-        values = ((state, given.get(state, symbol(state))) for state in self.event.given)
-        stored = tuple(state for state, value in values if value != symbol(state) and value.free_symbols)
+        own = () if self.event.at_execution else self.event.given
+        stored = tuple(state for state in own if state in given and given[state].free_symbols)
         most = self.event.waiting if self.event.persistent else 1
         return tuple(Slot(self.edge.name, stored, k) for k in range(1, most + 1))
 
