@@ -7,7 +7,7 @@ from collections.abc import Container
 
 from hsdsl.functions import FUNCTIONS
 
-CASES = "write a mode for each case, or select(c, a, b): a where c > 0, else b; select(t - 1, 1, 0) is a step at t = 1"
+CASES = "write a mode for each case, or select(c, a, b): a where c > 0, else b; select(t - 1, 1, 0) is a step"
 _DEGREES = "angles are in radians: write 30*pi/180 for 30 degrees"
 _SAMPLES = "give it as samples, under `inputs`"
 _UNIT_NAMES = (

@@ -152,7 +152,7 @@ def _two_colons(content: str, column: int) -> str:
     if key.strip(" -") in _TEXTS:
         return f'quote the text: {key.strip(" -")}: "{shown(value)}"'
     if "?" in content[: column - 1]:
-        return "write a mode for each case; (1 + sign(t - 1))/2 is a step at t = 1"
+        return "write a mode for each case, or select(c, a, b): a where c > 0, else b; select(t - 1, 1, 0) is a step"
     if value[: column - len(key) - 3].isidentifier():
         inner = f"{key.strip(' -')}: {{{value}}}"
         return f"write {shown(inner)}, or quote it if it is a text"

@@ -270,7 +270,7 @@ class TestOverrides:
             (
                 "omega > 1",
                 "--set c: expected a number, got the condition `omega > 1`",
-                "write a mode for each case; (1 + sign(t - 1))/2 is a step at t = 1",
+                "write a mode for each case, or select(c, a, b): a where c > 0, else b; select(t - 1, 1, 0) is a step",
             ),
         ],
     )
