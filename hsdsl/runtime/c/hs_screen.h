@@ -65,6 +65,11 @@ typedef struct {
   const int32_t *alternatives;  /* of all transitions */
 } hs_record;
 
+/* Coefficients of corrections: see hsdsl/simulate/verdict/correction.py. */
+typedef struct {
+  double node[4], weight[6][4], bulge[4], slope[4], inside, pole;
+} hs_correction;
+
 /* Where something may be that only a closer look can tell, one bit each; HS_PARTED: everything. */
 typedef enum {
   HS_PARTED,
@@ -87,7 +92,8 @@ typedef struct {
   const hs_timeline *timeline;
   const hs_formulas *formulas; /* of each mode */
   hs_record run, finer;
-  int32_t order;            /* the most of a companion's series; 0 where the run is held against a finer one */
+  int32_t order;            /* the most of a companion's series; 0 where there is none */
+  const hs_correction *correction; /* of a companion without series; 0 likewise */
   double until, relaxation, tolerance;
   double *workspace;        /* hs_screen_room() numbers, in which what is found begins: */
   int32_t *crossing;        /* (transition): HS_LOOK_AT_... and HS_COMMUTES */

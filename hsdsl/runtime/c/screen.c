@@ -29,7 +29,7 @@ static void look_at_arc(hs_view *v) {
   const hs_arc *arc = &s->run.arc[v->arc];
   const int64_t jump = arc->jump;
   const double shift =
-      jump && !s->order ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
+      jump && !is_followed(s) ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
   const int flown = takes_time(&s->run, v->arc);
   int known = 0;
   if (s->model->mode[arc->mode].final) return;
@@ -99,7 +99,7 @@ static void lay_out_found(hs_screen *s, hs_store *store) {
   s->ending = take(store, arcs, sizeof(int32_t));
   s->turning = take(store, rows, sizeof(int32_t));
   s->changing = take(store, rows, sizeof(int32_t));
-  s->measured = s->order ? numbers(store, rows * s->run.width) : 0;
+  s->measured = is_followed(s) ? numbers(store, rows * s->run.width) : 0;
   s->late = numbers(store, transitions);
 }
 
@@ -117,7 +117,13 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.size = numbers(store, model->states);
   v.floor = numbers(store, 2 * (int64_t)model->states);
   v.late = s->late;
-  v.lines = numbers(store, s->order ? (int64_t)model->lines * (s->order + 2) : 0);
+  v.lines = numbers(store, is_followed(s) ? (int64_t)model->lines * (s->order + 2) : 0);
+  v.noise = numbers(store, w);
+  v.defects = numbers(store, s->correction ? 5 * (int64_t)w : 0);
+  v.derivatives = numbers(store, s->correction ? model->derivatives : 0);
+  v.factors = numbers(store, s->correction ? model->factors : 0);
+  v.inverse = numbers(store, s->correction ? model->factors : 0);
+  v.exchanged = take(store, s->correction ? w : 0, sizeof(int));
   v.tied = take(store, s->run.transitions + 1, sizeof(int64_t));
   double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
                        &v.at_start, &v.at_end, 0};
@@ -174,7 +180,7 @@ void hs_look(hs_screen *s) {
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
   fill_matrix(v.matrix, s->run.degree);
   const int apart =
-      s->order ? !plain_arcs(&s->run, s->model) || !accompany(&v)
+      is_followed(s) ? !plain_arcs(&s->run, s->model) || !accompany(&v)
                : !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
   if (apart) s->doubts = DOUBT(HS_PARTED);
   else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);

@@ -57,10 +57,10 @@ static void reach_row(hs_view *v, int64_t row, int64_t jump, double shift) {
   const hs_screen *s = v->s;
   const double least = hs_max(s->tolerance, ROUNDOFF_SHARE * HS_UNIT), *x = recorded_row(&s->run, row);
   const int w = s->model->width;
-  if (s->order)
+  if (is_followed(s))
     for (int i = 0; i < v->n; i++) grow(&v->error[v->table->state[i]], s->measured[row * s->run.width + i]);
   else compare_row(v, row, jump, shift);
-  if (!s->order && row == v->last && (v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump)) {
+  if (!is_followed(s) && row == v->last && (v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump)) {
     const hs_transition *made = s->run.transition;
     if (jump < s->run.transitions)
       compare_states(v, made[jump].mode, s->run.before + jump * w, s->finer.before + jump * w);

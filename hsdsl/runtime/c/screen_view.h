@@ -34,6 +34,9 @@ typedef struct {
   int mode, n, crossed;
   double *error, *size, *floor, *late; /* of all states; of each transition */
   double *lines; /* series of the companion */
+  double *noise; /* what round-off of the flow may do in a step of the companion */
+  double *defects, *derivatives, *factors, *inverse; /* of a correction; see screen_correction.c */
+  int *exchanged;
   int64_t *tied; /* where the alternatives of each transition begin */
   double *own;                        /* how wrong the states of the mode are */
   const hs_sparse *row; /* whose values `gradient` holds */
@@ -53,6 +56,17 @@ typedef struct {
 typedef struct {
   double value, rate, noise, shift;
 } hs_judged;
+
+/* Where the companion is at the start of a step of the run, and how far it is from there on: coefficients 1 to order + 1
+   in shares of the step, and by how much it has moved at the end besides. */
+typedef struct {
+  const hs_mode *table;
+  const double *p;
+  double *x, *y, *moved, *noise, *lines;
+  double t, h;
+  int64_t row; /* where the run's step begins */
+  int order;
+} hs_companion;
 
 /* The point at which transitions go, and the time within which other surfaces are reached together with it. */
 typedef struct {
@@ -137,6 +151,9 @@ static double noise_of(const hs_view *v, double magnitude, double t, const doubl
     magnitude += fabs(v->gradient[i]) * fabs(v->row->place[i] ? x[v->row->place[i] - 1] : t);
   return ROUNDOFF_UNITS * HS_UNIT * magnitude;
 }
+
+/* Whether a companion shows the errors of the run. */
+static int is_followed(const hs_screen *s) { return s->order || s->correction; }
 
 /* screen_errors.c */
 static void grow(double *error, double by);

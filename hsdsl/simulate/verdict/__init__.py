@@ -7,7 +7,8 @@ allows itself.
 
 ==============  ==============================================================================
 `screen`        where a compiled look says that there is nothing to find; `formulas`: routines as it takes them
-`companion`     the errors of a run by Taylor series, by what takes the same steps (`follower`)
+`companion`     the errors of a run, by what takes the same steps (`follower`), closer to the solution
+`correction`    steps that no series repeats, corrected
 `agreement`     the errors of a run, by the same run made finer
 `run_view`      an execution with its modes' routines; `place` is one state of it
 `steps`         its steps as polynomials, many at once, with routines over intervals

@@ -1,15 +1,16 @@
-"""Errors of a run by Taylor series without another run: a companion takes the same steps, closer to the solution.
+"""Errors of a run without another run: a companion takes the same steps, closer to the solution.
 
 The companion starts where the run does. Each of its steps begins where it is itself, and takes as long as the run's.
-It makes each transition where it crosses the same surface. Its distance to the run is the sum of what the run's series
+It makes each transition where it crosses the same surface. Its distance to the run is the sum of what the run's steps
 left out, carried along by the flow and by jumps, as long as that is small.
 
-- What a step's polynomial leaves out follows from how badly it solves the equation at the end, as when its size was
-  chosen. The first two terms that are left out are found so: an even or odd solution is no trap.
-- What a step makes of the distance before is the difference of two series. The run has recorded one of them. The other
-  has fewer terms: a distance needs few digits. Where its last two terms, times the number of steps, exceed all of a
-  state's terms together, more are made from there on, up to as many as the run has. So growth that the run does not
+- What the polynomial of a Taylor step leaves out follows from how badly it solves the equation at the end, as when its
+  size was chosen. The first two terms that are left out are found so: an even or odd solution is no trap.
+- What such a step makes of the distance before is the difference of two series. The run has recorded one of them. The
+  other has fewer terms: a distance needs few digits. Where its last two terms, times the number of steps, exceed all of
+  a state's terms together, more are made from there on, up to as many as the run has. So growth that the run does not
   show is seen.
+- Both follow for other methods from a `correction` of the step, as long as that leaves out less than the step.
 - Round-off of the flow is much the same for both, so each step moves the companion further away from the run by the
   most that it may do.
 
@@ -21,19 +22,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution import Execution
+from hsdsl.integrators import Method
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.agreement import Errors
 from hsdsl.simulate.verdict.follower import Follower, Lost
 
 Array = NDArray[np.float64]
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
+MOST_CORRECTED = 5  # order of methods whose steps leave out more than corrections of them
 
 
 @dataclass(frozen=True)
@@ -85,23 +87,25 @@ def is_compiled(run: Execution) -> bool:
     return run.compiled is not None
 
 
-def order_of(method: Any) -> int:
-    """The most that the order of the companion's series may be: with one coefficient more, as many as the run's."""
-    return method.order - 1
+def order_of(method: Method) -> int | None:
+    """The most that the order of the companion's series may be: with one coefficient more, as many as the run's.
+
+    None where it has no series.
+    """
+    return method.order - 1 if method.is_series else None
 
 
 def has_companion(problem: Problem, run: Execution) -> bool:
-    """Whether a companion shows the errors of a run: one by Taylor series, without strips and samples of inputs.
+    """Whether a companion shows the errors of a run: one with a tolerance, without strips and samples of inputs.
 
     Strips and transitions on entry of a run made in C are found where the companion follows it.
     """
-    settings = problem.settings
+    settings, method = problem.settings, problem.settings.method
     return (
         settings.scheme == "located"
         and settings.tolerance is not None
-        and settings.method is not None
-        and settings.method.kind == "taylor"
-        and order_of(settings.method) <= MOST_ORDER
+        and method is not None
+        and method.order <= (MOST_ORDER if method.is_series else MOST_CORRECTED)
         and problem.arithmetic.digits is None
         and len(problem.timeline.segments) == 1
         and run.stop.complete

@@ -1,16 +1,16 @@
 """The companion of a run on its way, in Python: its mode, time and state, and how far it is from the run.
 
 Along a step its series differ from the run's by less and less from term to term. Only so many terms are made that all
-steps of the run together leave out little of the difference; of the others it has the run's own.
+steps of the run together leave out little of the difference; of the others it has the run's own. Where the run has no
+series, its steps are corrected.
 """
 
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsdsl.enclosures import Range, as_range
 from hsdsl.execution import Arc, Execution, Transition
@@ -18,8 +18,8 @@ from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import terms
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.verdict.correction import Array, corrected
 
-Array = NDArray[np.float64]
 MOST_ROUNDS = 8  # of Newton's method
 CLOSED_IN = 2.0**-10  # of the tie tolerance: a crossing's time is found
 FEWEST, FURTHER = 3, 2  # the order of the first series, and by how much it grows where that is not enough
@@ -29,41 +29,12 @@ class Lost(ValueError):
     """The companion cannot follow."""
 
 
-class Course(NamedTuple):
-    """The companion along one step.
-
-    Attributes
-    ----------
-    length : float
-        Of the run's step.
-    terms : array, shape (number, states)
-        Of the run's series in shares of the step, from that of power 0 on.
-    end : array, shape (states,)
-        The run's state where the step ends.
-    away : array, shape (number, states)
-        How far the companion's terms are from the run's.
-    moved : array, shape (states,)
-        By how much it is further away at the end.
-    """
-
-    length: float
-    terms: Array
-    end: Array
-    away: Array
-    moved: Array
-
-    def at(self, time: float) -> State:
-        """Where the companion is some time after the step began."""
-        share = time / self.length
-        run = self.end if share == 1 else share ** np.arange(len(self.terms)) @ self.terms
-        return tuple((run + share ** np.arange(len(self.away)) @ self.away + self.moved).tolist())
-
-
 class Follower:
-    """The companion on its way: its mode, time and state; ``order`` is the most that its series have."""
+    """The companion on its way: its time and state; ``order`` is the most that its series have, None for no series."""
 
-    def __init__(self, problem: Problem, run: Execution, order: int) -> None:
-        self.problem, self.run, self.most, self.order = problem, run, order, min(FEWEST, order)
+    def __init__(self, problem: Problem, run: Execution, order: int | None) -> None:
+        self.problem, self.run, self.most = problem, run, order
+        self.order = min(FEWEST, order or 0)
         self.modes = {mode.name: k for k, mode in enumerate(problem.program.modes)}
         self.apart = np.zeros((len(run.times), run.values.shape[1]))
         self.times: list[float] = run.times.tolist()
@@ -79,30 +50,38 @@ class Follower:
         shift = self.t - times[arc.first]
         for row in range(arc.first, arc.last + 1):
             h = times[row] - times[row - 1] if row > arc.first else 0.0
-            jumps = made if row == arc.last else None
-            course = self._course(mode, row - 1, h) if h > 0 else self._start(mode) if jumps else None
-            y = course.at(h) if course else self.x
-            self._compare(row, self.run.values[row], y)
-            if jumps and course:
-                self._jump(arc, jumps, course, h)
-            elif h > 0:
-                self.x, self.t = y, times[row] + shift
+            if h > 0:
+                self.x, self.t = self._end(mode, row - 1, h), times[row] + shift
+            self._compare(row, self.run.values[row], self.x)
+        if made:
+            self._jump(arc, made)
 
-    def _start(self, mode: int) -> Course:
-        """Its course from where it is, without a step of the run."""
-        x = np.array(self.x)
-        return Course(1.0, x[None, :], x, np.vstack([0 * x, self._expanded(mode)]), 0 * x)
-
-    def _course(self, mode: int, row: int, h: float) -> Course:
-        """Its course along the run's step from a row."""
-        n = len(self.x)
-        x, end = (np.asarray(self.run.values[k, :n], dtype=float) for k in (row, row + 1))
-        piece = np.asarray(self.run.coefficients[row][:, :n], dtype=float)
+    def _end(self, mode: int, row: int, h: float) -> State:
+        """Where the run's step from a row takes it."""
+        x, end = np.asarray(self.run.values[row : row + 2, : len(self.x)], dtype=float)
+        piece = np.asarray(self.run.coefficients[row][:, : len(self.x)], dtype=float)
         slope, noise = self._enclosed(mode, self.times[row + 1], end)
-        left = self._left_out(mode, self.times[row + 1], end, piece, h, slope)
-        course = Course(h, np.vstack([x, piece]), end, self._away(mode, x, piece, h), left)
-        further = np.where(np.array(course.at(h)) < end, -h * noise, h * noise)
-        return course._replace(moved=left + further)
+        if self.most is None:
+            away = np.array(self.x) - x
+            inside, further = self._corrected(mode, x, piece, h, end, np.where(away < 0, -h * noise, h * noise))
+            self._compare(row + 1, x, tuple((x + away + inside).tolist()))
+            return tuple((end + (away + further)).tolist())
+        away = self._away(mode, x, piece, h).sum(axis=0)
+        away += self._left_out(mode, self.times[row + 1], end, piece, h, slope)
+        return tuple((end + away + np.where(away < 0, -h * noise, h * noise)).tolist())
+
+    def _corrected(self, mode: int, x: Array, piece: Array, h: float, end: Array, moved: Array) -> tuple[Array, Array]:
+        """How much further away a step takes it, inside and at the end; what is moved goes on as the flow does."""
+        flow, jacobian = self.problem.kernel.bind(mode, self.data).flow, self.problem.kernel.jacobian(mode, self.data)
+        slopes = np.array(jacobian(self.t + h, *end.tolist()), dtype=float).reshape(len(end), len(end))
+
+        def defect(s: float, away: Array, rate: Array) -> Array:
+            powers = np.arange(1, len(piece) + 1)
+            at = x + s**powers @ piece + away
+            slope = powers * s ** (powers - 1) @ piece + rate
+            return h * np.array(flow(self.t + s * h, *at.tolist())) - slope + moved
+
+        return corrected(defect, np.array(self.x) - x, h * slopes)
 
     def _away(self, mode: int, x: Array, piece: Array, h: float) -> Array:
         """How far its terms are from the run's, so many that all steps together leave out little of it."""
@@ -112,7 +91,7 @@ class Follower:
             away = np.vstack([np.array(self.x) - x, stages * powers[:, None] - piece[: len(stages)]])
             sizes = np.abs(away)
             settled = np.all(len(self.times) * sizes[-2:].sum(axis=0) <= sizes.sum(axis=0))
-            if settled or self.order == self.most:
+            if settled or self.most is None or self.order == self.most:
                 return away
             self.order = min(self.order + FURTHER, self.most)
 
@@ -150,20 +129,21 @@ class Follower:
         away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
         self.apart[row, : len(y)] = np.fmax(self.apart[row, : len(y)], away)
 
-    def _jump(self, arc: Arc, made: Transition, course: Course, s: float) -> None:
-        """Make a transition where the companion crosses its surface, close to the time s of its course."""
-        mode, y = self.problem.program.modes[self.modes[arc.mode]], course.at(s)
+    def _jump(self, arc: Arc, made: Transition) -> None:
+        """Make a transition where it crosses the surface, along a straight line from where it is."""
+        mode, y = self.problem.program.modes[self.modes[arc.mode]], self.x
         kernel = self.problem.kernel.bind(self.modes[arc.mode], self.data)
         found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
-        tie, change = float(self.problem.tie(self.t)), np.inf
+        tie, change, s = float(self.problem.tie(self.t)), np.inf, 0.0
+        slope = kernel.flow(self.t, *y)
         for _ in range(MOST_ROUNDS):
             value, rate = kernel.surfaces(self.t + s, *y)[k], kernel.rates[k](self.t + s, *y)[0]
             if not rate > 0:
                 raise Lost
             change = value / rate
             s -= change
-            y = course.at(s)
+            y = tuple(a + s * b for a, b in zip(self.x, slope, strict=True))
             if abs(change) <= CLOSED_IN * tie:
                 break
         if not abs(change) <= tie:

@@ -7,7 +7,7 @@ make the same transitions. Of others there is none, and every hypothesis is look
 from __future__ import annotations
 
 import ctypes
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.companion import Companion, is_compiled, order_of
+from hsdsl.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
@@ -131,15 +132,25 @@ def _common(problem: Problem, plan: Any, accompanied: bool) -> Any:
     model, settings, method = plan.compiled, problem.settings, problem.settings.method
     formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
     assert method is not None
+    order = order_of(method) if accompanied else None
     return structures.Screen(
         model=ctypes.addressof(model.table),
         timeline=plan.timeline,
         formulas=ctypes.addressof(formulas.table),
-        order=order_of(method) if accompanied else 0,
+        order=order or 0,
+        correction=ctypes.addressof(_correction()) if accompanied and order is None else 0,
         until=settings.until,
         relaxation=settings.relaxation,
         tolerance=settings.tolerance,
     )
+
+
+@cache
+def _correction() -> Any:
+    """The coefficients of corrections."""
+    known = correction()
+    numbers = (*known.nodes, *known.weights.ravel(), *known.bulge, *known.slope, INSIDE, POLE)
+    return structures.Correction.from_buffer((ctypes.c_double * len(numbers))(*numbers))
 
 
 def _record(columns: Any) -> Any:
