@@ -7,7 +7,7 @@ out. Other surfaces are crossed as along any flow.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
@@ -35,8 +35,11 @@ def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
     return in_contact(run, here, holding) if holding else here
 
 
-def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
-    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there."""
+def keeping(run: Run, here: ModeState, surfaces: Iterable[int], touched: Collection[int] = ()) -> list[int]:
+    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there.
+
+    The guards of the edges ``touched`` hold it already.
+    """
     edges, sizes, found = here.mode.edges, Vector(), list[int]()
     for k in surfaces if run.settings.completion != "none" else ():
         if not k < len(edges) or edges[k].contact is None:
@@ -51,7 +54,7 @@ def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
         except DOMAIN_ERRORS:
             continue
         found.append(k)
-    return found
+    return [k for k in found if is_possible(run, here, k, here.t, here.x, {*touched, *found})]
 
 
 def pressing(run: Run, here: ModeState, kept: list[int]) -> list[int] | None:
@@ -80,12 +83,34 @@ def pushes(run: Run, here: ModeState, holding: list[int], kept: list[int]) -> li
 
 
 def keeps(run: Run, here: ModeState, k: int) -> bool:
-    """Whether edge k is possible and its reset leaves the state where it is."""
-    t, x, kernel = here.t, here.x, here.kernel
+    """Whether the reset of edge k leaves the state where it is."""
     noise = (SAME_UNITS * run.arithmetic.unit * s for s in here.arc.scales)
-    after = kernel.resets[k](t, *x)
-    still = all(abs(a - b) <= most for a, b, most in zip(after, x, noise, strict=True))
-    return still and bool(kernel.conditions[k](t, *x)[0])
+    after = here.kernel.resets[k](here.t, *here.x)
+    return all(abs(a - b) <= most for a, b, most in zip(after, here.x, noise, strict=True))
+
+
+def is_possible(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Collection[int]) -> bool:
+    """Whether the `if` of edge k holds at a point, or next along the flow that the guards of other edges leave.
+
+    So `v < 0` holds for a body at rest on the floor: what it is pressed to, it does.
+    """
+    holds = here.kernel.conditions[k]
+    try:
+        if holds(t, *x)[0] or not here.mode.edges[k].conditional:
+            return bool(holds(t, *x)[0])
+        others = sorted({*touched} - {k})
+        slope = (in_contact(run, here, others) if others else here).kernel.flow(t, *x)
+        return any(holds(time, *later)[0] for time, later in shortly(run, t, x, slope))
+    except DOMAIN_ERRORS:
+        return False
+
+
+def shortly(run: Run, t: Number, x: State, slope: State) -> Iterator[tuple[Number, State]]:
+    """Times and states behind a point along its slope, within the tie of times."""
+    after = run.arithmetic.unit * run.settings.until
+    while after <= run.tie(t):
+        yield t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
+        after = after * 2
 
 
 def is_tangent(run: Run, here: ModeState, k: int, sizes: Vector) -> bool:
@@ -133,15 +158,11 @@ def in_touch(here: ModeState, held: ModeState) -> list[int]:
 
 def condition_ends(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> tuple[Number, State] | None:
     """The first moment from t on, within the tie of times, at which an `if` in contact does not hold; None for none."""
-    later: tuple[Number, State] = (t, x)
-    after = run.arithmetic.unit * run.settings.until
+    later, touched = (t, x), in_touch(here, held)
     try:
-        slope = held.kernel.flow(t, *x)
-        while after <= run.tie(t):
-            later = t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
-            if not all(here.kernel.conditions[k](later[0], *later[1])[0] for k in in_touch(here, held)):
+        for later in shortly(run, t, x, held.kernel.flow(t, *x)):
+            if not all(is_possible(run, here, k, *later, touched) for k in touched):
                 return later
-            after = after * 2
     except DOMAIN_ERRORS:
         return later
     return None

@@ -12,7 +12,7 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import contact_at, in_contact, in_touch, keeping, keeps, pushes
+from hsdsl.simulate.contact import contact_at, in_contact, in_touch, is_possible, keeping, keeps, pushes
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
@@ -61,11 +61,12 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         if held.surfaces.releases(k):
             return here
         q = limit_of(run, here, held, k, end)
-        if q is None or not keeps(run, limit := here.moved(end, q), k):
+        touched = in_touch(here, held)
+        if q is None or not keeps(run, limit := here.moved(end, q), k) or not is_possible(run, here, k, end, q, touched):
             return here
         if edge.contact is None or run.settings.completion == "none":
             return run.diagnostics.accumulates(edge.name, end, here.t)
-        if not keeping(run, limit, [k]) or not pushes(run, limit, [*in_touch(here, held), k], [k]):
+        if not keeping(run, limit, [k], touched) or not pushes(run, limit, [*touched, k], [k]):
             return here
         if meets_another(here, limit, k):
             return here

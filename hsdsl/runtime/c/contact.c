@@ -21,7 +21,7 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
-/* Whether edge k is possible and its reset leaves the state where it is. */
+/* Whether the reset of edge k leaves the state where it is. */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
   const hs_edge *edge = &here->table->edge[k];
@@ -31,7 +31,7 @@ static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
     const int s = edge->change[i];
     still &= fabs(run->after[i] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
   }
-  return still ? condition(run, k, t, x) : 0;
+  return still;
 }
 
 /* Whether the flow, of these sizes, is tangent to surface k, to round-off. */
@@ -43,25 +43,6 @@ static int is_tangent(hs_run *run, hs_time t, const hs_real *x, int k) {
   for (int i = 0; i < row->count; i++)
     size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
   return fabs(rate) <= ZERO_UNITS * HS_UNIT * size;
-}
-
-/* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
-   many. */
-static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
-  const hs_mode_state *here = &run->here;
-  int count = 0, sized = 0; /* sized: whether the flow's sizes are known, -1 where they have no value */
-  for (int k = 0; k < here->table->edges; k++) {
-    const hs_edge *edge = &here->table->edge[k];
-    if (!marks[k]) continue;
-    marks[k] = 0;
-    if (edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
-    if (edge->push_order == 2) {
-      if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
-      if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
-    }
-    marks[k] = 1, count++;
-  }
-  return count;
 }
 
 /* Number the marks of walls anew where a table has `more` edges than the one before. */
@@ -101,6 +82,46 @@ static void bind_contacts(hs_run *run, const int *held, const int *kept) {
 static void bind_mode(hs_run *run) {
   run->here.table = &run->model->mode[run->here.mode];
   run->here.p = run->own_p;
+}
+
+/* Whether the `if` of edge k, of the state's mode, holds at a point, or next along the flow that the guards of other
+   edges leave: of those `touched` and of those `found`, each 0 for none. */
+static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
+  const hs_mode *const own = run->here.table;
+  const int now = condition(run, k, t, x), n = run->here.dimension;
+  int others = 0, holds = 0;
+  if (now || !own->edge[k].conditional) return now == 1;
+  for (int j = 0; j < own->edges; j++)
+    others += run->others[j] = j != k && ((touched && touched[j]) || (found && found[j]));
+  if (others) bind_contacts(run, run->others, run->others);
+  const int raised = run->here.table->flow(run->here.p, t, x, run->at);
+  if (others) bind_mode(run);
+  for (hs_real after = HS_UNIT * run->until; !raised && !holds && after <= tie(run, t); after = after * 2) {
+    for (int s = 0; s < n; s++) run->after[s] = x[s] + after * run->at[s];
+    holds = condition(run, k, t + after, run->after);
+  }
+  return holds == 1;
+}
+
+/* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
+   many. Those `touched` hold it already. */
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks, const int *touched) {
+  const hs_mode_state *here = &run->here;
+  int *const found = run->beyond;
+  int count = 0, sized = 0; /* sized: whether the flow's sizes are known, -1 where they have no value */
+  for (int k = 0; k < here->table->edges; k++) {
+    const hs_edge *edge = &here->table->edge[k];
+    found[k] = 0;
+    if (!marks[k] || edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
+    if (edge->push_order == 2) {
+      if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
+      if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
+    }
+    found[k] = 1;
+  }
+  for (int k = 0; k < here->table->edges; k++)
+    count += marks[k] = found[k] && is_possible(run, k, t, x, touched, found);
+  return count;
 }
 
 /* Of the edges `kept`, mark those in `pushed` that the flow presses on while those `held` hold the state: 1 where they
@@ -157,7 +178,7 @@ static int contact_at(hs_run *run) {
   int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
   if (!here->standing || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
   for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
-  const int count = keeping(run, here->t, run->x, kept);
+  const int count = keeping(run, here->t, run->x, kept, 0);
   if (!count) return GOES_ON;
   if (!pressing(run, here->t, run->x, kept, count, held, run->beyond)) {
     for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
@@ -199,17 +220,15 @@ static int condition_ends(hs_run *run, hs_time *t) {
   const hs_time from = *t;
   copy(run->z, run->x, here->dimension);
   if (held->flow(here->p, from, run->x, run->end)) return 1;
+  for (int k = 0; k < own->edges; k++) run->kept[k] = in_touch(run, k);
   for (hs_real after = HS_UNIT * run->until; after <= tie(run, from); after = after * 2) {
     int holds = 1;
     *t = from + after;
     for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + after * run->end[s];
-    for (int k = 0; k < own->edges && holds == 1; k++) {
-      if (!in_touch(run, k)) continue;
-      bind_mode(run);
-      holds = condition(run, k, *t, run->z);
-      run->here.table = held, run->here.p = run->held_p;
-    }
-    if (holds != 1) return 1;
+    bind_mode(run);
+    for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept, 0);
+    bind_contacts(run, run->kept, run->kept);
+    if (!holds) return 1;
   }
   *t = from;
   return 0;

@@ -214,7 +214,8 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
 /* contact.c */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
-static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks);
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks, const int *touched);
+static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found);
 static void bind_contacts(hs_run *run, const int *held, const int *kept);
 static void bind_mode(hs_run *run);
 static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed);

@@ -123,6 +123,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->held_p = numbers(store, run->model->data + run->model->contacts);
   run->kept = take(store, m, sizeof(int));
   run->held = take(store, m, sizeof(int));
+  run->others = take(store, m, sizeof(int));
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
   hs_real **states[] = {&run->q, &run->other_end, 0};

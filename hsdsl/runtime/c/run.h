@@ -190,6 +190,7 @@ typedef struct {
   hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
   const hs_real *own_p; /* what they are bound to else */
   int *kept, *held; /* one for each edge: whether it may hold the state, and does */
+  int *others;      /* one for each edge: whether it holds the state where the `if` of another is looked at */
   hs_real **k;          /* stages, then the flow at the end */
   hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */

@@ -122,11 +122,12 @@ static int close_tail(hs_run *run, int k) {
   if (here->table != own) after_contact(run);
   hs_real *const q = run->z;
   if (touches || limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
+  if (!is_possible(run, k, end, q, run->held, 0)) return GOES_ON;
   if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
-  if (!keeping(run, end, q, run->kept)) return GOES_ON;
+  if (!keeping(run, end, q, run->kept, run->held)) return GOES_ON;
   pushes(run, end, q, run->held, run->kept, run->beyond);
   if (!run->beyond[k] || meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
   note(run, HS_REPLACED, k, run->jump - 1, end, left);
