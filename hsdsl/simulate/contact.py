@@ -7,7 +7,7 @@ out. Other surfaces are crossed as along any flow.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
@@ -98,19 +98,19 @@ def is_possible(run: Run, here: ModeState, k: int, t: Number, x: State, touched:
     try:
         if holds(t, *x)[0] or not here.mode.edges[k].conditional:
             return bool(holds(t, *x)[0])
-        others = sorted({*touched} - {k})
-        slope = (in_contact(run, here, others) if others else here).kernel.flow(t, *x)
-        return any(holds(time, *later)[0] for time, later in shortly(run, t, x, slope))
+        return bool(holds(t, *pressed(run, here, k, t, x, touched))[0])
     except DOMAIN_ERRORS:
         return False
 
 
-def shortly(run: Run, t: Number, x: State, slope: State) -> Iterator[tuple[Number, State]]:
-    """Times and states behind a point along its slope, within the tie of times."""
-    after = run.arithmetic.unit * run.settings.until
-    while after <= run.tie(t):
-        yield t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
-        after = after * 2
+def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Collection[int]) -> State:
+    """Where the flow that the guards of other edges leave takes a state: off by round-off where the reset changes it."""
+    others, after = sorted({*touched} - {k}), run.arithmetic.zero
+    slope = (in_contact(run, here, others) if others else here).kernel.flow(t, *x)
+    for i in here.mode.edges[k].changes:
+        if slope[i] != 0:
+            after = max(after, ZERO_UNITS * run.arithmetic.unit * here.arc.scales[i] / abs(slope[i]))
+    return tuple(a + after * f for a, f in zip(x, slope, strict=True))
 
 
 def is_tangent(run: Run, here: ModeState, k: int, sizes: Vector) -> bool:
@@ -156,13 +156,24 @@ def in_touch(here: ModeState, held: ModeState) -> list[int]:
     return [k for k, edge in enumerate(here.mode.edges) if edge.contact in held.surfaces.touched]
 
 
-def condition_ends(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> tuple[Number, State] | None:
-    """The first moment from t on, within the tie of times, at which an `if` in contact does not hold; None for none."""
-    later, touched = (t, x), in_touch(here, held)
+def behind_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x: State) -> tuple[Number, State, bool]:
+    """A point behind the end of a part of an `if` in contact, and whether an `if` does not hold there.
+
+    Surface k of the contact rises through zero at t; it is above round-off at the point, if all hold there.
+    """
+    touched, after = in_touch(here, held), run.arithmetic.unit * run.settings.until
+    own = next(j for j in touched if here.mode.edges[j].contact == held.mode.edges[k].releases)
+    later = x
     try:
-        for later in shortly(run, t, x, held.kernel.flow(t, *x)):
-            if not all(is_possible(run, here, k, *later, touched) for k in touched):
-                return later
+        slope = held.kernel.flow(t, *x)
+        while True:
+            time = min(t + after, here.segment.end)
+            later = tuple(a + (time - t) * f for a, f in zip(x, slope, strict=True))
+            if not all(is_possible(run, here, j, time, later, touched) for j in touched):
+                return time, later, True
+            r = held.kernel.surfaces(time, *pressed(run, here, own, time, later, touched))[k]
+            if r > held.surfaces.roundoff_bound(k, time, later) or not time < here.segment.end:
+                return time, later, False
+            after = after * 2
     except DOMAIN_ERRORS:
-        return later
-    return None
+        return t, x, True

@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import after_contact, condition_ends, contact_at, in_touch
+from hsdsl.simulate.contact import after_contact, behind_end, contact_at, in_touch
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
@@ -25,7 +25,7 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import close_tail, contraction
+from hsdsl.simulate.zeno import close_tail, contraction, flown
 
 MOST_CORRECTIONS = 8
 
@@ -69,20 +69,15 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
         if not held.surfaces.releases(crossing.edge):
             ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
             return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name not in ends))
-        t, x = crossing.time, crossing.state
-        let_go = (t, x) if crossing.edge < len(edges) else condition_ends(run, here, held, t, x)
-        if let_go is not None:
-            return released(run, here, held, outcome, *let_go)
-        held.surfaces.active.add(crossing.edge)
+        t, x, ends = crossing.time, crossing.state, True
+        if not crossing.edge < len(edges):
+            t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
+        if t > crossing.time:
+            here.arc.append(t, x, (tuple(b - a for a, b in zip(crossing.state, x, strict=True)),))
+        if ends:
+            active = after_contact(here, held, t, x).surfaces.active
+            return run.place(here.index, here.mode.states, t, x, outcome.scale, active=active)
         held = held.moved(t, x)
-
-
-def released(run: Run, here: ModeState, held: ModeState, event: Event, t: Number, x: State) -> ModeState:
-    """Go on in the mode itself from a point that a guard no longer holds."""
-    if t > event.crossing.time:
-        here.arc.append(t, x, (tuple(b - a for a, b in zip(event.crossing.state, x, strict=True)),))
-    active = after_contact(here, held, t, x).surfaces.active
-    return run.place(here.index, here.mode.states, t, x, event.scale, active=active)
 
 
 def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event | ModeState | Stop:
@@ -244,10 +239,7 @@ def crowded(run: Run, here: ModeState, edge: str, t: Number) -> bool:
     again = any(made.edge == edge and made.source == here.mode.name for made in last)
     if not again and t - last[0].time <= run.tie(t):
         return False
-    flown = t - last[0].time
-    for made in last:
-        flown = flown - (made.resumed - made.time if made.resumed is not None else 0)
-    return flown <= run.settings.relaxation
+    return flown(last, t) <= run.settings.relaxation
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:

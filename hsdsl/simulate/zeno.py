@@ -1,25 +1,29 @@
-"""Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
+"""Zeno tails: impacts that follow each other ever faster towards rest on guards are replaced by their limit (M11).
 
 Flights T_n of one edge that leads back to its own mode shrink by the ratio q at least; what is left is then at most
-T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests.
+T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests. Edges may take turns, as
+those of a body that bounces on one that bounces. The state is taken to the limit of all of them once as many transitions
+as cost no time have fallen within the relaxation, if the flow moves it further within that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import contact_at, in_contact, in_touch, is_possible, keeping, keeps, pushes
+from hsdsl.simulate.contact import contact_at, in_contact, in_touch, is_possible, keeping, keeps, pressing
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.scales import flow_sizes
 
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS = 4  # of a point towards a guard
-MOST_ROUNDS = 60  # of acceleration towards a reset's fixed point
+MOST_ROUNDS = 60  # of acceleration towards a fixed point
 
 
 def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
@@ -42,53 +46,96 @@ def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
     return (flights[-1], ratio) if ratio < 1 else None
 
 
+def flown(made: Sequence[Transition], t: Number) -> Number:
+    """The time of flow since the first of some transitions, without that in strips."""
+    found = t - made[0].time
+    for one in made:
+        found = found - (one.resumed - one.time if one.resumed is not None else 0)
+    return found
+
+
+def nearly_over(run: Run, here: ModeState, k: int) -> tuple[list[int], Number] | None:
+    """Return the edges of a tail that ends within the relaxation, and a bound of what is left of it; else None."""
+    made = run.recorder.transitions[-FREE:]
+    relaxation = run.settings.relaxation
+    if found := contraction(made):
+        flight, ratio = found
+        left = flight * ratio / (1 - ratio)
+        return ([k], left) if left <= relaxation else None
+    own = {edge.name: j for j, edge in enumerate(here.mode.edges) if edge.contact is not None}
+    mode, left = here.mode.name, flown(made, here.t)
+    if len(made) < FREE or left > relaxation or run.settings.completion == "none":
+        return None
+    if not all(one.source == one.target == mode and one.edge in own and not one.entry for one in made):
+        return None
+    edges = sorted({own[one.edge] for one in made})
+    return (edges, left) if len(edges) > 1 else None
+
+
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
     made = run.recorder.transitions
-    found = contraction(made)
+    found = nearly_over(run, here, k)
     if found is None or here.mode.states != here.arc.states:
         return here
-    flight, ratio = found
-    left = flight * ratio / (1 - ratio)
+    edges, left = found
     end = min(here.t + left, here.segment.end)
-    if left > run.settings.relaxation or not end > here.t:
+    if not end > here.t:
         return here
     edge = here.mode.edges[k]
     try:
         held = contact_at(run, here)
         if isinstance(held, Stop):
             return held
-        if held.surfaces.releases(k):
-            return here
-        q = limit_of(run, here, held, k, end)
         touched = in_touch(here, held)
-        if q is None or not keeps(run, limit := here.moved(end, q), k) or not is_possible(run, here, k, end, q, touched):
+        if any(j in touched for j in edges):
+            return here
+        q = limit_of(run, here, touched, edges, end)
+        if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
             return here
         if edge.contact is None or run.settings.completion == "none":
-            return run.diagnostics.accumulates(edge.name, end, here.t)
-        if not keeping(run, limit, [k], touched) or not pushes(run, limit, [*touched, k], [k]):
+            possible = is_possible(run, here, k, end, q, touched)
+            return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
+        if keeping(run, there, edges, touched) != edges:
             return here
-        if meets_another(here, limit, k):
+        if not {*edges} & {*(pressing(run, there, sorted({*touched, *edges})) or ())}:
+            return here
+        if meets_another(here, there, edges):
             return here
     except DOMAIN_ERRORS:
         return here
-    run.diagnostics.replaced(edge.name, len(made) - 1, end, left)
+    for j in edges:
+        run.diagnostics.replaced(here.mode.edges[j].name, len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     rest = run.place(here.index, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
-    rest.surfaces.active.add(k)
+    rest.surfaces.active.update(edges)
     return rest
 
 
-def limit_of(run: Run, here: ModeState, held: ModeState, k: int, end: Number) -> State | None:
+def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
-    q = fixed_point(here, k, here.t, here.x)
-    if here.mode.edges[k].contact is not None:
-        slope = in_contact(run, here, [*in_touch(here, held), k]).kernel.flow(here.t, *q)
-        q = onto_guard(here, k, end, tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True)))
-    q = fixed_point(here, k, end, q)
-    far = abs(here.kernel.surfaces(end, *q)[k]) > here.surfaces.roundoff_bound(k, end, q, entry=True)
-    return None if far else q
+    q = in_turn(partial(fixed_point, here), edges, here.t, here.x)
+    if len(edges) > 1:
+        sizes = flow_sizes(run, here, here.kernel.flow(here.t, *here.x))
+        most = (run.settings.relaxation * size for size in sizes)
+        if not all(abs(a - b) <= far for a, b, far in zip(q, here.x, most, strict=True)):
+            return None
+    if here.mode.edges[edges[0]].contact is not None:
+        slope = in_contact(run, here, sorted({*touched, *edges})).kernel.flow(here.t, *q)
+        q = tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True))
+        q = in_turn(partial(onto_guard, here), edges, end, q)
+    q = in_turn(partial(fixed_point, here), edges, end, q)
+    bound = here.surfaces.roundoff_bound
+    on = all(abs(here.kernel.surfaces(end, *q)[k]) <= bound(k, end, q, entry=True) for k in edges)
+    return q if on else None
+
+
+def in_turn(taken: Callable[[int, Number, State], State], edges: list[int], t: Number, x: State) -> State:
+    """The point that a state runs to which several edges, in turn, take to what one of them keeps."""
+    if len(edges) == 1:
+        return taken(edges[0], t, x)
+    return limit(lambda x: reduce(lambda q, k: taken(k, t, q), edges, x), x)
 
 
 def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
@@ -104,31 +151,35 @@ def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
     return x
 
 
-def meets_another(here: ModeState, limit: ModeState, k: int) -> bool:
-    """Whether a surface other than k is passed on the way to a limit."""
+def meets_another(here: ModeState, there: ModeState, edges: list[int]) -> bool:
+    """Whether a surface other than those of edges is passed on the way to a limit."""
     surfaces = here.surfaces
-    before, after = here.kernel.surfaces(here.t, *here.x), here.kernel.surfaces(limit.t, *limit.x)
+    before, after = here.kernel.surfaces(here.t, *here.x), here.kernel.surfaces(there.t, *there.x)
     for j, (one, two) in enumerate(zip(before, after, strict=True)):
-        rises = two > surfaces.roundoff_bound(j, limit.t, limit.x) and not one > surfaces.roundoff_bound(
+        rises = two > surfaces.roundoff_bound(j, there.t, there.x) and not one > surfaces.roundoff_bound(
             j, here.t, here.x
         )
-        if j != k and rises:
+        if j not in edges and rises:
             return True
     return False
 
 
 def fixed_point(here: ModeState, k: int, t: Number, x: State) -> State:
-    """The point that repeated resets run to (Aitken's acceleration, by component)."""
-    reset = here.kernel.resets[k]
+    """The point that repeated resets run to."""
+    return limit(lambda x: here.kernel.resets[k](t, *x), x)
+
+
+def limit(step: Callable[[State], State], x: State) -> State:
+    """The point that repeated steps run to (Aitken's acceleration, by component)."""
     for _ in range(MOST_ROUNDS):
-        one = reset(t, *x)
+        one = step(x)
         if one == x:
             break
-        two = reset(t, *one)
+        two = step(one)
         x = tuple(map(_accelerated, x, one, two))
     return x
 
 
 def _accelerated(a: Number, b: Number, c: Number) -> Number:
     bend = c - 2 * b + a
-    return a - (b - a) * (b - a) / bend if bend != 0 else c
+    return a - (b - a) * (b - a) / bend if bend != 0 and abs(c - b) <= abs(b - a) else c

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import random
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import pytest
 from engines import assert_engines_agree
 
@@ -148,3 +150,90 @@ def test_stack_of_bodies_rests_and_leaves_from_the_top(engine: str) -> None:
     assert run.final.state["x3"] == pytest.approx(3 / 8 * flown**3 / 6, abs=1e-9)
     assert [run.final.state[f"x{i}"] for i in range(3)] == [0, 0, 0]
     assert any("the guard of c2 from t = 2.6666" in reason for reason in run.verdict.reasons)
+
+
+def column(n: int, restitution: str, bodies: str, until: float, conditional: bool = True) -> str:
+    """Bodies of one mass above each other and a floor, as one writes them; ``bodies`` are their initial values."""
+    floor, above = ("if: v0 < 0, ", "if: v{0} < v{1}, ") if conditional else ("", "")
+    flow = ", ".join(f"x{i}: v{i}, v{i}: -9.81" for i in range(n))
+    lines = [f"- {{name: floor, when: x0 <= 0, {floor}to: a, reset: {{v0: -e*v0}}}}"]
+    for i in range(1, n):
+        one, two = f"(v{i}*(1 - e) + v{i - 1}*(1 + e))/2", f"(v{i - 1}*(1 - e) + v{i}*(1 + e))/2"
+        guard = f"when: x{i} <= x{i - 1}, {above.format(i, i - 1)}"
+        lines.append(f"- {{name: hit{i}, {guard}to: a, reset: {{v{i}: '{one}', v{i - 1}: '{two}'}}}}")
+    transitions = "\n".join(f"      {line}" for line in lines)
+    return (
+        f"hsdsl: 1\nparameters: {{e: {restitution}}}\nmodes:\n  a:\n    flow: {{{flow}}}\n    transitions:\n"
+        f"{transitions}\ninitial: {{mode: a, {bodies}}}\nexperiment: {{until: {until}}}\n"
+    )
+
+
+def end_of_column(restitution: float, x: list[float], v: list[float]) -> float:
+    """When two bodies above a floor come to rest, flight by flight in 60 digits: the end of both Zeno tails."""
+    with mpmath.workdps(60):
+        e, g, t = mpmath.mpf(str(restitution)), mpmath.mpf("9.81"), mpmath.mpf(0)
+        a, b, u, w = (mpmath.mpf(str(value)) for value in (*x, *v))
+        while max(abs(a), abs(b), abs(u), abs(w)) > mpmath.mpf(10) ** -16:
+            floor = (u + mpmath.sqrt(u * u + 2 * g * a)) / g
+            meet = (b - a) / (u - w) if u > w else mpmath.inf
+            if a < mpmath.mpf(10) ** -40 and abs(u) < mpmath.mpf(10) ** -24:
+                a, u = mpmath.mpf(0), mpmath.mpf(0)  # at rest on the floor until the other one comes
+                floor, meet = mpmath.inf, (w + mpmath.sqrt(w * w + 2 * g * b)) / g
+                t, b, w = t + meet, mpmath.mpf(0), -mpmath.sqrt(w * w + 2 * g * b)
+                u, w = (u * (1 - e) + w * (1 + e)) / 2, (w * (1 - e) + u * (1 + e)) / 2
+                continue
+            s = min(floor, meet)
+            t, a, b, u, w = t + s, a + u * s - g * s * s / 2, b + w * s - g * s * s / 2, u - g * s, w - g * s
+            if meet <= floor:
+                b, u, w = a, (u * (1 - e) + w * (1 + e)) / 2, (w * (1 - e) + u * (1 + e)) / 2
+            else:
+                a, u = mpmath.mpf(0), -e * u
+        return float(t)
+
+
+@pytest.mark.parametrize("conditional", [False, True])
+def test_bodies_that_bounce_on_each_other_come_to_rest_together(conditional: bool) -> None:
+    """Tails of two edges in turn, one of them inside the other's flights, end where resets in turn lead."""
+    text = column(2, "0.2", "x0: 0.33, v0: -0.01, x1: 0.83, v1: 0.3", 4, conditional)
+    run = assert_engines_agree(hsdsl.loads(text))
+    right = end_of_column(0.2, [0.33, 0.83], [-0.01, 0.3])
+    assert run.stop.reason == "until"
+    assert run.verdict.theorem == "left"
+    assert [run.final.state[name] for name in ("v0", "v1")] == [0, 0]
+    assert [run.final.state[name] for name in ("x0", "x1")] == pytest.approx([0, 0], abs=1e-15)
+    rests = [reason for reason in run.verdict.reasons if reason.startswith("at rest on the guard of hit1 from t = ")]
+    assert float(rests[0].split("t = ")[1].split()[0]) == pytest.approx(right, abs=4e-6)  # the relaxation
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_columns_come_to_rest_and_elastic_ones_do_not(seed: int) -> None:
+    r = random.Random(f"column {seed}")
+    n, bodies, height, energy = r.choice((2, 3, 4)), list[str](), 0.0, 0.0
+    for i in range(n):
+        height, speed = round(height + r.uniform(0.1, 1), 2), round(r.uniform(-1, 1), 2)
+        bodies.append(f"x{i}: {height}, v{i}: {speed}")
+        energy += speed**2 / 2 + 9.81 * height
+    model = hsdsl.loads(column(n, r.choice(("0.2", "0.5", "0.7")), ", ".join(bodies), 5, r.random() < 0.5))
+    last = model.simulate().final.state
+    assert max(map(abs, last.values())) < 1e-12
+    last = model.simulate(parameters={"e": 1}, until=2).final.state
+    kept = sum(float(last[f"v{i}"]) ** 2 / 2 + 9.81 * float(last[f"x{i}"]) for i in range(n))
+    assert kept == pytest.approx(energy, rel=1e-7)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "condition", ["v < 0", "v <= 0", "v < 0 and t < 3", "not v >= 0", "v < 1e-3*(3 - t)", "v < 0 or t < 3"]
+)
+def test_an_if_counts_as_what_it_is_next_along_the_flow(engine: str, condition: str) -> None:
+    """A ball at rest is pressed to fall; where its `if` ends it does."""
+    text = f"""
+hsdsl: 1
+modes:
+  a: {{flow: {{x: v, v: -1}}, transitions: [{{when: x <= 0, if: {condition}, to: a, reset: {{v: -v/5}}}}]}}
+initial: {{mode: a, x: 1, v: 0}}
+experiment: {{until: 4}}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    falls = -0.5 if "t)" in condition or " and " in condition else 0
+    assert run.final.state["x"] == pytest.approx(falls, abs=1e-9)

@@ -84,23 +84,32 @@ static void bind_mode(hs_run *run) {
   run->here.p = run->own_p;
 }
 
-/* Whether the `if` of edge k, of the state's mode, holds at a point, or next along the flow that the guards of other
-   edges leave: of those `touched` and of those `found`, each 0 for none. */
-static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
+/* Where the flow that the guards of other edges leave, of those `touched` and of those `found`, each 0 for none, takes a
+   state: off by round-off where the reset of edge k changes it, to run->after. */
+static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
   const hs_mode *const own = run->here.table;
-  const int now = condition(run, k, t, x), n = run->here.dimension;
-  int others = 0, holds = 0;
-  if (now || !own->edge[k].conditional) return now == 1;
+  const hs_edge *const edge = &own->edge[k];
+  int others = 0;
+  hs_real after = 0.0;
   for (int j = 0; j < own->edges; j++)
     others += run->others[j] = j != k && ((touched && touched[j]) || (found && found[j]));
   if (others) bind_contacts(run, run->others, run->others);
   const int raised = run->here.table->flow(run->here.p, t, x, run->at);
   if (others) bind_mode(run);
-  for (hs_real after = HS_UNIT * run->until; !raised && !holds && after <= tie(run, t); after = after * 2) {
-    for (int s = 0; s < n; s++) run->after[s] = x[s] + after * run->at[s];
-    holds = condition(run, k, t + after, run->after);
+  if (raised) return RAISED;
+  for (int i = 0; i < edge->changes; i++) {
+    const int s = edge->change[i];
+    if (run->at[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * run->scales[s] / fabs(run->at[s]));
   }
-  return holds == 1;
+  for (int s = 0; s < run->here.dimension; s++) run->after[s] = x[s] + after * run->at[s];
+  return 0;
+}
+
+/* Whether the `if` of edge k, of the state's mode, holds at a point, or next along the flow that others leave. */
+static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
+  const int now = condition(run, k, t, x);
+  if (now || !run->here.table->edge[k].conditional) return now == 1;
+  return !pressed(run, k, t, x, touched, found) && condition(run, k, t, run->after) == 1;
 }
 
 /* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
@@ -212,24 +221,29 @@ static void after_contact(hs_run *run) {
   count_active(run);
 }
 
-/* Move t to the first moment from it on, within the tie of times, at which an `if` in contact does not hold, and the
-   state run->x to run->z: 1; 0 where all hold. */
-static int condition_ends(hs_run *run, hs_time *t) {
+/* Move t, where surface j of the contact rises through zero, to behind the end of a part of an `if` in contact, and the
+   state run->x to run->z: whether an `if` does not hold there. Surface j is above round-off there, if all hold. */
+static int behind_end(hs_run *run, int j, hs_time *t) {
   const hs_mode_state *here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   const hs_time from = *t;
-  copy(run->z, run->x, here->dimension);
-  if (held->flow(here->p, from, run->x, run->end)) return 1;
+  hs_real r, noise;
+  int of = 0, raised = held->flow(here->p, from, run->x, run->end);
+  while (own->edge[of].contact != held->edge[j].releases) of++;
   for (int k = 0; k < own->edges; k++) run->kept[k] = in_touch(run, k);
-  for (hs_real after = HS_UNIT * run->until; after <= tie(run, from); after = after * 2) {
+  for (hs_real after = HS_UNIT * run->until; !raised; after = after * 2) {
     int holds = 1;
-    *t = from + after;
-    for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + after * run->end[s];
+    *t = earlier(from + after, segment_end(run));
+    for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + (*t - from) * run->end[s];
     bind_mode(run);
     for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept, 0);
+    raised = holds && pressed(run, of, *t, run->z, run->kept, 0);
     bind_contacts(run, run->kept, run->kept);
     if (!holds) return 1;
+    raised = raised || surface(run, j, *t, run->after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);
+    if (!raised && (r > noise || !(*t < segment_end(run)))) return 0;
   }
   *t = from;
-  return 0;
+  copy(run->z, run->x, here->dimension);
+  return 1;
 }

@@ -223,7 +223,7 @@ static int contact_at(hs_run *run);
 static int releases(const hs_run *run, int j);
 static int in_touch(const hs_run *run, int k);
 static void after_contact(hs_run *run);
-static int condition_ends(hs_run *run, hs_time *t);
+static int behind_end(hs_run *run, int j, hs_time *t);
 
 /* zeno.c */
 static const hs_made *made_before(const hs_run *run, int back);

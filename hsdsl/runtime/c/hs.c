@@ -124,6 +124,8 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->kept = take(store, m, sizeof(int));
   run->held = take(store, m, sizeof(int));
   run->others = take(store, m, sizeof(int));
+  run->tail = take(store, m, sizeof(int));
+  run->turn = numbers(store, 2 * (int64_t)w);
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
   hs_real **states[] = {&run->q, &run->other_end, 0};

@@ -231,14 +231,13 @@ static int along_guards(hs_run *run, hs_time limit) {
       hs_time t = run->chosen.time;
       copy(run->x, run->chosen.state, here->dimension);
       if (in_touch(run, end)) return released(run, t);
-      if (condition_ends(run, &t)) {
+      const int ends = behind_end(run, end, &t);
+      if (t > run->chosen.time) {
         secant(run, &run->cubic);
         append(run, t, run->z, &run->cubic);
-        swap(&run->x, &run->z);
-        return released(run, t);
       }
-      run->active_surfaces[end] = 1;
-      here->standing++;
+      swap(&run->x, &run->z);
+      if (ends) return released(run, t);
       here->t = t;
       continue;
     }
@@ -278,13 +277,8 @@ static int crowded(const hs_run *run, int k, hs_time t) {
   int again = 0;
   if (run->jump < FREE || contraction(run, &flight, &ratio)) return 0;
   const hs_time since = t - made_before(run, FREE - 1)->time;
-  hs_time flown = since;
-  for (int i = FREE - 1; i >= 0; i--) {
-    const hs_made *made = made_before(run, i);
-    flown = flown - (made->resumed == made->resumed ? made->resumed - made->time : 0);
-    again |= made->edge == k && made->mode == run->here.mode;
-  }
-  return flown <= run->epsilon && (again || since > tie(run, t));
+  for (int i = 0; i < FREE; i++) again |= made_before(run, i)->edge == k && made_before(run, i)->mode == run->here.mode;
+  return flown(run, t) <= run->epsilon && (again || since > tie(run, t));
 }
 
 /* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */

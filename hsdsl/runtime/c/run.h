@@ -191,6 +191,8 @@ typedef struct {
   const hs_real *own_p; /* what they are bound to else */
   int *kept, *held; /* one for each edge: whether it may hold the state, and does */
   int *others;      /* one for each edge: whether it holds the state where the `if` of another is looked at */
+  int *tail;        /* one for each surface: whether it is that of an edge of a Zeno tail */
+  hs_real *turn;    /* 2 width: where a tail's edges take a state in turn */
   hs_real **k;          /* stages, then the flow at the end */
   hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
   int expanded;        /* whether it has written them, in this mode */

@@ -1,4 +1,4 @@
-/* Zeno tails: impacts that follow each other ever faster towards rest on a guard are replaced by their limit (M11).
+/* Zeno tails: impacts that follow each other ever faster towards rest on guards are replaced by their limit (M11).
    See hsdsl/simulate/zeno.py. */
 
 #include "functions.h"
@@ -32,7 +32,7 @@ static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
 
 static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
   const hs_real bend = c - 2 * b + a;
-  return bend != 0 ? a - (b - a) * (b - a) / bend : c;
+  return bend != 0 && fabs(c - b) <= fabs(b - a) ? a - (b - a) * (b - a) / bend : c;
 }
 
 /* The point that repeated resets of edge k run to from run->z, to run->z. */
@@ -50,10 +50,10 @@ static int fixed_point(hs_run *run, int k, hs_time t) {
   return 0;
 }
 
-/* A point near the guard of edge k taken to it, each state in proportion to its scale. */
-static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
+/* run->z taken to the guard of edge k, which is near, each state in proportion to its scale. */
+static int onto_guard(hs_run *run, int k, hs_time t) {
   const int n = run->here.dimension;
-  hs_real *const weights = run->at;
+  hs_real *const x = run->z, *const weights = run->at;
   for (int i = 0; i < MOST_CORRECTIONS_TO_GUARD; i++) {
     hs_real r, noise;
     if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
@@ -70,29 +70,69 @@ static int onto_guard(hs_run *run, int k, hs_time t, hs_real *x) {
   return 0;
 }
 
-/* The point that a tail of edge k, also in contact with run->held, runs to at its end, to run->z: 1; 0 where it is not
-   on the guard. */
-static int limit_of(hs_run *run, int k, hs_time end) {
+/* run->z taken by each edge of the tail, in turn. */
+static int by_each(hs_run *run, int (*taken)(hs_run *, int, hs_time), hs_time t) {
+  for (int k = 0; k < run->here.table->edges; k++)
+    if (run->tail[k] && taken(run, k, t)) return RAISED;
+  return 0;
+}
+
+/* The point that run->z runs to, to run->z, which the edges of the tail, `count` of them, in turn take to what one of
+   them keeps. */
+static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count, hs_time t) {
+  const int n = run->here.dimension;
+  hs_real *const x = run->z, *const first = run->turn, *const one = run->turn + n;
+  if (count == 1) return by_each(run, taken, t);
+  for (int i = 0; i < MOST_ROUNDS; i++) {
+    copy(first, x, n);
+    if (by_each(run, taken, t)) return RAISED;
+    if (same_state(first, x, n)) break;
+    copy(one, x, n);
+    if (by_each(run, taken, t)) return RAISED;
+    for (int s = 0; s < n; s++) x[s] = accelerated(first[s], one[s], x[s]);
+  }
+  return 0;
+}
+
+/* Whether run->z is no further than the flow moves run->x within the relaxation. */
+static int is_near(hs_run *run) {
+  const hs_mode_state *here = &run->here;
+  if (here->table->flow(here->p, here->t, run->x, run->end) || flow_sizes(run, here->t, run->x, run->end)) return RAISED;
+  for (int s = 0; s < here->dimension; s++)
+    if (!(fabs(run->z[s] - run->x[s]) <= run->epsilon * run->flow_sizes[s])) return 0;
+  return 1;
+}
+
+/* The point that the tail, of `count` edges, runs to at its end, also in contact with run->held, to run->z: 1; 0 where
+   it is not on the guards. */
+static int limit_of(hs_run *run, int count, hs_time end) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
+  int along = 0;
   hs_real r, noise, *const q = run->z;
   copy(q, run->x, n);
-  if (fixed_point(run, k, here->t)) return RAISED;
-  if (here->table->edge[k].contact >= 0) {
+  if (in_turn(run, fixed_point, count, here->t)) return RAISED;
+  if (count > 1 && is_near(run) != 1) return 0;
+  for (int k = 0; k < here->table->edges; k++) along |= run->tail[k] && here->table->edge[k].contact >= 0;
+  if (along) {
     bind_contacts(run, run->held, run->held);
     const int raised = here->table->flow(here->p, here->t, q, run->end);
     bind_mode(run);
     if (raised) return RAISED;
     for (int s = 0; s < n; s++) q[s] = q[s] + (end - here->t) * run->end[s];
-    if (onto_guard(run, k, end, q)) return RAISED;
+    if (in_turn(run, onto_guard, count, end)) return RAISED;
   }
-  if (fixed_point(run, k, end) || surface(run, k, end, q, &r) || roundoff_bound(run, k, end, q, 1, &noise))
-    return RAISED;
-  return !(fabs(r) > noise);
+  if (in_turn(run, fixed_point, count, end)) return RAISED;
+  for (int k = 0; k < here->table->edges; k++) {
+    if (!run->tail[k]) continue;
+    if (surface(run, k, end, q, &r) || roundoff_bound(run, k, end, q, 1, &noise)) return RAISED;
+    if (!(fabs(r) <= noise)) return 0;
+  }
+  return 1;
 }
 
-/* Whether a surface other than k is passed on the way from x to a limit q: 1, 0 or RAISED. */
-static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, const hs_real *q, int k) {
+/* Whether a surface other than those of the tail is passed on the way from x to a limit q: 1, 0 or RAISED. */
+static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, const hs_real *q) {
   const hs_mode_state *here = &run->here;
   const int m = here->table->surfaces;
   if (here->table->values(here->p, t, x, run->ahead) || here->table->values(here->p, end, q, run->ends)) return RAISED;
@@ -101,42 +141,94 @@ static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, 
     if (roundoff_bound(run, j, end, q, 0, &noise)) return RAISED;
     if (!(run->ends[j] > noise)) continue;
     if (roundoff_bound(run, j, t, x, 0, &before)) return RAISED;
-    if (j != k && !(run->ahead[j] > before)) return 1;
+    if (!run->tail[j] && !(run->ahead[j] > before)) return 1;
   }
   return 0;
 }
 
-/* Go to the limit of a tail of edge k that is nearly over; stop at one where no motion along the guard goes on. */
+/* The time of flow up to t since the first of the last transitions, without that in strips. */
+static hs_time flown(const hs_run *run, hs_time t) {
+  hs_time found = t - made_before(run, FREE - 1)->time;
+  for (int i = FREE - 1; i >= 0; i--) {
+    const hs_made *made = made_before(run, i);
+    found = found - (made->resumed == made->resumed ? made->resumed - made->time : 0);
+  }
+  return found;
+}
+
+/* Mark in run->tail the edges of a tail that ends within the relaxation, and bound what is `left` of it; return how
+   many. The last transition was that of edge k. */
+static int nearly_over(hs_run *run, int k, hs_time *left) {
+  const hs_mode_state *here = &run->here;
+  hs_real flight, ratio;
+  int count = 0;
+  for (int j = 0; j < here->table->surfaces; j++) run->tail[j] = 0;
+  if (contraction(run, &flight, &ratio)) {
+    *left = flight * ratio / (1 - ratio);
+    run->tail[k] = 1;
+    return !(*left > run->epsilon);
+  }
+  if (run->jump < FREE || !run->task->settings.contacts) return 0;
+  *left = flown(run, here->t);
+  if (*left > run->epsilon) return 0;
+  for (int i = 0; i < FREE; i++) {
+    const hs_made *made = made_before(run, i);
+    if (made->entry || made->mode != here->mode || made->target != here->mode) return 0;
+    if (here->table->edge[made->edge].contact < 0) return 0;
+    count += !run->tail[made->edge];
+    run->tail[made->edge] = 1;
+  }
+  return count > 1 ? count : 0;
+}
+
+/* Whether resets keep a limit q of the tail, of `count` edges, and the flow presses on their guards. */
+static int is_held(hs_run *run, hs_time end, const hs_real *q, int count) {
+  const int edges = run->here.table->edges;
+  int all = 0, presses = 0;
+  if (keeping(run, end, q, run->kept, run->held) != count) return 0;
+  for (int j = 0; j < edges; j++) all += run->held[j];
+  if (!pressing(run, end, q, run->held, all, run->kept, run->beyond)) return 0;
+  for (int j = 0; j < edges; j++) presses |= run->tail[j] && run->kept[j];
+  return presses;
+}
+
+/* Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on. The last
+   transition was that of edge k. */
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
-  hs_real flight, ratio;
-  if (!contraction(run, &flight, &ratio) || here->dimension != here->table->dimension || !here->dimension)
-    return GOES_ON;
-  const hs_real left = flight * ratio / (1 - ratio);
+  hs_time left;
+  int touches = 0;
+  if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
+  const int count = nearly_over(run, k, &left);
+  if (!count) return GOES_ON;
   const hs_time whole = here->t + left, end = earlier(whole, segment_end(run));
-  if (left > run->epsilon || whole > run->pause || !(end > here->t)) return GOES_ON;
+  if (whole > run->pause || !(end > here->t)) return GOES_ON;
   const hs_mode *const own = here->table;
   if (contact_at(run) != GOES_ON) return HS_ACCUMULATED;
-  const int touches = in_touch(run, k);
-  for (int j = 0; j < own->edges; j++) run->held[j] = j == k || in_touch(run, j), run->kept[j] = j == k;
+  for (int j = 0; j < own->edges; j++) {
+    touches |= run->tail[j] && in_touch(run, j);
+    run->held[j] = run->tail[j] || in_touch(run, j), run->kept[j] = run->tail[j];
+  }
   if (here->table != own) after_contact(run);
   hs_real *const q = run->z;
-  if (touches || limit_of(run, k, end) != 1 || keeps(run, end, q, k) != 1) return GOES_ON;
-  if (!is_possible(run, k, end, q, run->held, 0)) return GOES_ON;
+  if (touches || limit_of(run, count, end) != 1) return GOES_ON;
+  for (int j = 0; j < own->edges; j++)
+    if (run->tail[j] && keeps(run, end, q, j) != 1) return GOES_ON;
   if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
+    if (!is_possible(run, k, end, q, run->held, 0)) return GOES_ON;
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
-  if (!keeping(run, end, q, run->kept, run->held)) return GOES_ON;
-  pushes(run, end, q, run->held, run->kept, run->beyond);
-  if (!run->beyond[k] || meets_another(run, here->t, run->x, end, q, k)) return GOES_ON;
-  note(run, HS_REPLACED, k, run->jump - 1, end, left);
+  if (!is_held(run, end, q, count) || meets_another(run, here->t, run->x, end, q)) return GOES_ON;
+  for (int j = 0; j < own->edges; j++)
+    if (run->tail[j]) note(run, HS_REPLACED, j, run->jump - 1, end, left);
   secant(run, &run->cubic);
   append(run, end, q, &run->cubic);
   swap(&run->x, &run->z);
   place(run, here->mode, here->dimension, end, 0);
   here->table->values(here->p, end, run->x, run->ahead);
   enter_surfaces(run, end, 0.0, 0, end);
-  if (!run->active_surfaces[k]) run->active_surfaces[k] = 1, here->standing++;
+  for (int j = 0; j < own->edges; j++)
+    if (run->tail[j] && !run->active_surfaces[j]) run->active_surfaces[j] = 1, here->standing++;
   return GOES_ON;
 }

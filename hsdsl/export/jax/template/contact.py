@@ -31,10 +31,19 @@ def after_reset(model, bound, mode, k, t, x):
 
 
 def keeps(model, bound, lane, k, t, x):
-    """Whether edge k is possible and leaves the state where it is."""
-    noise = SAME_UNITS * UNIT * scales_here(model, lane)
-    still = (jnp.abs(after_reset(model, bound, lane.mode, k, t, x) - x) <= noise).all()
-    return still & bound.facts(lane.mode, t, x).conditions[k]
+    """Whether edge k leaves the state where it is, and its `if` holds there or next along the flow."""
+    scales = scales_here(model, lane)
+    still = (jnp.abs(after_reset(model, bound, lane.mode, k, t, x) - x) <= SAME_UNITS * UNIT * scales).all()
+    return still & is_possible(model, bound, lane.mode, k, t, x, scales)
+
+
+def is_possible(model, bound, mode, k, t, x, scales):
+    """Whether the `if` of edge k holds at a point, or next along the flow: off by round-off where the reset moves it."""
+    slope = bound.flow(mode, t, x)
+    slopes = jax.jvp(lambda x: after_reset(model, bound, mode, k, t, x) - x, (x,), (slope,))[1]
+    moved = (slopes != 0) & (slope != 0)
+    after = jnp.where(moved, ZERO_UNITS * UNIT * scales / jnp.abs(jnp.where(slope == 0, 1.0, slope)), 0.0).max()
+    return bound.facts(mode, t, x).conditions[k] | bound.facts(mode, t, x + after * slope).conditions[k]
 
 
 def is_tangent(model, bound, lane, k, t, x):
@@ -93,8 +102,8 @@ def let_go(model, config, p, lane, event):
     t, x, owner = frozen(event.t), frozen(event.x), model.of(model.owner, lane.mode)
     after = UNIT * config.until * 2.0 ** jnp.arange(DOUBLINGS)
     after = jnp.where(after <= ties(config, t), after, 0.0)
-    slope = bound.flow(lane.mode, t, x)
-    holds = jax.vmap(lambda s: bound.facts(owner, t + s, x + s * slope).conditions[lane.held])(after)
+    slope, scales = bound.flow(lane.mode, t, x), scales_here(model, lane)
+    holds = jax.vmap(lambda s: is_possible(model, bound, owner, lane.held, t + s, x + s * slope, scales))(after)
     own = event.k == lane.held
     late = jnp.where(own, 0.0, after[jnp.argmax(~holds)])
     frees = own | ~holds.all()

@@ -867,7 +867,7 @@ function [yes, pushed] = held(w, q, k, t, x, d)
   noise = 4 * eps * sizes;
   f = slope(w, q, t, x, d);
   after = w.m.reset{q}{k}(t, x, w.p, d);
-  pushed = all(abs(after - x) <= noise) && holds(w, q, k, t, x, d) && any(f) && all(isfinite(f));
+  pushed = all(abs(after - x) <= noise) && any(f) && all(isfinite(f)) && possible(w, q, k, t, x, f, sizes, d);
   if ~pushed
     return
   end
@@ -881,6 +881,17 @@ function [yes, pushed] = held(w, q, k, t, x, d)
   pushed = rate > 0;
   ahead = x + small * f;
   yes = pushed && opposite(f, w.m.reset{q}{k}(t, ahead, w.p, d) - ahead, noise);
+end
+
+function yes = possible(w, q, k, t, x, f, sizes, d)
+% Whether the `if` of edge k holds at a point, or next along the flow f: off by round-off where the reset moves it.
+  yes = holds(w, q, k, t, x, d);
+  if ~yes
+    ahead = x + sqrt(eps) * f;
+    moved = w.m.reset{q}{k}(t, ahead, w.p, d) ~= ahead & f ~= 0;
+    after = max([0; 16 * eps * sizes(moved) ./ abs(f(moved))]);
+    yes = holds(w, q, k, t, x + after * f, d);
+  end
 end
 
 function [w, here, event] = rest(w, here)
