@@ -104,7 +104,7 @@ def is_possible(run: Run, here: ModeState, k: int, t: Number, x: State, touched:
 
 
 def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Collection[int]) -> State:
-    """Where the flow that the guards of other edges leave takes a state: off by round-off where the reset changes it."""
+    """Where the flow that other edges' guards leave takes a state: off by round-off where the reset changes it."""
     others, after = sorted({*touched} - {k}), run.arithmetic.zero
     slope = (in_contact(run, here, others) if others else here).kernel.flow(t, *x)
     for i in here.mode.edges[k].changes:

@@ -1,9 +1,9 @@
 """Zeno tails: impacts that follow each other ever faster towards rest on guards are replaced by their limit (M11).
 
 Flights T_n of one edge that leads back to its own mode shrink by the ratio q at least; what is left is then at most
-T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests. Edges may take turns, as
-those of a body that bounces on one that bounces. The state is taken to the limit of all of them once as many transitions
-as cost no time have fallen within the relaxation, if the flow moves it further within that.
+T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests. Edges may take turns,
+as those of a body that bounces on one that bounces. The state is taken to the limit of all of them once as many
+transitions as cost no time have fallen within the relaxation, if the flow moves it further within that.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ from .functions import chosen, frozen, keeping, when
 from .lane import STEP, ZENO, contraction, noticed, sampled, scales_here, stopped
 from .model import Bound, noise_of
 from .steps import at
-from .surfaces import UNIT, ties
+from .surfaces import UNIT
 
-SAME_UNITS, ZERO_UNITS, ROUNDS, CORRECTIONS, DOUBLINGS = 4, 16, 60, 8, 14
+SAME_UNITS, ZERO_UNITS, ROUNDS, CORRECTIONS, QUADRUPLINGS = 4, 16, 60, 8, 28
 
 
 def takes_back(slope, back, sizes):
@@ -38,12 +38,18 @@ def keeps(model, bound, lane, k, t, x):
 
 
 def is_possible(model, bound, mode, k, t, x, scales):
-    """Whether the `if` of edge k holds at a point, or next along the flow: off by round-off where the reset moves it."""
+    """Whether the `if` of edge k holds at a point, or next along the flow."""
+    next_to = pressed(model, bound, mode, k, t, x, scales)
+    return bound.facts(mode, t, x).conditions[k] | bound.facts(mode, t, next_to).conditions[k]
+
+
+def pressed(model, bound, mode, k, t, x, scales):
+    """Where the flow takes a state: off by round-off where the reset of edge k moves it."""
     slope = bound.flow(mode, t, x)
     slopes = jax.jvp(lambda x: after_reset(model, bound, mode, k, t, x) - x, (x,), (slope,))[1]
     moved = (slopes != 0) & (slope != 0)
     after = jnp.where(moved, ZERO_UNITS * UNIT * scales / jnp.abs(jnp.where(slope == 0, 1.0, slope)), 0.0).max()
-    return bound.facts(mode, t, x).conditions[k] | bound.facts(mode, t, x + after * slope).conditions[k]
+    return x + after * slope
 
 
 def is_tangent(model, bound, lane, k, t, x):
@@ -100,21 +106,26 @@ def let_go(model, config, p, lane, event):
     ends = event.mask & model.of(model.releases, lane.mode)[event.k]
     bound = Bound(model, frozen(p), lane.segment)
     t, x, owner = frozen(event.t), frozen(event.x), model.of(model.owner, lane.mode)
-    after = UNIT * config.until * 2.0 ** jnp.arange(DOUBLINGS)
-    after = jnp.where(after <= ties(config, t), after, 0.0)
     slope, scales = bound.flow(lane.mode, t, x), scales_here(model, lane)
-    holds = jax.vmap(lambda s: is_possible(model, bound, owner, lane.held, t + s, x + s * slope, scales))(after)
-    own = event.k == lane.held
-    late = jnp.where(own, 0.0, after[jnp.argmax(~holds)])
-    frees = own | ~holds.all()
+    after = jnp.minimum(UNIT * config.until * 4.0 ** jnp.arange(QUADRUPLINGS), bound.end - t)
+
+    def look(s):
+        """Whether an `if` ends, and whether the surface is above round-off."""
+        time, point = t + s, x + s * slope
+        ahead = bound.facts(lane.mode, time, pressed(model, bound, owner, lane.held, time, point, scales))
+        above = ahead.values[event.k] > noise_of(ahead, time, point, 0.0)[event.k]
+        return ~is_possible(model, bound, owner, lane.held, time, point, scales), above
+
+    ended, above = jax.vmap(look)(after)
+    first, own = jnp.argmax(ended | above | (t + after >= bound.end)), event.k == lane.held
+    late, frees = jnp.where(own, 0.0, after[first]), own | ended[first]
     here = noticed(model, lane, x)._replace(
         t=event.t + late, x=event.x + late * slope, trial=lane.h, clear=jnp.asarray(False), phase=jnp.int32(STEP),
         halvings=jnp.zeros_like(lane.halvings), terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
-    on = here._replace(active=here.active | (jnp.arange(model.M) == event.k))
     free = out_of_contact(model, here, jnp.asarray(True))
     free = free._replace(scale=event.sizes, entered_t=frozen(here.t), entered_x=frozen(here.x))
-    lane = chosen(ends, chosen(frees, free, on), lane)
+    lane = chosen(ends, chosen(frees, free, here), lane)
     return lane, event._replace(mask=event.mask & ~ends)
 
 
