@@ -11,7 +11,7 @@ from hsdsl.cli.console import print_json, say
 from hsdsl.cli.options import Answer, Experiment, Model, option
 from hsdsl.cli.texts import names_of
 from hsdsl.errors import UsageError
-from hsdsl.export import TARGETS, check_folder, check_scheme, files_of, source_of, write
+from hsdsl.export import TARGETS, check_folder, check_scheme, check_target, files_of, source_of, write
 
 TO = f"The target: {', '.join(TARGETS)}."
 OUT = "The folder for the files; left out, a target with one file of text prints it."
@@ -32,6 +32,7 @@ def export(
     with answer.reporting():
         from hsdsl.model import load
 
+        check_target(to)
         if out is not None:
             check_folder(out, force)
         settings = experiment.settings()
@@ -42,7 +43,11 @@ def export(
         if out is None:
             if len(files) > 1:
                 raise UsageError(f"{to} has {len(files)} files: expected --out DIR")
-            print(next(iter(files.values())).decode(), end="")
+            (name, content), *_ = files.items()
+            if answer.json:
+                print_json({"target": to, "name": name, "text": content.decode()})
+            else:
+                print(content.decode(), end="")
             return
         written = write(files, out, force)
         if answer.json:

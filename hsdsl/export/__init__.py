@@ -7,6 +7,7 @@ the output folder, or raises `UsageError` where the target cannot keep the model
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import ExitStack, suppress
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -17,8 +18,9 @@ from hsdsl.names import did_you_mean
 if TYPE_CHECKING:
     from hsdsl.export.source import Source
     from hsdsl.model import Model
+    from hsdsl.store.atomic import New
 
-__all__ = ["TARGETS", "check_folder", "check_scheme", "files_of", "source_of", "write"]
+__all__ = ["TARGETS", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
@@ -49,21 +51,22 @@ def files_of(source: Source, target: str) -> dict[str, bytes]:
 
     Raises UsageError: an unknown target, or a model that the target cannot keep.
     """
-    _check_target(target)
+    check_target(target)
     if source.system.parts and target not in OF_PARTS:
         hint = f"--to {' or '.join(OF_PARTS)}, or write the modes of a small one out"
         raise UsageError(f"{target} has no systems of parts", hint)
     return import_module(f"hsdsl.export.{target}").files(source)
 
 
-def _check_target(target: str) -> None:
+def check_target(target: str) -> None:
+    """Refuse a target that there is not."""
     if target not in TARGETS:
         raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS) or _choices())
 
 
 def check_scheme(model: Model, target: str, arguments: Mapping[str, Any]) -> None:
     """Refuse a scheme that no code has, before anything else about it: the two documents of a model have none."""
-    _check_target(target)
+    check_target(target)
     given = {"scheme": arguments.get("scheme"), "step": 1}  # a step, since some schemes are refused without one
     scheme = model.resolve(arguments.get("settings"), given).values["scheme"].value
     if scheme == "paoli-schatzman" and target not in DOCUMENTS:
@@ -83,21 +86,36 @@ def check_folder(folder: Path, force: bool) -> None:
 
 
 def write(files: Mapping[str, bytes], folder: Path, force: bool = False) -> list[Path]:
-    """Write files into a folder, which is made; each of them appears whole.
+    """Write files into a folder, which is made: all of them under other names first, so that a failure leaves none.
 
     Raises UsageError: the folder has entries and ``force`` is not given, or it cannot be written.
     """
-    from hsdsl.store.atomic import replacing
+    from hsdsl.store.atomic import unplaced
 
     check_folder(folder, force)
-    written: list[Path] = []
-    for name, content in files.items():
-        path = folder / PurePosixPath(name)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
-        with replacing(path) as file:
-            file.write(content)
-        written.append(path)
-    return written
+    paths, folders = [folder / PurePosixPath(name) for name in files], list[Path]()
+    try:
+        with ExitStack() as parts:
+            whole: list[New] = []
+            for path, content in zip(paths, files.values(), strict=True):
+                _make(path.parent, folders)
+                whole.append(parts.enter_context(unplaced(path)))
+                whole[-1].file.write(content)
+                whole[-1].finish()
+            for new in whole:
+                new.place()
+    except BaseException:
+        for made in reversed(folders):
+            with suppress(OSError):  # a file of an earlier export is in it
+                made.rmdir()
+        raise
+    return paths
+
+
+def _make(folder: Path, made: list[Path]) -> None:
+    """Make a folder and those it is in; ``made`` gets those that there were not, the outer first."""
+    made += [each for each in reversed((folder, *folder.parents)) if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror or error}") from error

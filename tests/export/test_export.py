@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import json
+import os
 from io import BytesIO
 from pathlib import Path
 from zipfile import ZipFile, is_zipfile
@@ -10,7 +13,8 @@ import pytest
 
 import hsdsl
 from hsdsl.cli.verbs import obey
-from hsdsl.export import TARGETS, files_of, source_of
+from hsdsl.errors import UsageError
+from hsdsl.export import TARGETS, files_of, source_of, write
 from hsdsl.export.identifiers import identifiers
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -106,3 +110,38 @@ def test_initial_values_keep_their_expressions_in_any_order(target):
     """The file has z, x, y, and the mode x, y, z; what the call gives stays a number."""
     files = files_of(source_of(hsdsl.loads(USING), {"initial": {"y": 5}}), target)
     assert any(b"[found[1], found[2], found[0]]" in content for content in files.values())
+
+
+def test_a_printed_document_is_one_json_object_on_request(capsys: pytest.CaptureFixture[str]) -> None:
+    assert obey(["export", BALL, "--to", "mermaid", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["target"] == "mermaid"
+    assert found["name"] == "bouncing_ball.mmd"
+    assert "stateDiagram-v2" in found["text"]
+
+
+def test_the_target_is_refused_before_the_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine").write_text("kept")
+    assert obey(["export", BALL, "--to", "mermad", "--out", str(tmp_path)]) == 2
+    assert "there is no export target 'mermad'" in capsys.readouterr().err
+
+
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out, files = tmp_path / "new" / "out", {"a": b"1", "sub/b": b"2", "sub/c": b"3"}
+    left = iter((True, True))
+
+    def synced(descriptor: int) -> None:
+        if not next(left, False):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", synced)
+    with pytest.raises(UsageError, match="No space left"):
+        write(files, out)
+    assert not list(tmp_path.iterdir())
+    left = iter((True, True, True))
+    assert write(files, out) == [out / name for name in files]
+    left = iter(())
+    with pytest.raises(UsageError, match="No space left"):
+        write({"a": b"new", "d/e": b"5"}, out, force=True)
+    assert sorted(path.relative_to(out).as_posix() for path in out.rglob("*")) == ["a", "sub", "sub/b", "sub/c"]
+    assert (out / "a").read_bytes() == b"1"
