@@ -115,3 +115,29 @@ def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     assert obey(["export", str(MODELS / "stiff-switch.yaml"), "--to", "rust", "--out", str(out)]) == 2
     assert "--method dopri5" in capsys.readouterr().err
     assert not out.exists()
+
+
+TWO_EDGES = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: 1, n: 0, y: 1}
+    transitions:
+      - {name: many, event: x >= 1, reset: {n: n + 3, x: -1}}
+      - {name: now, event: n >= 3, reset: {n: 0}, priority: y*10}
+initial: {mode: a, x: 0, n: 0, y: 1}
+experiment: {until: 4}
+"""
+
+
+def test_the_test_of_a_crate_compares_names_of_edges() -> None:
+    text = files_of(source_of(hsdsl.loads(TWO_EDGES), {}), "rust")["tests/expected/mod.rs"].decode()
+    rows = [line.split(", ") for line in text.splitlines() if line.startswith("    (")]
+    assert [row[3] for row in rows] == ['"many"', '"now"'] * 2
+
+
+@pytest.mark.tools
+@pytest.mark.skipif(which("cargo") is None, reason="there is no cargo")
+def test_an_event_of_several_edges_passes_the_crates_own_test(tmp_path: Path) -> None:
+    write(files_of(source_of(hsdsl.loads(TWO_EDGES), {}), "rust"), tmp_path)
+    assert "1 passed" in cargo(tmp_path, "test", "-q")

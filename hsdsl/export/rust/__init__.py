@@ -33,20 +33,19 @@ def expected_text(source: Source) -> str:
     rows: list[str] = []
     for made in run.transitions:
         mode = modes.index(made.source)
-        edges = program.modes[mode].edges
-        edge = next(k for k, e in enumerate(edges) if e.name == made.edge)
         after = [0.0] * width(program)
         for i, value in enumerate((made.after or {}).values()):
             after[i] = float(value)
         resumed = float("nan") if made.resumed is None else float(made.resumed)
         entry = "true" if made.entry else "false"
         states = array(map(literal, after))
+        edge = string(made.edge)  # an event is several edges of its name
         rows.append(f"    ({literal(float(made.time))}, {literal(resumed)}, {mode}, {edge}, {entry}, {states}),\n")
     reason = "".join(word.title() for word in run.stop.reason.split("_"))
     comments = "".join(f"// {line}\n" for line in source.heading)
     return (
         f"{comments}use hybrid::model::W;\n\n/// Time, when flow went on, mode, edge, on entry, state behind it.\n"
-        "pub type Expected = (f64, f64, usize, usize, bool, [f64; W]);\n\n"
+        "pub type Expected = (f64, f64, usize, &'static str, bool, [f64; W]);\n\n"
         f"pub const MOST: usize = {most};\npub const REASON: &str = {string(reason)};\n"
         f"pub const END: f64 = {literal(float(run.stop.time))};\n"
         f"pub static TRANSITIONS: &[Expected] = &[\n{''.join(rows)}];\n"
