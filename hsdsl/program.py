@@ -114,7 +114,7 @@ class EdgeProgram:
     has the same states as the target are there any. ``contact`` is the number of the motion along its guard in the
     mode; None where there is none. ``push_order`` is the order of the guard's derivative, along the flow, that presses
     then. ``releases`` is the contact that an edge of `ModeProgram.held` ends. Of an edge that is part
-    of an event ``of_event`` has its name, and how its condition and its delay are written.
+    of an event ``of_event`` has its name, how its condition is written, and its options.
     """
 
     name: str

@@ -106,7 +106,7 @@ class Event:
     given: tuple[str, ...] = ()
     waiting: int = 1
     priority: sp.Expr | None = None
-    delay_text: str = ""
+    options: tuple[str, ...] = ()
     at_execution: bool = False
 
 
@@ -117,7 +117,7 @@ class Edge:
     ``reset`` has one expression for each state of ``target_states`` (identity where the file names none);
     ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
     ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again.
-    One that is part of an event has in ``of_event`` its name, and how its condition and its delay are written. That of
+    One that is part of an event has in ``of_event`` its name, how its condition is written, and its options. That of
     a ``part`` leaves the mode with this number of it.
     """
 

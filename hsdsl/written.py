@@ -60,5 +60,4 @@ def written_modes(modes: Sequence[M]) -> list[M]:
 
 def event_text(of_event: Sequence[str]) -> list[str]:
     """How an event is written, key by key; nothing for another edge."""
-    _, condition, delay = of_event or ("", "", "")
-    return [f"event {condition}"] * bool(condition) + [f"delay {delay}"] * bool(delay)
+    return [f"event {of_event[1]}", *of_event[2:]] if of_event else []

@@ -159,7 +159,6 @@ def event_of(
         symbols.report(given.place, "HS323", message, hint)
         return None
     after = None if delay is None else delay.expr
-    text = transition.delay.value if transition.delay else ""
     flags = transition.persistent, transition.initially
     rank = None if priority is None else priority.expr
     return Event(
@@ -169,7 +168,7 @@ def event_of(
         *flags,
         waiting=transition.waiting,
         priority=rank,
-        delay_text=text,
+        options=transition.options,
         at_execution=transition.values == "execution",
     )
 

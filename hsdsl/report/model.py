@@ -116,8 +116,8 @@ def _edge(edge: Edge, math: Mathematics, named: bool) -> str:
     condition = f" if {math.condition(edge.condition_text)}" if edge.condition_text else ""
     when = f"when {math.inequality(edge.surface.text)}{condition}"
     if edge.of_event:
-        _, event, delay = edge.of_event
-        when = f"event {math.condition(event)}{f', delay {_said(delay)}' if delay else ''}"
+        _, event, *options = edge.of_event
+        when = ", ".join([f"event {math.condition(event)}", *map(_said, options)])
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     seen = without_memory(edge.target_states)
     changed = ", ".join(math.reset(name, text) for name, text in resets if text != name and name in seen)

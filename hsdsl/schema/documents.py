@@ -119,6 +119,9 @@ class SolveDocument(Document):
     )
 
 
+OPTIONS = ("delay", "values", "persistent", "waiting", "initially", "priority")  # of a transition
+
+
 class TransitionDocument(Document):
     """An edge that leaves a mode: with `when` and `to`, or with `event`."""
 
@@ -175,6 +178,16 @@ class TransitionDocument(Document):
         """The mode entered; None where the mode stays, or is not known."""
         label: Scalar | None = self.to
         return None if label is None or label.value == ABSENT else label.value  # pyright: ignore[reportUnnecessaryComparison]
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What differs from the defaults, as people read it: `delay 2`, `persistent false`."""
+        found: list[str] = []
+        for key in OPTIONS:
+            value = getattr(self, key)
+            if value != type(self).model_fields[key].default:
+                found.append(f"{key} {value.value if isinstance(value, Scalar) else str(value).lower()}")
+        return tuple(found)
 
     @model_validator(mode="before")
     @classmethod

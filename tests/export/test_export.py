@@ -145,3 +145,25 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.M
         write({"a": b"new", "d/e": b"5"}, out, force=True)
     assert sorted(path.relative_to(out).as_posix() for path in out.rglob("*")) == ["a", "sub", "sub/b", "sub/c"]
     assert (out / "a").read_bytes() == b"1"
+
+
+TRANSITIONS = """{a: {flow: {x: 1, y: 1}, transitions: [
+  {name: late, event: x >= 1, delay: 1/2, persistent: false, values: execution, reset: {x: -1}},
+  {name: now, event: y >= 3, priority: 10*x, reset: {y: 0}},
+  {name: walks, when: y >= 9, to: a, priority: 3, reset: {y: 0}}]}}"""
+OF_ONE = f"hsdsl: 1\nmodes: {TRANSITIONS}\ninitial: {{mode: a, x: 0, y: 1}}\nexperiment: {{until: 4}}"
+OF_PARTS = f"""
+hsdsl: 1
+automata: {{k: {{modes: {TRANSITIONS}}}}}
+system: {{q: {{automaton: k, initial: {{mode: a, x: 0, y: 1}}}}}}
+experiment: {{until: 4}}
+"""
+
+
+@pytest.mark.parametrize("text", [OF_ONE, OF_PARTS])
+def test_a_diagram_has_what_decides_when_transitions_are_made(text: str) -> None:
+    (diagram,) = files_of(source_of(hsdsl.loads(text), {}), "mermaid").values()
+    late, now, walks = (line for line in diagram.decode().splitlines() if "--" in line and "<br/>" in line)
+    assert "late<br/>event x #62;#61; 1<br/>delay 1/2<br/>values execution<br/>persistent false<br/>x " in late
+    assert "now<br/>event y #62;#61; 3<br/>priority 10#8727;x<br/>y " in now
+    assert "walks<br/>when y #62;#61; 9<br/>priority 3<br/>y " in walks

@@ -67,7 +67,7 @@ def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[
     for edge in mode.edges:
         drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest)
         made = [remembered(draft, memories, order) for draft in drafts]
-        given = () if edge.event is None else (edge.name, edge.event.text, edge.event.delay_text)
+        given = () if edge.event is None else (edge.name, edge.event.text, *edge.event.options)
         edges += made if not given else [replace(part, of_event=given) for part in made]
     further = all_states(own)
     return replace(

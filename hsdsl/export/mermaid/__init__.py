@@ -74,7 +74,7 @@ def _transition_lines(made: Any) -> list[str]:
     given = {"event": made.event, "with": made.on, "when": made.when}
     fires = [f"{word} {scalar.value}" for word, scalar in given.items() if scalar is not None][:1]
     condition = [f"if {made.condition.value}"] if made.condition else []
-    return [*name, *fires, *condition, *(f"{state} := {text}" for state, text in pairs(made.reset))]
+    return [*name, *fires, *condition, *made.options, *(f"{state} := {text}" for state, text in pairs(made.reset))]
 
 
 def _mode_lines(mode: Mode) -> list[str]:
@@ -86,7 +86,8 @@ def _mode_lines(mode: Mode) -> list[str]:
 def _edge_lines(edge: Edge) -> list[str]:
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     condition = [] if edge.condition is None else [f"if {edge.condition_text}"]
-    when = event_text(edge.of_event) if edge.of_event else [f"when {edge.surface.text}", *condition]
+    priority = [f"priority {edge.priority}"] if edge.priority else []
+    when = event_text(edge.of_event) or [f"when {edge.surface.text}", *condition, *priority]
     return [edge.name, *when, *(f"{name} := {text}" for name, text in resets if text != name)]
 
 
