@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl import ahead, program_cache
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
+from hsdsl.errors import UsageError
 from hsdsl.files import ModelFiles
 from hsdsl.integrators import METHODS
 from hsdsl.limits import Limits, applied
@@ -25,7 +26,7 @@ from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Problem, prepare
-from hsdsl.simulate.input_segments import Timeline, make_timeline
+from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timeline
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
@@ -214,7 +215,21 @@ class Pipeline:
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""
         with applied(None if self._files is None else self._files.limits):
-            return make_timeline(self.program, values.kernel, parameters, until)
+            try:
+                return make_timeline(self.program, values.kernel, parameters, until)
+            except UnorderedTimes as error:
+                raise UsageError(f"{self._place_of(error)}{error}", error.hint) from None
+
+    def _place_of(self, error: UnorderedTimes) -> str:
+        """Where the file has a sample, with a colon; nothing where there is no file."""
+        if self._files is None:
+            return ""
+        from hsdsl.elaborate import elaborate_files
+
+        document: Any = elaborate_files(self._files).document
+        given = document.inputs[error.name]
+        span = (given.times[error.k] if hasattr(given, "times") else given.file).place.span
+        return f"{span.path}:{span.line}:{span.column}: "
 
     def drivable(self) -> Pipeline:
         """The pipeline of the same model with inputs that can be driven from outside."""

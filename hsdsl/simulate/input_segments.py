@@ -21,6 +21,14 @@ from hsdsl.simulate.surfaces import TIE
 BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
 
 
+class UnorderedTimes(UsageError):
+    """Sample ``k`` of an input, counted from 0, is not behind the sample before it."""
+
+    def __init__(self, message: str, name: str = "", k: int = 0) -> None:
+        super().__init__(message, "give each time once, the earliest first")
+        self.name, self.k = name, k
+
+
 @dataclass(frozen=True)
 class Segment:
     """Time from ``start`` to ``end``, what routines are bound to on it, and whether an input jumps at its start."""
@@ -118,8 +126,10 @@ def _samples(
         times, values = both[: len(both) // 2], both[len(both) // 2 :]
     if not all(map(kernel.arithmetic.isfinite, (*times, *values))):
         raise UsageError(f"input {given.name} has a sample that is not finite")
-    if any(not a < b for a, b in pairwise(times)):
-        raise UsageError(f"the sample times of input {given.name} do not increase")
+    for k, (a, b) in enumerate(pairwise(times), start=1):
+        if not a < b:
+            message = f"the sample times of input {given.name} do not increase: {b} after {a}"
+            raise UnorderedTimes(message, given.name, k)
     return times, values
 
 

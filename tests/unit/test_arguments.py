@@ -88,3 +88,20 @@ def test_any_backend_of_matplotlib_may_be_named(named, tmp_path):
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr
     assert (tmp_path / "x.svg").stat().st_size > 1000
+
+
+def test_times_of_samples_in_no_order_have_a_place(tmp_path):
+    text = """hsdsl: 1
+parameters: {T: 1.25}
+inputs:
+  pulse: {times: [0, T, 2*T, 3], values: [0, 1, 0, 2], hold: zero}
+modes: {a: {flow: {x: pulse}}}
+initial: {mode: a, x: 0}
+experiment: {until: 4}
+"""
+    (tmp_path / "m.yaml").write_text(text)
+    model = hsdsl.load(tmp_path / "m.yaml")
+    model.simulate()
+    with pytest.raises(UsageError, match=r"m\.yaml:4:30: .* pulse do not increase: 3\.0 after 3\.5") as refused:
+        model.simulate(parameters={"T": 1.75})
+    assert refused.value.hint == "give each time once, the earliest first"
