@@ -26,7 +26,8 @@ parameters:
   θ_max: {value: 0.25, unit: 'm/s^2 & $', about: 'how \\much%'}
   x_1: 3
 modes:
-  'a&\\b_%#$': {flow: {x1: abs(x1) + θ_max, é: 'min(x1, floor(x1/2))**2/3 + 1e-9*sign(x1)'}, domain: [x1 <= 100],
+  'a&\\b_%#$': {flow: {x1: abs(x1) + θ_max,
+      é: 'min(x1, floor(x1/2))**2/3 + 1e-9*sign(x1) - select(x1, sqrt(x1), 2)'}, domain: [x1 <= 100],
     transitions: [{name: '}\\%', when: x1 >= x_1, if: é > 0 and not x1 < 1, to: 'a&\\b_%#$', reset: {x1: -1e9}}]}
 initial: {mode: 'a&\\b_%#$', x1: 1, é: 0}
 experiment: {until: 1}
@@ -113,6 +114,18 @@ def test_names_and_numbers_are_written_as_people_do() -> None:
         "9.81", r"\frac{1}{2}", "2.5", r"1 \cdot 10^{-9}", "2700000", r"- \frac{1}{3}", r"\frac{22}{7}",
         r"\left|{x_{1}}\right|", r"\min\left(x_{1}, 2\right)", r"- 2\,\omega\,\mathrm{vx}", r"\frac{x_{1}^{2}}{3}",
     ]  # fmt: skip
+
+
+def test_choices_are_cases() -> None:
+    math = Mathematics(["x", "v"])
+    root = r"\begin{cases} \sqrt{x - 1} & \text{for}\: x - 1 > 0 \\v & \text{otherwise} \end{cases}"
+    assert math.expression("select(x - 1, sqrt(x - 1), v)") == root
+    one = r"\begin{cases} 1 & \text{for}\: v > 0 \\2\,x & \text{otherwise} \end{cases}"
+    assert math.expression("3*select(v, 1, 2*x)") == rf"3\,\left({one}\right)"
+    assert math.expression("select(v, 1, 2*x)**3") == rf"\left({one}\right)^{{3}}"
+    assert math.inequality("select(v, 1, 2*x) >= x") == rf"{one} \geq x"
+    inner = r"\begin{cases} v & \text{for}\: x > 0 \\1 & \text{otherwise} \end{cases}"
+    assert inner in math.expression("select(v, select(x, v, 1), x)")
 
 
 @pytest.mark.tools

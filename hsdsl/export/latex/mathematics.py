@@ -13,6 +13,8 @@ from hsdsl import decimals
 from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
 from hsdsl.expression import plain
 from hsdsl.expression.scope import Function, symbol
+from hsdsl.expression.selection import cases
+from hsdsl.functions import below
 
 _SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
 _PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")
@@ -118,6 +120,16 @@ class _Printer(LatexPrinter):
 
     def _print_maximum(self, expr: Any, exp: Any = None) -> str:
         return self._named(r"\max", expr, exp)
+
+    def _print_below(self, expr: Any, exp: Any = None) -> str:
+        text = self._print_Piecewise(cases(expr))
+        return rf"\left({text}\right)^{{{exp}}}" if exp is not None else text
+
+    def _needs_mul_brackets(self, expr: Any, first: bool = False, last: bool = False) -> bool:
+        return isinstance(expr, below) or super()._needs_mul_brackets(expr, first, last)
+
+    def _needs_add_brackets(self, expr: Any) -> bool:
+        return isinstance(expr, below) or super()._needs_add_brackets(expr)
 
     def _print_sign(self, expr: Any, exp: Any = None) -> str:
         return self._named(r"\operatorname{sign}", expr, exp)
