@@ -398,6 +398,30 @@ def test_initial_values_follow_before_a_unit_is_initialised(made: Any) -> None:
     assert seen == [[8, 4, 4], [12, 4, 8], [1, 4, -3], [1, 4, -3]]
 
 
+EVENTS = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: 1 - t, y: 3*cos(9*t), z: -z/2, n: 0, m: 0}
+    transitions:
+      - {name: one, event: "x <= 0.25 and z <= 2", reset: {n: n + 1}}
+      - {name: two, event: "x <= 0.25 or y >= 1.2", reset: {m: m + 1}}
+initial: {mode: a, x: 0, y: 1, z: 1, n: 0, m: 0}
+experiment: {until: 3}
+"""
+
+
+def test_events_of_several_comparisons_fire_where_a_run_has_them(made: Any) -> None:
+    model = loaded(EVENTS)
+    exact = [made.time for made in model.simulate(scheme="located").transitions if "re-arms" not in made.edge]
+    result = fmpy.simulate_fmu(
+        made(EVENTS, 3), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=3, output_interval=0.5
+    )
+    assert len(result) < 200
+    assert (result["n"][-1], result["m"][-1]) == (1, 3)
+    assert jumps(result, ["n", "m"]) == pytest.approx(exact, abs=1e-6)
+
+
 DRIVEN_OTHERWISE = DRIVEN.replace("u: sin(t)", "u: {times: [0, 1, 2], values: [0.5, -1, 2], hold: zero}")
 
 

@@ -2,7 +2,8 @@
 
    Surface k of a mode has the indicator max(margin - r, -length * rate): positive inside the domain, and beyond the
    surface as long as the flow leads back. It falls through zero where the state is beyond by the margin and moves on
-   outwards. The margin is far above what a search for roots leaves, so that nothing stays undecided, and far below any
+   outwards. That of an edge with a condition is margin - r, as a state may be beyond it without having crossed it.
+   The margin is far above what a search for roots leaves, so that nothing stays undecided, and far below any
    state. The state is then taken back along the flow onto the surface, so no reset begins beyond it. */
 
 #include "events.h"
@@ -93,12 +94,12 @@ static int push_of(const hs_mode *mode, int k, const double *p, double t, const 
 /* The indicator of surface k. */
 static int indicator(const fmu *unit, int k, const double *p, const double *x, const double *r, double *z) {
   const fmu_data *now = &unit->now;
+  const hs_mode *mode = fmu_table(unit);
+  const int plain = k < mode->edges && mode->edge[k].conditional;
   double rate;
-  if (rate_of(fmu_table(unit), k, p, now->time, x, &rate)) {
-    *z = now->margin[k] - r[k]; /* the flow may end at the surface */
-    return !hs_finite(*z);
-  }
-  *z = hs_max(now->margin[k] - r[k], -length_of() * rate);
+  *z = now->margin[k] - r[k];
+  if (!plain && !rate_of(mode, k, p, now->time, x, &rate)) /* the flow may end at the surface */
+    *z = hs_max(*z, -length_of() * rate);
   return !hs_finite(*z);
 }
 
@@ -229,12 +230,29 @@ static int rests(fmu *unit, int k, const double *p, double t, const double *befo
   return 1;
 }
 
+/* Mark the edges with a condition that the state is beyond at time t without having crossed them; those that it had
+   `crossed` in a mode that stays may fire. */
+static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int *crossed) {
+  fmu_data *const now = &unit->now;
+  const hs_mode *mode = fmu_table(unit);
+  double x[PROBLEM_WIDTH + 1], r[PROBLEM_SURFACES + 1];
+  memset(now->outside, 0, sizeof now->outside);
+  if (set_margins(unit)) return 1;
+  fmu_local(unit, x);
+  if (mode->values(fmu_bind(unit), t, x, r)) return 0;
+  for (int k = 0; k < mode->edges; k++)
+    now->outside[k] = mode->edge[k].conditional && r[k] > now->margin[k] && !(mode == before && crossed[k]);
+  return 0;
+}
+
 /* Make the transition of edge k; why the run ends, if it does. */
-static const char *make(fmu *unit, int k, const double *p, double *x, int entry) {
+static const char *make(fmu *unit, int k, const double *p, double *x, const double *r, int entry) {
   fmu_data *const now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   double after[PROBLEM_WIDTH + 1], t = now->time;
   const int source = now->mode;
+  int crossed[PROBLEM_SURFACES + 1];
+  for (int j = 0; j < mode->edges; j++) crossed[j] = j != k && !now->outside[j] && r[j] > now->margin[j] / 2;
   if (!entry && taken_back(unit, mode, k, p, &t, x)) return "not_finite";
   if (reset_of(mode, k, p, t, x, after)) return "not_finite";
   for (int s = 0; s < mode->edge[k].target_dimension; s++)
@@ -242,8 +260,8 @@ static const char *make(fmu *unit, int k, const double *p, double *x, int entry)
   fmu_enter(unit, source, k, after);
   now->jumps++;
   now->resting = -1;
-  memset(now->outside, 0, sizeof now->outside);
-  return now->mode == source && rests(unit, k, p, now->time, x) < 0 ? "zeno" : 0;
+  if (now->mode == source && rests(unit, k, p, now->time, x) < 0) return "zeno";
+  return !now->ended && enter_surfaces(unit, t, mode, crossed) ? "not_finite" : 0;
 }
 
 /* Which surfaces the state is beyond without having fired. */
@@ -268,10 +286,10 @@ static const char *transitions(fmu *unit, int entry) {
     if (k >= mode->edges) return "left_domain";
     if (now->resting >= 0 && mode->edge[k].releases == hs_the_model.mode[now->mode].edge[now->resting].contact) {
       now->resting = -1;
-      memset(now->outside, 0, sizeof now->outside);
+      if (enter_surfaces(unit, now->time, 0, 0)) return "not_finite";
       continue;
     }
-    const char *const ends = make(unit, k, p, x, entry && r[k] > now->margin[k]);
+    const char *const ends = make(unit, k, p, x, r, entry && r[k] > now->margin[k]);
     if (ends) return ends;
     entry = 1;
   }
@@ -297,6 +315,7 @@ fmu_status fmu_update(fmu *unit, int *jumped, double *next) {
     unit->bound = 0;
   }
   now->changed = 0;
+  if (!now->events++ && enter_surfaces(unit, now->time, 0, 0)) return FMU_ERROR;
   if (!now->ended && (unit->complaint = transitions(unit, entry)) != 0) now->ended = 1;
   if (!now->ended && set_outside(unit)) return FMU_ERROR;
   *jumped = now->jumps != jumps || now->resting != resting;

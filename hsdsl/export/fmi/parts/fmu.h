@@ -26,7 +26,7 @@ typedef struct {
   /* of co-simulation: what is shown in place of the state while it waits in a strip, or before an event is handled */
   int shows_before, before_mode;
   double before[PROBLEM_STATES + 1];
-  int64_t jumps;
+  int64_t jumps, events; /* transitions made, and times at which the caller looked for them */
   hs_pause pause;
   double numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
   double data[PROBLEM_DATA + 1];
