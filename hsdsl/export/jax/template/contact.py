@@ -161,12 +161,13 @@ def limit_of(model, p, lane, k, end, left, wanted):
     """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
     bound, whole = Bound(model, frozen(p), lane.segment), Bound(model, p, lane.segment)
     contact = model.of(model.contact, lane.mode)[k]
-    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, frozen(lane.t), x), lane.x, wanted)
+    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, lane.t, x), lane.x, wanted)
     still, t = frozen(q), frozen(lane.t)
     moved = still + left * bound.flow(jnp.maximum(contact, 0), t, still)
     moved = onto_guard(bound, lane, k, end, moved, scales_here(model, frozen(lane)))
     q = jnp.where(contact >= 0, keeping(moved, q), q)
-    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, end, x), q, wanted)
+    then = keeping(end, lane.t)
+    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, then, x), q, wanted)
 
 
 def close_tail(model, config, p, lane, record, mask):
