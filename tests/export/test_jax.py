@@ -257,3 +257,39 @@ def test_ten_thousand_oscillators(tmp_path: Path) -> None:
     for i in (0, 1234, 9999):
         run = model.simulate(initial={"x": float(starts[i, 0])}, **settings)
         assert_same(module, jax.tree.map(lambda a, i=i: a[i], found), run)
+
+
+KEPT = """
+hsdsl: 1
+parameters: {k: 2}
+modes: {a: {flow: {x: 1}, transitions: [{name: done, when: x >= 1, to: end, reset: {x: k}}]}, end: {final: true}}
+outputs: {o: k*x}
+initial: {mode: a, x: 0}
+experiment: {until: 3, method: rk4, step: 1/100}
+"""
+
+
+def test_a_final_mode_without_flow_has_the_outputs_before(tmp_path: Path) -> None:
+    module = imported(hsdsl.loads(KEPT), tmp_path)
+    found = jitted(module.simulate)(module.parameters({"k": 3}))
+    assert found.outputs.tolist() == [9]
+
+
+RISING = """
+hsdsl: 1
+parameters: {A: 0.2, g: 9.81}
+modes:
+  air:
+    flow: {h: v, v: -g}
+    transitions: [{name: bounce, when: h <= A*t**2, to: air, reset: {v: 2*A*t - 0.5*(v - 2*A*t)}}]
+initial: {mode: air, h: 1, v: 0}
+experiment: {until: 3, scheme: located, method: dopri5, tolerance: 1e-11}
+"""
+
+
+@pytest.mark.slow
+def test_derivatives_behind_a_tail_onto_a_guard_that_moves(tmp_path: Path) -> None:
+    """Held by the guard the state is (A t**2, 2 A t), for any g."""
+    module = imported(hsdsl.loads(RISING), tmp_path)
+    slopes = jitted(jax.jacfwd(lambda p: module.simulate(p).x))(module.parameters())
+    assert np.allclose(slopes, [[9, 0], [6, 0]], rtol=0, atol=1e-4)

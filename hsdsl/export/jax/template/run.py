@@ -15,7 +15,7 @@ from jax import lax
 from .contact import let_go
 from .entry import at_the_end, boundary, enter, held_on
 from .functions import frozen
-from .lane import RUNNING, STEP, STEPS, STOPS, start
+from .lane import FINAL, RUNNING, STEP, STEPS, STOPS, start
 from .located import located_crossing
 from .model import Bound, Model
 from .relaxed import relaxed_crossing
@@ -130,7 +130,9 @@ def run(model, config, p, mode, x0, rounds=None):
     stop = jnp.where(lane.stop == RUNNING, STEPS, lane.stop)
     bound = Bound(model, p, model.segment(frozen(p), frozen(lane.t)))  # at an end in a strip inputs may have jumped
     mode = model.of(model.owner, lane.mode).astype(jnp.int32)
-    outputs = bound.routines.outputs(mode, bound.p, lane.t, lane.x)
+    shown = jnp.where(stop == FINAL, jnp.asarray(model.keeper, jnp.int32)[lane.edge], mode)
+    shown = jnp.where(lane.count > 0, shown, mode)
+    outputs = bound.routines.outputs(shown, bound.p, lane.t, lane.x)
     return Run(*record, lane.count, stop, lane.t, mode, lane.x, outputs, lane.steps)
 
 
