@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -41,16 +42,28 @@ def export(
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
         files = files_of(source, to)
         if out is None:
-            if len(files) > 1:
-                raise UsageError(f"{to} has {len(files)} files: expected --out DIR")
-            (name, content), *_ = files.items()
+            name, text = only_text(files, to)
             if answer.json:
-                print_json({"target": to, "name": name, "text": content.decode()})
+                print_json({"target": to, "name": name, "text": text})
             else:
-                print(content.decode(), end="")
+                print(text, end="")
             return
         written = write(files, out, force)
         if answer.json:
             print_json({"target": to, "files": [str(path) for path in written]})
         elif not answer.quiet:
             say(f"wrote {written[0] if len(written) == 1 else f'{len(written)} files below {out}'}")
+
+
+def only_text(files: Mapping[str, bytes], to: str) -> tuple[str, str]:
+    """The name and the text of the only file of a target.
+
+    Raises UsageError: it has several, or one that is no text.
+    """
+    if len(files) > 1:
+        raise UsageError(f"{to} has {len(files)} files: expected --out DIR")
+    ((name, content),) = files.items()
+    try:
+        return name, content.decode()
+    except UnicodeDecodeError:
+        raise UsageError(f"{name} is no text: expected --out DIR") from None

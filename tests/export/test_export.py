@@ -12,6 +12,7 @@ from zipfile import ZipFile, is_zipfile
 import pytest
 
 import hsdsl
+from hsdsl.cli.export import only_text
 from hsdsl.cli.verbs import obey
 from hsdsl.errors import UsageError
 from hsdsl.export import TARGETS, files_of, source_of, write
@@ -167,3 +168,11 @@ def test_a_diagram_has_what_decides_when_transitions_are_made(text: str) -> None
     assert "late<br/>event x #62;#61; 1<br/>delay 1/2<br/>values execution<br/>persistent false<br/>x " in late
     assert "now<br/>event y #62;#61; 3<br/>priority 10#8727;x<br/>y " in now
     assert "walks<br/>when y #62;#61; 9<br/>priority 3<br/>y " in walks
+
+
+def test_only_one_file_of_text_is_printed() -> None:
+    assert only_text({"a.mmd": "é".encode()}, "mermaid") == ("a.mmd", "é")
+    with pytest.raises(UsageError, match="c has 2 files: expected --out"):
+        only_text({"a": b"", "b": b""}, "c")
+    with pytest.raises(UsageError, match=r"a\.fmu is no text: expected --out"):
+        only_text({"a.fmu": b"PK\xf8"}, "fmi3")
