@@ -32,6 +32,7 @@ CALLS = [
     ["chart", ROOM, "--methods", "rk4", "--engines", "python", "--schemes", "located", "--steps", "0.1"],
     ["stability", ROOM, "--map", "rate=0.1:0.2:2,tolerance=1e-6:1e-5:2", "--processes", "1", "--no-rho"],
     ["export", ROOM, "--to", "mermaid", "--out", "graph"],
+    ["export", ROOM, "--to", "mermaid"],
     ["import", SPACEEX, "--out", "heater.yaml"],
     ["doctor"],
 ]
