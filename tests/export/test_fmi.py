@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import re
 import subprocess
@@ -21,6 +22,7 @@ from hsdsl.export.fmi.variables import unit_of
 from hsdsl.model import Model
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
+from fmpy.fmi1 import FMICallException  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
 STANDARD = Path(fmpy.__file__).parent / "c-code"  # the headers of both versions
@@ -467,6 +469,71 @@ def test_directional_derivatives_are_those_of_differences(made: Any) -> None:
             [unit.references[name] for name in unknowns], [unit.references[known]], [1.0]
         )
         assert list(slopes) == pytest.approx([(a - b) / (2 * step) for a, b in zip(*rows, strict=True)], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("point", "size"), [(0.5, 0.0), (0.5, -0.1), (0.1, 0.1), (0.3, 0.4), (0.9, 0.1), (0.5, math.inf), (0.5, math.nan)]
+)
+def test_steps_begin_where_the_last_one_ended_and_lead_on(point: float, size: float, made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3))
+    unit.go_to(0.5, step=0.5)
+    known = unit.get("time", "x", "v")
+    with pytest.raises(FMICallException):
+        unit.unit.doStep(currentCommunicationPoint=point, communicationStepSize=size)
+    assert unit.get("time", "x", "v") == known
+    unit.go_to(1, step=0.5)
+
+
+def test_units_of_fmi_2_refuse_a_step_back(made: Any) -> None:
+    path = made(BALL, 2)
+    unit = fmpy.instantiate_fmu(fmpy.extract(path), fmpy.read_model_description(path), "CoSimulation")
+    unit.setupExperiment(startTime=0)
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    with pytest.raises(FMICallException):
+        unit.doStep(currentCommunicationPoint=0, communicationStepSize=-0.1)
+    unit.doStep(currentCommunicationPoint=0, communicationStepSize=0.1)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "known"),
+    [("der(v)", "k"), ("force", "k"), ("der(v)", "time"), ("force", "der(x)"), ("mode", "x"), ("force", "mode")],
+)
+def test_derivatives_by_other_than_states_and_inputs_are_refused(unknown: str, known: str, made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3))
+    with pytest.raises(FMICallException):
+        unit.unit.getDirectionalDerivative([unit.references[unknown]], [unit.references[known]], [1.0])
+
+
+def test_parameters_beyond_their_bounds_are_refused(made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3))
+    with pytest.raises(FMICallException):
+        unit.set(k=-1.0)
+    assert unit.get("k") == [4.0]
+    unit.set(k=0.0)
+    early = Stepped(made(DRIVEN, 3), initialise=False, k=-1.0)
+    early.unit.enterInitializationMode(startTime=0)
+    with pytest.raises(FMICallException):
+        early.unit.exitInitializationMode()
+
+
+def test_a_damaged_state_is_refused(made: Any) -> None:
+    unit = Stepped(made(DRIVEN, 3))
+    stored = bytearray(unit.unit.serializeFMUState(unit.unit.getFMUState()))
+    stored[len(stored) // 2] ^= 1
+    with pytest.raises(FMICallException):
+        unit.unit.deserializeFMUState(bytes(stored))
+
+
+def test_units_report_a_cascade_that_they_have_no_room_for(made: Any) -> None:
+    text = BALL.replace("when: h <= 0, to: fly, reset: {v: -e*v}", "when: h <= 0, to: fly, reset: {h: h - 1}")
+    messages: list[str] = []
+
+    def keep(*given: object) -> None:
+        messages.append(str(given[-1]))
+
+    fmpy.simulate_fmu(made(text, 3), fmi_type="CoSimulation", stop_time=2.4, logger=keep)
+    assert any("more than 64 transitions at one instant" in message for message in messages)
 
 
 def test_texts_of_a_model_stay_texts_and_bytes_stay_the_same(made: Any) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hsdsl.backends.c import routine_functions
+from hsdsl.backends.c import constant_bodies, routine_functions
 from hsdsl.backends.c.printer import literal
-from hsdsl.export.c.text import array, comment, string
+from hsdsl.export.c.text import array, comment, function, string
 from hsdsl.export.fmi.variables import Unit, switched
 from hsdsl.lower.slopes import lower_given
 from hsdsl.parts import numbered
@@ -46,10 +46,21 @@ extern const fmu_input_place fmu_input[];
 extern const double fmu_input_start[], fmu_nominal[];
 extern const fmu_slope_table fmu_slopes[];
 
+/* Which parameter is beyond a bound of its own; 0 for none. */
+const char *fmu_beyond(const double *p);
+
 /* The value of the expression of an input. */
 double fmu_given(int input, const double *p, double t);
 
 #endif
+"""
+_BEYOND = """
+const char *fmu_beyond(const double *p) {{
+  double bound;
+  (void)p, (void)bound;
+{tests}
+  return 0;
+}}
 """
 _GIVEN = """
 double fmu_given(int input, const double *p, double t) {{
@@ -88,6 +99,7 @@ def numbers(unit: Unit) -> str:
         array("const double", "fmu_nominal", map(literal, [*unit.nominals, *_ones(unit)])),
         _slopes(unit),
         _given(unit),
+        _bounds(unit),
     ]
     return "".join(parts)
 
@@ -119,3 +131,15 @@ def _given(unit: Unit) -> str:
     calls = (f"  if (input == {name.removeprefix('given_')}) {name}(p, t, 0, out);" for name in routines.names)
     functions = routine_functions(routines, unit.problem.program, "")
     return functions + _GIVEN.format(calls="\n".join(calls))
+
+
+def _bounds(unit: Unit) -> str:
+    program = unit.problem.program
+    bodies, functions, tests = constant_bodies(program), list[str](), list[str]()
+    for i, name in enumerate(program.parameters):
+        for kind, relation in (("minimum", "<"), ("maximum", ">")):
+            if (bound := f"{kind}_{i}") in bodies:
+                functions.append(function(bound, "const hs_real *p", bodies[bound]))
+                text = string(f"parameter {name} is beyond its {kind}")
+                tests.append(f"  if (!{bound}(p, &bound) && p[{i}] {relation} bound) return {text};")
+    return "".join(functions) + _BEYOND.format(tests="\n".join(tests))

@@ -293,7 +293,7 @@ static const char *transitions(fmu *unit, int entry) {
     if (ends) return ends;
     entry = 1;
   }
-  return now->ended ? 0 : "zeno";
+  return now->ended ? 0 : "zeno: more than a thousand transitions at one instant";
 }
 
 fmu_status fmu_update(fmu *unit, int *jumped, double *next) {

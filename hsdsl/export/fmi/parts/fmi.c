@@ -16,8 +16,11 @@
   }
 
 fmi_status fmi_answer(instance *own, fmu_status status) {
+  const char *const refusal = own->unit->refusal;
+  own->unit->refusal = 0;
   if (status == FMU_OK) return FMI_OK;
   if (status == FMU_NO_VALUE) return fmi_log(own, FMI_DISCARD, "something has no finite value here");
+  if (refusal) return fmi_log(own, FMI_ERROR, refusal);
   return fmi_log(own, FMI_ERROR, own->unit->complaint ? own->unit->complaint : "not allowed here, or without a value");
 }
 
@@ -126,22 +129,37 @@ FMI(FMI_STATE(Free, ), void *i, void **state) {
   return FMI_OK;
 }
 
+/* A sum over the bytes of a state (FNV-1a), by which one that was damaged is known. */
+static uint64_t sum_of(const void *state) {
+  const unsigned char *bytes = state;
+  uint64_t sum = 0xcbf29ce484222325u;
+  for (size_t k = 0; k < fmu_size(); k++) sum = (sum ^ bytes[k]) * 0x100000001b3u;
+  return sum;
+}
+
+static size_t stored_size(void) { return fmu_size() + sizeof(uint64_t); }
+
 FMI(FMI_STATE(Serialized, Size), void *i, void *state, size_t *size) {
   (void)i, (void)state;
-  *size = fmu_size();
+  *size = stored_size();
   return FMI_OK;
 }
 
 FMI(FMI_STATE(Serialize, ), void *i, void *state, fmi_byte bytes[], size_t size) {
-  if (size != fmu_size()) return fmi_answer(i, FMU_ERROR);
-  memcpy(bytes, state, size);
+  if (size != stored_size()) return fmi_answer(i, FMU_ERROR);
+  const uint64_t sum = sum_of(state);
+  memcpy(bytes, state, fmu_size());
+  memcpy(bytes + fmu_size(), &sum, sizeof sum);
   return FMI_OK;
 }
 
 FMI(FMI_DESERIALIZE, void *i, const fmi_byte bytes[], size_t size, void **state) {
-  if (size != fmu_size()) return fmi_answer(i, FMU_ERROR);
-  if (!*state) *state = malloc(size);
+  uint64_t sum;
+  if (size == stored_size()) memcpy(&sum, bytes + fmu_size(), sizeof sum);
+  if (size != stored_size() || sum != sum_of(bytes))
+    return fmi_log(i, FMI_ERROR, "these bytes are no state that this unit has written");
+  if (!*state) *state = malloc(fmu_size());
   if (!*state) return fmi_answer(i, FMU_ERROR);
-  memcpy(*state, bytes, size);
+  memcpy(*state, bytes, fmu_size());
   return FMI_OK;
 }

@@ -64,7 +64,7 @@ FMI(DoStep, void *i, double point, double size, int no_state_before) {
   instance *own = i;
   int event = 0;
   (void)no_state_before;
-  const fmi_status status = fmi_ended(own, fmu_step(own->unit, point + size, &own->reached, &event));
+  const fmi_status status = fmi_ended(own, fmu_step(own->unit, point, size, &own->reached, &event));
   return status == fmi2OK && own->unit->now.ended ? fmi2Discard : status;
 }
 

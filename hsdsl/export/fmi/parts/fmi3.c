@@ -152,8 +152,8 @@ FMI(DoStep, void *i, double point, double size, bool no_state_before, bool *even
   instance *own = i;
   int handled = 0;
   (void)no_state_before;
-  const fmu_status status = fmu_step(own->unit, point + size, last, &handled);
-  *early = *last < point + size && own->unit->early_return_allowed;
+  const fmu_status status = fmu_step(own->unit, point, size, last, &handled);
+  *early = !status && *last < point + size && own->unit->early_return_allowed;
   *event = handled && own->unit->event_mode_used && *early;
   *terminate = own->unit->now.ended != 0;
   return fmi_ended(own, status);

@@ -156,6 +156,16 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
   }
 }
 
+/* Whether a parameter may be tuned to a value: those that it decides are within their bounds too. */
+static int is_tunable(fmu *unit, int index, double value) {
+  double p[PROBLEM_PARAMETERS + 1];
+  memcpy(p, unit->now.parameters, PROBLEM_PARAMETERS * sizeof *p);
+  p[index] = value;
+  if (problem_derive(p)) return 0;
+  unit->refusal = fmu_beyond(p);
+  return !unit->refusal;
+}
+
 fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
   fmu_data *now = &unit->now;
   if (reference >= FMU_VARIABLES) return FMU_ERROR;
@@ -170,6 +180,7 @@ fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
     case FMU_PARAMETER:
       if (problem_derived[variable->index] || (now->started && problem_structural[variable->index])) return FMU_ERROR;
       if (problem_structural[variable->index] && value != problem_timeline.data[variable->index]) return FMU_ERROR;
+      if (now->started && !is_tunable(unit, variable->index, value)) return FMU_ERROR;
       now->changed |= now->parameters[variable->index] != value;
       now->parameters[variable->index] = value;
       now->tuned = 1;
@@ -241,10 +252,20 @@ static void follow_run(fmu *unit) {
   unit->bound = 0;
 }
 
+#define TEXT_NOW(a) #a
+#define TEXT(a) TEXT_NOW(a)
+
+/* Why a run ended; nothing but a full table of modes interrupts it. */
+static const char *why(const hs_stop *stop) {
+  if (stop->reason != HS_INTERRUPTED) return hs_stop_word(stop);
+  return "more than " TEXT(PROBLEM_VISITED) " transitions at one instant, for which the unit has no room: "
+         "compile its sources with a larger PROBLEM_VISITED";
+}
+
 /* Whether a run has ended other than in a final mode; it is said why. */
 static int has_failed(fmu *unit) {
   if (!unit->now.ended || unit->run.task.stop.reason == HS_FINAL) return 0;
-  unit->complaint = hs_stop_word(&unit->run.task.stop);
+  unit->complaint = why(&unit->run.task.stop);
   return 1;
 }
 
@@ -261,7 +282,7 @@ fmu_status fmu_initialize(fmu *unit) {
   fmu_data *now = &unit->now;
   int jumped;
   double next;
-  if (!fmu_bind(unit)) return FMU_ERROR;
+  if (!fmu_bind(unit) || (unit->refusal = fmu_beyond(now->parameters)) != 0) return FMU_ERROR;
   now->segment = fmu_segment_at(now->time);
   unit->bound = 0;
   now->started = 1;
@@ -270,9 +291,22 @@ fmu_status fmu_initialize(fmu *unit) {
   return fmu_update(unit, &jumped, &next);
 }
 
-fmu_status fmu_step(fmu *unit, double until, double *reached, int *event) {
+/* Why no step of a size begins at a communication point; a point may be off by the round-off of sums. */
+static const char *step_refusal(const fmu_data *now, double point, double size) {
+  const double off = sqrt(0x1p-53) * hs_max(size, fabs(now->time));
+  if (!(size > 0)) return "expected a communication step size above zero";
+  if (!hs_finite(point + size) || !(point + size > now->time)) return "expected a step that ends later than the last";
+  if (!now->ended && fabs(point - now->time) > off)
+    return "expected the communication point that the last step reached";
+  return 0;
+}
+
+fmu_status fmu_step(fmu *unit, double point, double size, double *reached, int *event) {
   fmu_data *now = &unit->now;
+  const double until = point + size;
   *event = 0;
+  *reached = now->time;
+  if ((unit->refusal = step_refusal(now, point, size)) != 0) return FMU_ERROR;
   *reached = until;
   if (!fmu_bind(unit)) return FMU_ERROR;
   if (now->ended) {
@@ -327,6 +361,11 @@ fmu_status fmu_slope(fmu *unit, unsigned unknown, unsigned known, double *slope)
   const fmu_slope_table *table = &fmu_slopes[fmu_table(unit) - hs_the_model.mode];
   if (unknown >= FMU_VARIABLES || known >= FMU_VARIABLES) return FMU_ERROR;
   const fmu_variable *row = &fmu_variables[unknown], *column = &fmu_variables[known];
+  const int given = column->kind == FMU_STATE || (column->kind == FMU_INPUT && !fmu_input[column->index].fixed);
+  if (!given || (row->kind != FMU_DERIVATIVE && row->kind != FMU_OUTPUT && row->kind != FMU_STATE)) {
+    unit->refusal = "derivatives are of states, their derivatives and real outputs, by states and inputs";
+    return FMU_ERROR;
+  }
   const double *p = fmu_bind(unit);
   *slope = row->kind == column->kind && row->index == column->index;
   if (row->kind != FMU_DERIVATIVE && row->kind != FMU_OUTPUT) return FMU_OK;

@@ -41,7 +41,8 @@ typedef struct {
   double slopes[PROBLEM_STATES + 1]; /* where the flow had a value last */
   int64_t jumps_before;
   hs_instance run;
-  const char *complaint;
+  const char *complaint; /* why the run ended */
+  const char *refusal;   /* why the last call was refused, until it is logged */
 } fmu;
 
 fmu *fmu_new(int co_simulation);
@@ -65,10 +66,11 @@ fmu_status fmu_initialize(fmu *unit);
 /* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
 fmu_status fmu_update(fmu *unit, int *jumped, double *next);
 
-/* Go on until a time, or behind the first transition where the caller handles events; `reached` is how far. */
-fmu_status fmu_step(fmu *unit, double until, double *reached, int *event);
+/* Go on from the present time by a size, or behind the first transition where the caller handles events;
+   `reached` is how far. */
+fmu_status fmu_step(fmu *unit, double point, double size, double *reached, int *event);
 
-/* The slope of one variable by another, both by their references. */
+/* The slope of a derivative, output or state by a state or input, both by their references. */
 fmu_status fmu_slope(fmu *unit, unsigned unknown, unsigned known, double *slope);
 
 /* The state of a unit as bytes. */
