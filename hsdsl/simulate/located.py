@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import after_contact, behind_end, contact_at, in_touch
+from hsdsl.simulate.contact import behind_end, contact_at, in_touch
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
@@ -25,7 +25,7 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import close_tail, contraction, flown
+from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly
 
 MOST_CORRECTIONS = 8
 
@@ -62,21 +62,23 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
     while True:
         outcome = follow(run, held, stepping(run, held), here.segment.end)
         if isinstance(outcome, ModeState):
-            return after_contact(here, held, outcome.t, outcome.x)
+            return held_exactly(run, here, held, outcome.t, outcome.x)
         if isinstance(outcome, Stop):
             return outcome
         crossing, edges = outcome.crossing, here.mode.edges
         if not held.surfaces.releases(crossing.edge):
             ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
-            return replace(outcome, alternatives=tuple(name for name in outcome.alternatives if name not in ends))
+            x = held_exactly(run, here, held, crossing.time, crossing.state).x
+            others = tuple(name for name in outcome.alternatives if name not in ends)
+            return replace(outcome, crossing=replace(crossing, state=x), alternatives=others)
         t, x, ends = crossing.time, crossing.state, True
         if not crossing.edge < len(edges):
             t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
         if t > crossing.time:
             here.arc.append(t, x, (tuple(b - a for a, b in zip(crossing.state, x, strict=True)),))
         if ends:
-            active = after_contact(here, held, t, x).surfaces.active
-            return run.place(here.index, here.mode.states, t, x, outcome.scale, active=active)
+            after = held_exactly(run, here, held, t, x)
+            return run.place(here.index, here.mode.states, t, after.x, outcome.scale, active=after.surfaces.active)
         held = held.moved(t, x)
 
 

@@ -15,7 +15,16 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import contact_at, in_contact, in_touch, is_possible, keeping, keeps, pressing
+from hsdsl.simulate.contact import (
+    after_contact,
+    contact_at,
+    in_contact,
+    in_touch,
+    is_possible,
+    keeping,
+    keeps,
+    pressing,
+)
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
@@ -129,6 +138,17 @@ def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], en
     bound = here.surfaces.roundoff_bound
     on = all(abs(here.kernel.surfaces(end, *q)[k]) <= bound(k, end, q, entry=True) for k in edges)
     return q if on else None
+
+
+def held_exactly(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> ModeState:
+    """The mode itself again, the state without what steps along its guards were off by: they may hold it again."""
+    touched, after = in_touch(here, held), after_contact(here, held, t, x)
+    try:
+        q = in_turn(partial(onto_guard, after), touched, t, x)
+        q = in_turn(partial(fixed_point, after), touched, t, q)
+        return after.moved(t, q) if all(keeps(run, after.moved(t, q), k) for k in touched) else after
+    except DOMAIN_ERRORS:
+        return after
 
 
 def in_turn(taken: Callable[[int, Number, State], State], edges: list[int], t: Number, x: State) -> State:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from fractions import Fraction
 from typing import Any
@@ -237,3 +238,24 @@ experiment: {{until: 4}}
     run = hsdsl.loads(text).simulate(engine=engine)
     falls = -0.5 if "t)" in condition or " and " in condition else 0
     assert run.final.state["x"] == pytest.approx(falls, abs=1e-9)
+
+
+def test_motion_along_a_curved_guard_goes_on_behind_what_interrupts_it() -> None:
+    """Kinks of inputs and impacts of others find the state on its guard to round-off, not to the tolerance."""
+    text = """
+hsdsl: 1
+inputs: {u: {times: [0, 1.15, 1.25, 2, 3], values: [0, 1, 0, 1, 0]}}
+modes:
+  a:
+    flow: {h: v, v: -10, c: u, y: w, w: -10}
+    transitions:
+      - {name: table, when: h <= sin(9*t)/20, to: a, reset: {v: 0.45*cos(9*t) - 0.5*(v - 0.45*cos(9*t))}}
+      - {name: floor, when: y <= 0, to: a, reset: {w: -0.95*w}}
+initial: {mode: a, h: 0.5, v: 0, c: 0, y: 1, w: 0}
+experiment: {until: 3}
+"""
+    for method in ("taylor", "dopri5", "radau"):
+        run = assert_engines_agree(hsdsl.loads(text), method=method)
+        assert run.stop.reason == "until", method
+        assert run.final.state["h"] == pytest.approx(math.sin(27) / 20, abs=1e-9)
+        assert run.final.state["v"] == pytest.approx(0.45 * math.cos(27), abs=1e-8)

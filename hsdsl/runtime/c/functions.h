@@ -228,6 +228,7 @@ static int behind_end(hs_run *run, int j, hs_time *t);
 /* zeno.c */
 static const hs_made *made_before(const hs_run *run, int back);
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
+static void be_held_exactly(hs_run *run, hs_time t, hs_real *x);
 static int close_tail(hs_run *run, int k);
 
 /* touching.c */

@@ -214,7 +214,7 @@ static void drop_releases(hs_run *run) {
 /* Go on in the mode itself from run->x, which a guard no longer holds. */
 static int released(hs_run *run, hs_time t) {
   hs_mode_state *const here = &run->here;
-  after_contact(run);
+  be_held_exactly(run, t, run->x);
   const int standing_before = here->standing;
   copy(run->scale, run->landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
@@ -241,8 +241,15 @@ static int along_guards(hs_run *run, hs_time limit) {
       here->t = t;
       continue;
     }
-    if (outcome == LANDED) drop_releases(run);
-    after_contact(run);
+    if (outcome == LANDED) {
+      drop_releases(run);
+      be_held_exactly(run, run->chosen.time, run->chosen.state);
+    } else if (outcome == AT_BOUNDARY) {
+      be_held_exactly(run, here->t, run->x);
+    } else {
+      run->still = same_state(run->began, run->x, here->dimension);
+      after_contact(run);
+    }
     return outcome;
   }
 }
@@ -257,9 +264,8 @@ static int located_flow(hs_run *run) {
   copy(run->began, run->x, n);
   for (int k = 0; k < own->edges; k++) run->held[k] = in_touch(run, k);
   const int outcome = along_guards(run, limit);
-  const int still = same_state(run->began, outcome == LANDED ? run->chosen.state : run->x, n);
   for (int k = 0; k < own->edges; k++)
-    if (run->held[k]) note(run, HS_IN_CONTACT, k, still, from, run->task->now);
+    if (run->held[k]) note(run, HS_IN_CONTACT, k, run->still, from, run->task->now);
   return outcome;
 }
 

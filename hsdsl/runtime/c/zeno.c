@@ -94,6 +94,22 @@ static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count,
   return 0;
 }
 
+/* Be in the mode itself again at t, the state x without what steps along its guards were off by: they may hold it
+   again. */
+static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
+  const hs_mode_state *here = &run->here;
+  const int edges = run->model->mode[here->mode].edges;
+  int count = 0, held = 1;
+  run->still = same_state(run->began, x, here->dimension);
+  for (int k = 0; k < edges; k++) count += run->kept[k] = in_touch(run, k);
+  after_contact(run);
+  for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
+  copy(run->z, x, here->dimension);
+  if (in_turn(run, onto_guard, count, t) || in_turn(run, fixed_point, count, t)) return;
+  for (int k = 0; k < edges && held; k++) held = !run->tail[k] || keeps(run, t, run->z, k) == 1;
+  if (held) copy(x, run->z, here->dimension);
+}
+
 /* Whether run->z is no further than the flow moves run->x within the relaxation. */
 static int is_near(hs_run *run) {
   const hs_mode_state *here = &run->here;
