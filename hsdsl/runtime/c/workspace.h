@@ -25,7 +25,8 @@
 
 #define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
 #define HS_LOCATED_SPACE_OF(w, m, modes, data, derivatives, stages, extra, degree, most)                           \
-  (HS_NUMBERS(derivatives) + HS_NUMBERS(data) + 2 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
+  (HS_NUMBERS(derivatives) + HS_NUMBERS(data) + 4 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
+   HS_NUMBERS(2 * (w)) + \
    HS_STAGES(w, (stages) + 1 + (extra)) + 3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
    (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
    HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
