@@ -213,12 +213,14 @@ static void begin_span(hs_run *run, hs_real h, hs_time t1);
 HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
 /* contact.c */
+static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope);
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
 static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks, const int *touched);
 static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found);
 static void bind_contacts(hs_run *run, const int *held, const int *kept);
 static void bind_mode(hs_run *run);
 static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed);
+static int pressing(hs_run *run, hs_time t, const hs_real *x, const int *kept, int count, int *held, int *pushed);
 static int contact_at(hs_run *run);
 static int releases(const hs_run *run, int j);
 static int in_touch(const hs_run *run, int k);
@@ -228,6 +230,7 @@ static int behind_end(hs_run *run, int j, hs_time *t);
 /* zeno.c */
 static const hs_made *made_before(const hs_run *run, int back);
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
+static hs_time flown(const hs_run *run, hs_time t);
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x);
 static int close_tail(hs_run *run, int k);
 
