@@ -1,12 +1,12 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """The functions of the language, as SymPy functions.
 
-The smooth ones are SymPy's own, but for the hyperbolic three: SymPy asks whether they are real by splitting their
-argument into real and imaginary parts, which in a nest of them takes for ever; ours are real. The kinked and jumping
-ones (abs, sign, min, max, floor) are classes of our own: SymPy's rewrite themselves, and differentiate into objects no
-kernel has (DiracDelta, re, im). Ours stay as written, fold fractions, and differentiate almost everywhere: abs' = sign,
-sign' = floor' = 0, max' picks the larger side. Other constants are left to the kernel: to tell which of two sums of
-roots is larger can take SymPy for ever.
+The smooth ones are SymPy's own, but for atan2 and the hyperbolic three: SymPy asks whether they are real by splitting
+their argument into real and imaginary parts, which in a nest of them takes for ever; ours are real. The kinked and
+jumping ones (abs, sign, min, max, floor) are classes of our own: SymPy's rewrite themselves, and differentiate into
+objects no kernel has (DiracDelta, re, im). Ours stay as written, fold fractions, and differentiate almost everywhere:
+abs' = sign, sign' = floor' = 0, max' picks the larger side. Other constants are left to the kernel: to tell which of
+two sums of roots is larger can take SymPy for ever.
 """
 
 from __future__ import annotations
@@ -162,6 +162,18 @@ class tanh(sp.tanh):
     _eval_is_positive = _eval_is_negative = _eval_is_zero = _eval_is_unknown
 
 
+class atan2(sp.atan2):
+    """The angle of a point (y, x), real: SymPy's is a complex logarithm where it cannot tell the sign of a constant."""
+
+    is_real = is_finite = True
+
+    @classmethod
+    def eval(cls, y, x):
+        """Fold as SymPy does, where the result is real as it stands."""
+        angle = super().eval(y, x)
+        return None if angle is None or angle.has(sp.I, sp.Piecewise, sp.Heaviside) else angle
+
+
 def power(base, exponent):
     """``base**exponent``; a power of a power stays as it is.
 
@@ -180,7 +192,7 @@ def rebuilt(expr, arguments):
 # name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)
 FUNCTIONS: dict[str, tuple[object, int, int | None]] = {
     **{name: (getattr(sp, name), 1, 1) for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
-    "atan2": (sp.atan2, 2, 2),
+    "atan2": (atan2, 2, 2),
     **{function.__name__: (function, 1, 1) for function in (sinh, cosh, tanh)},
     **{name: (getattr(sp, name), 1, 1) for name in ("asinh", "acosh", "atanh", "exp", "log", "sqrt")},
     "abs": (absolute, 1, 1),

@@ -17,7 +17,7 @@ import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import by_constants
-from hsdsl.functions import absolute, floor, maximum, minimum, rebuilt, sign
+from hsdsl.functions import absolute, atan2, floor, maximum, minimum, rebuilt, sign
 from hsdsl.lower.routines import Definition
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.program import Switch
@@ -77,7 +77,7 @@ class Switches:
     def angle(self, y: sp.Expr, x: sp.Expr) -> sp.Expr:
         """The angle of (x, y): behind the origin that of the opposite point, and a half turn."""
         side, behind = self.number("sign", y, jumps=True), self.number("sign", x, jumps=True)
-        return side * sp.pi * (_HALF - _HALF * behind) + sp.atan2(behind * y, behind * x)
+        return side * sp.pi * (_HALF - _HALF * behind) + atan2(behind * y, behind * x)
 
 
 _BRANCHES: dict[type, Callable[..., sp.Expr]] = {
@@ -86,7 +86,7 @@ _BRANCHES: dict[type, Callable[..., sp.Expr]] = {
     absolute: lambda switches, u: switches.number("sign", u) * u,
     maximum: lambda switches, a, b: switches.between(a, b),
     minimum: lambda switches, a, b: -switches.between(-a, -b),
-    sp.atan2: lambda switches, y, x: switches.angle(y, x),
+    atan2: lambda switches, y, x: switches.angle(y, x),
 }
 
 

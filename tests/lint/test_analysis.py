@@ -32,7 +32,7 @@ def applied(call):
 
 def grown(parts):
     one = st.sampled_from([FUNCTIONS[n][0] for n in FUNCTIONS if n not in ("min", "max", "atan2", "select")])
-    two = st.sampled_from([FUNCTIONS["min"][0], FUNCTIONS["max"][0], sp.atan2, sp.Add, sp.Mul])
+    two = st.sampled_from([FUNCTIONS["min"][0], FUNCTIONS["max"][0], FUNCTIONS["atan2"][0], sp.Add, sp.Mul])
     return st.one_of(
         st.tuples(one, parts).map(applied),
         st.tuples(two, parts, parts).map(applied),

@@ -8,7 +8,7 @@ import sympy as sp
 from hsdsl.expression import ExpressionError, parse, symbolic
 from hsdsl.expression.scope import Refusal, Scope, Value, state, symbol
 from hsdsl.expression.stack import deep_stack
-from hsdsl.functions import absolute, maximum, minimum
+from hsdsl.functions import absolute, atan2, maximum, minimum
 
 NAMES = ["x", "y", "a", "E", "I", "S", "N", "Q", "beta", "gamma", "lambda", "zeta", "class", "def", "None", "é", "x_1"]
 SCOPE = Scope({**{name: state(name) for name in NAMES}, "t": Value(symbol("t"))})
@@ -71,7 +71,8 @@ NUMBERS = {
     "max(x, y)": maximum(X, Y),
     "min(x, y, 2)": minimum(minimum(X, Y), 2),
     "floor(2.5)": sp.Integer(2),
-    "atan2(y, x)": sp.atan2(Y, X),
+    "atan2(y, x)": atan2(Y, X),
+    "atan2(1/3, abs(pi))": atan2(sp.Rational(1, 3), absolute(sp.pi)),
     "0**0": sp.Integer(1),
     "x\n + y": X + Y,
 }

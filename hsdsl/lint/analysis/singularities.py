@@ -21,7 +21,7 @@ _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
     sp.Add, sp.Mul, sp.Symbol, sp.Number, sp.NumberSymbol, sp.Abs, sp.Min, sp.Max, functions.absolute,
     functions.minimum, functions.maximum, *(functions.FUNCTIONS[name][0] for name in _SMOOTH),
 )  # fmt: skip
-_JUMPING = (functions.sign, functions.floor, sp.atan2)
+_JUMPING = (functions.sign, functions.floor, functions.atan2)
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
@@ -59,7 +59,7 @@ def jumps_in_time(dynamics: Dynamics, expr: Any) -> bool:
 def _jump(part: Any) -> list[Clause]:
     if isinstance(part, functions.floor):
         return [(zero(part.args[0] - level),) for level in _LEVELS]
-    if isinstance(part, sp.atan2):
+    if isinstance(part, functions.atan2):
         return [(zero(part.args[0]), negative(part.args[1]))]
     return [(zero(part.args[0]),)]
 
@@ -73,7 +73,7 @@ def discontinuities(expr: Any) -> tuple[Clause, ...] | None:
             found.append((zero(sp.sin(sp.pi * part.args[0])),))
         elif isinstance(part, (functions.sign, sp.sign)):
             found.append((zero(part.args[0]),))
-        elif isinstance(part, sp.atan2):
+        elif isinstance(part, functions.atan2):
             found.append((zero(part.args[0]), at_most_zero(part.args[1])))
         elif not isinstance(part, _CONTINUOUS) and not part.is_Pow:
             return None
