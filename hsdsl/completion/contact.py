@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 from sympy.core.relational import Relational
 
+from hsdsl.completion.counts import counts_of
 from hsdsl.completion.nearby import SMALL, Nearby, Point, cancelled, fixed_point, mode_of_part, rank, symbols, value_at
 from hsdsl.completion.printer import text_of
 from hsdsl.system import TIME, Edge, Mode, Surface
@@ -31,7 +32,7 @@ class Contact:
     ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` has the condition under which each
     does. ``push`` is the derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where
     the guard's own derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead
-    from a state near the guard.
+    from a state near the guard. ``counts`` are the states that they count with, which keep their values.
     """
 
     edge: int
@@ -46,6 +47,7 @@ class Contact:
     landing: tuple[sp.Expr, ...]
     ends: tuple[sp.Basic, ...]
     near: Nearby
+    counts: tuple[int, ...] = ()
 
     @property
     def last(self) -> sp.Expr:
@@ -71,6 +73,7 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
         return None
     near = Nearby(mode, edge, mode_of_part(edge, numbers))
+    near = near.without(counts) if (counts := counts_of(near)) else near
     if any(mode.states[i] in numbers for i in near.changed):
         return None
     constrained = _constrained(near) if near.changed and near.is_small() else None
@@ -84,7 +87,9 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
                       reset=symbols(mode.states), reset_texts=mode.states)  # fmt: skip
     further, ends = _ends_of_condition(release, edge.condition)
     rate = cancelled(near.along(near.guard))
-    return Contact(k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near)
+    return Contact(
+        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts
+    )
 
 
 def _constrained(near: Nearby):

@@ -39,19 +39,23 @@ def _rows(states: tuple[str, ...], flow: tuple[sp.Expr, ...]) -> dict[sp.Symbol,
 class Nearby:
     """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
 
-    ``changed`` has the numbers of these states, ``own`` their symbols, ``moved`` what the reset adds to each. ``here``
-    is the mode of the part that the edge belongs to.
+    ``changed`` has the numbers of these states, but for those in ``counts``, ``own`` their symbols, ``moved`` what the
+    reset adds to each. ``mode`` is the edge's, ``here`` that of the part that the edge belongs to.
     """
 
-    def __init__(self, mode: Mode, edge: Edge, here: dict[sp.Symbol, sp.Integer]) -> None:
-        self._here = here
+    def __init__(self, mode: Mode, edge: Edge, here: dict[sp.Symbol, sp.Integer], counts: Sequence[int] = ()) -> None:
+        self._here, self.mode = here, mode
         self.states, self.edge = symbols(mode.states), edge
         self.guard = sp.sympify(edge.surface.residual).xreplace(here)
         self._flow = _rows(mode.states, mode.flow)
         pairs = zip(self.states, edge.reset, strict=True)
-        self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x]
+        self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x and i not in counts]
         self.own = tuple(self.states[i] for i in self.changed)
         self.moved = sp.Matrix([edge.reset[i].xreplace(here) - self.states[i] for i in self.changed])
+
+    def without(self, counts: Sequence[int]) -> Nearby:
+        """The same with a reset that leaves some states as they are."""
+        return Nearby(self.mode, self.edge, self._here, counts)
 
     def flow(self, x: sp.Symbol) -> Any:
         """The rate of time or of a state."""

@@ -82,10 +82,16 @@ def pushes(run: Run, here: ModeState, holding: list[int], kept: list[int]) -> li
         return []
 
 
+def reset_but_counts(here: ModeState, k: int, t: Number, x: State) -> State:
+    """What the reset of edge k makes of a state, but for states that it counts with."""
+    after, counts = here.kernel.resets[k](t, *x), here.mode.edges[k].counts
+    return tuple(x[i] if i in counts else a for i, a in enumerate(after)) if counts else after
+
+
 def keeps(run: Run, here: ModeState, k: int) -> bool:
     """Whether the reset of edge k leaves the state where it is."""
     noise = (SAME_UNITS * run.arithmetic.unit * s for s in here.arc.scales)
-    after = here.kernel.resets[k](here.t, *here.x)
+    after = reset_but_counts(here, k, here.t, here.x)
     return all(abs(a - b) <= most for a, b, most in zip(after, here.x, noise, strict=True))
 
 
@@ -110,6 +116,7 @@ def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Col
     for i in here.mode.edges[k].changes:
         if slope[i] != 0:
             after = max(after, ZERO_UNITS * run.arithmetic.unit * here.arc.scales[i] / abs(slope[i]))
+    after = after or run.arithmetic.unit * run.settings.until  # where these states have been zero only
     return tuple(a + after * f for a, f in zip(x, slope, strict=True))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
-from hsdsl.program import ModeProgram
+from hsdsl.program import EdgeProgram, ModeProgram
 from hsdsl.simulate.stops import show
 
 FREE = 16  # transitions within the relaxation that cost no time; so many are remembered
@@ -54,14 +54,15 @@ class Diagnostics:
         if not still:
             self._moved[edge] = place, end, start
 
-    def replaced(self, edge: str, number: int, end: Number, left: Number) -> None:
+    def replaced(self, edge: EdgeProgram, number: int, end: Number, left: Number) -> None:
         """The transitions after ``number`` were replaced by their limit."""
         for other, (place, until, start) in self._moved.items():
             if until >= end - 2 * left:  # meanwhile motion along other guards goes on
                 self._moved[other] = place, end, start
+        counts = ", ".join(edge.target_states[i] for i in edge.counts)
         self.departures.append(
-            f"Zeno at t = {show(end)}: the transitions of {edge} after number {number}, all within {show(left)} "
-            "of each other, are replaced by their limit",
+            f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number}, all within {show(left)} "
+            f"of each other, are replaced by their limit{f'; {counts} has none and keeps its value' * bool(counts)}"
         )
 
     def accumulates(self, edge: str, end: Number, t: Number) -> Stop:

@@ -29,7 +29,7 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
     if kind == "in contact":
         return diagnostics.in_contact(mode.edges[k].name, time, other, bool(count))
     if kind == "replaced":
-        return diagnostics.replaced(mode.edges[k].name, count, time, other)
+        return diagnostics.replaced(mode.edges[k], count, time, other)
     if kind == "slides":
         return slides(program.modes[count].edges[k].name, program.modes[count], mode, time)
     if kind == "coupled":

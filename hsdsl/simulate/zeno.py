@@ -24,6 +24,7 @@ from hsdsl.simulate.contact import (
     keeping,
     keeps,
     pressing,
+    reset_but_counts,
 )
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
@@ -114,7 +115,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     except DOMAIN_ERRORS:
         return here
     for j in edges:
-        run.diagnostics.replaced(here.mode.edges[j].name, len(made) - 1, end, left)
+        run.diagnostics.replaced(here.mode.edges[j], len(made) - 1, end, left)
     here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     rest = run.place(here.index, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
@@ -186,7 +187,7 @@ def meets_another(here: ModeState, there: ModeState, edges: list[int]) -> bool:
 
 def fixed_point(here: ModeState, k: int, t: Number, x: State) -> State:
     """The point that repeated resets run to."""
-    return limit(lambda x: here.kernel.resets[k](t, *x), x)
+    return limit(lambda x: reset_but_counts(here, k, t, x), x)
 
 
 def limit(step: Callable[[State], State], x: State) -> State:

@@ -364,6 +364,40 @@ experiment: {until: 10}
     assert [run.final.state[name] for name in "xvyw"] == pytest.approx([0] * 4, abs=1e-9)
 
 
+COUNTING = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, v: -1, n: 0, m: MORE}
+    domain: [WALL]
+    transitions: [{name: hit, when: x <= 0, to: a, reset: {v: VELOCITY, n: RESET, m: m + n}}]
+initial: {mode: a, x: 1, v: 0, n: 1, m: 0}
+experiment: {until: 6, max_transitions: 200}
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "wall", "velocity", "reset", "limit"),
+    [
+        ("0", "t <= 9", "-v/2", "n + 1", True),
+        ("0", "t <= 9", "-v/2", "1e-12 + n", True),
+        ("0", "t <= 9", "-v/2", "-n", True),
+        ("0", "t <= 9", "-v/2", "2*n", True),
+        ("n", "t <= 9", "-v/2", "n + 1", False),  # a flow depends on it
+        ("0", "n <= 1e6", "-v/2", "n + 1", False),
+        ("0", "t <= 9", "-v*n/(n + 1)", "n + 1", False),
+    ],
+)
+def test_what_nothing_depends_on_needs_no_limit(more: str, wall: str, velocity: str, reset: str, limit: bool) -> None:
+    names = {"MORE": more, "WALL": wall, "VELOCITY": velocity, "RESET": reset}
+    text = COUNTING
+    for name, value in names.items():
+        text = text.replace(name, value)
+    run = hsdsl.loads(text).simulate()
+    assert (run.stop.reason == "until" and abs(run.final["x"]) < 1e-9) == limit
+    assert any("n, m has none and keeps its value" in reason for reason in run.verdict.reasons) == limit
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("before", [0, 1e-8, 3e-7, 9e-7])
 def test_zeno_point_just_behind_the_end(before: float, engine: str) -> None:

@@ -21,16 +21,21 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
+/* What the reset of an edge makes of a state, but for states that it counts with, to `out`. */
+static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const hs_real *x, hs_real *out) {
+  if (hs_changed(edge, edge->reset, run->here.p, t, x, x, out)) return RAISED;
+  for (int i = 0; i < edge->counts; i++) out[edge->count[i]] = x[edge->count[i]];
+  return 0;
+}
+
 /* Whether the reset of edge k leaves the state where it is. */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
   const hs_edge *edge = &here->table->edge[k];
   int still = 1;
-  if (edge->reset(here->p, t, x, run->after)) return RAISED;
-  for (int i = 0; i < edge->changes; i++) {
-    const int s = edge->change[i];
-    still &= fabs(run->after[i] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
-  }
+  if (reset_but_counts(run, edge, t, x, run->after)) return RAISED;
+  for (int s = 0; s < here->dimension; s++)
+    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
   return still;
 }
 
@@ -101,6 +106,7 @@ static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *t
     const int s = edge->change[i];
     if (run->at[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * run->scales[s] / fabs(run->at[s]));
   }
+  if (!(after > 0)) after = HS_UNIT * run->until; /* where these states have been zero only */
   for (int s = 0; s < run->here.dimension; s++) run->after[s] = x[s] + after * run->at[s];
   return 0;
 }

@@ -214,6 +214,7 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
 /* contact.c */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope);
+static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const hs_real *x, hs_real *out);
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
 static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks, const int *touched);
 static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found);

@@ -72,6 +72,8 @@ typedef struct {
   const int *change;
   int contact;    /* number of the motion along its guard; -1 for none */
   int push_order; /* the derivative of the guard along the flow that presses then */
+  int counts;     /* states that it counts with, which motion along its guard leaves as they are */
+  const int *count;
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 

@@ -42,9 +42,9 @@ static int fixed_point(hs_run *run, int k, hs_time t) {
   const int n = here->dimension;
   hs_real *const x = run->z, *const one = run->after, *const two = run->at;
   for (int i = 0; i < MOST_ROUNDS; i++) {
-    if (hs_changed(edge, edge->reset, here->p, t, x, x, one)) return RAISED;
+    if (reset_but_counts(run, edge, t, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
-    if (hs_changed(edge, edge->reset, here->p, t, one, one, two)) return RAISED;
+    if (reset_but_counts(run, edge, t, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
   }
   return 0;

@@ -26,8 +26,9 @@ def takes_back(slope, back, sizes):
 
 
 def after_reset(model, bound, mode, k, t, x):
-    """Where edge k leads."""
-    return bound.routines.reset(model.of(model.edge, mode)[k], bound.p, t, x)
+    """Where edge k leads, but for states that it counts with."""
+    edge = model.of(model.edge, mode)[k]
+    return jnp.where(model.of(model.counts, edge), x, bound.routines.reset(edge, bound.p, t, x))
 
 
 def keeps(model, bound, lane, k, t, x):
@@ -49,6 +50,7 @@ def pressed(model, bound, mode, k, t, x, scales):
     slopes = jax.jvp(lambda x: after_reset(model, bound, mode, k, t, x) - x, (x,), (slope,))[1]
     moved = (slopes != 0) & (slope != 0)
     after = jnp.where(moved, ZERO_UNITS * UNIT * scales / jnp.abs(jnp.where(slope == 0, 1.0, slope)), 0.0).max()
+    after = jnp.where(after > 0, after, UNIT * (bound.end - t))  # where these states have been zero only
     return x + after * slope
 
 

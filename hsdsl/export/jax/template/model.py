@@ -92,6 +92,9 @@ class Model:
                 self._relate(j, len(modes[mode.owner].edges), own, mode.walls)
         self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
+        self.counts = np.zeros((max(1, len(edges)), self.W), bool)
+        for k, edge in enumerate(edges):
+            self.counts[k, list(edge.counts)] = True
         # whose outputs a run has behind an edge: a final mode without a flow keeps the states before, and these
         keepers = [e.source if e.states and not modes[e.target].states else e.target for e in edges]
         self.keeper = np.array(keepers or [0])

@@ -113,7 +113,7 @@ def mode_of(
     )
 
 
-def edge_of(name, source, target, states, conditional, priority, width, reset, spread):
+def edge_of(name, source, target, states, conditional, priority, counts, width, reset, spread):
     """An edge of plain routines."""
     return Edge(
         name,
@@ -122,6 +122,7 @@ def edge_of(name, source, target, states, conditional, priority, width, reset, s
         states,
         conditional,
         priority,
+        counts,
         lambda p, t, x: padded(reset(p, t, x), width),
         lambda p, t, x, s: padded(spread(p, t, x, s), width),
     )
@@ -129,7 +130,7 @@ def edge_of(name, source, target, states, conditional, priority, width, reset, s
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge between modes, given by their numbers; ``keeps`` says that both have the same states."""
+    """An edge between modes, given by their numbers, as the states of its target and those that it counts with."""
 
     name: str
     source: int
@@ -137,6 +138,7 @@ class Edge:
     states: tuple[int, ...]
     conditional: bool
     priority: int
+    counts: tuple[int, ...]
     reset: Callable
     spread: Callable
 

@@ -576,7 +576,7 @@ function event = first_crossing(w, here, t, h, x, k1, z, C, ends_at, d)
       if isempty(share)
         continue
       end
-      if k > edges || holds(w, q, k, t + share * h, y, d)
+      if k > edges || holds(w, q, k, t + share * h, y, d) || stays(w, q, k, t + share * h, y, d)
         found(end + 1, :) = [share, k];
         states{end + 1} = y;
         break
@@ -736,7 +736,7 @@ function [w, here] = jump(w, here, event)
   q = here.q;
   k = event.k;
   relaxed = strcmp(w.s.scheme, 'relaxed');
-  if ~relaxed && w.m.edge_target{q}(k) == q && held(w, q, k, event.t, event.x, w.m.data(segment(w.m, event.t), :))
+  if stays(w, q, k, event.t, event.x, w.m.data(segment(w.m, event.t), :))
     here.t = event.t;
     here.x = event.x;
     here.rest = k;
@@ -829,11 +829,11 @@ function [w, here] = close_tail(w, here, k)
   d = w.m.data(here.k, :);
   x = here.x;
   for round = 1:60
-    one = w.m.reset{q}{k}(time, x, w.p, d);
+    one = reset_but_counts(w, q, k, time, x, d);
     if isequal(one, x)
       break
     end
-    two = w.m.reset{q}{k}(time, one, w.p, d);
+    two = reset_but_counts(w, q, k, time, one, d);
     bend = two - 2 * one + x;
     next = two;
     next(bend ~= 0) = x(bend ~= 0) - (one(bend ~= 0) - x(bend ~= 0)) .^ 2 ./ bend(bend ~= 0);
@@ -866,7 +866,7 @@ function [yes, pushed] = held(w, q, k, t, x, d)
   sizes = max(w.sizes(w.m.state_index{q}), abs(x));
   noise = 4 * eps * sizes;
   f = slope(w, q, t, x, d);
-  after = w.m.reset{q}{k}(t, x, w.p, d);
+  after = reset_but_counts(w, q, k, t, x, d);
   pushed = all(abs(after - x) <= noise) && any(f) && all(isfinite(f)) && possible(w, q, k, t, x, f, sizes, d);
   if ~pushed
     return
@@ -880,7 +880,19 @@ function [yes, pushed] = held(w, q, k, t, x, d)
   end
   pushed = rate > 0;
   ahead = x + small * f;
-  yes = pushed && opposite(f, w.m.reset{q}{k}(t, ahead, w.p, d) - ahead, noise);
+  yes = pushed && opposite(f, reset_but_counts(w, q, k, t, ahead, d) - ahead, noise);
+end
+
+function yes = stays(w, q, k, t, x, d)
+% Whether a run by the located scheme rests on the guard of edge k from here on.
+  yes = ~strcmp(w.s.scheme, 'relaxed') && w.m.edge_target{q}(k) == q && held(w, q, k, t, x, d);
+end
+
+function after = reset_but_counts(w, q, k, t, x, d)
+% What the reset of edge k makes of a state, but for states that it counts with.
+  after = w.m.reset{q}{k}(t, x, w.p, d);
+  counts = w.m.edge_counts{q}{k};
+  after(counts) = x(counts);
 end
 
 function yes = possible(w, q, k, t, x, f, sizes, d)
@@ -888,8 +900,11 @@ function yes = possible(w, q, k, t, x, f, sizes, d)
   yes = holds(w, q, k, t, x, d);
   if ~yes
     ahead = x + sqrt(eps) * f;
-    moved = w.m.reset{q}{k}(t, ahead, w.p, d) ~= ahead & f ~= 0;
+    moved = reset_but_counts(w, q, k, t, ahead, d) ~= ahead & f ~= 0;
     after = max([0; 16 * eps * sizes(moved) ./ abs(f(moved))]);
+    if after == 0 % these states have been zero only
+      after = eps * w.s.until;
+    end
     yes = holds(w, q, k, t, x + after * f, d);
   end
 end
