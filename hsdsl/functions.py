@@ -170,8 +170,8 @@ class atan2(sp.atan2):
     @classmethod
     def eval(cls, y, x):
         """Fold as SymPy does, where the result is real as it stands."""
-        angle = super().eval(y, x)
-        return None if angle is None or angle.has(sp.I, sp.Piecewise, sp.Heaviside) else angle
+        angle = sp.atan2(y, x)
+        return None if angle.has(sp.atan2, sp.I, sp.Piecewise, sp.Heaviside) else angle
 
 
 def power(base, exponent):
