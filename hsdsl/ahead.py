@@ -109,9 +109,14 @@ def _work(files: ModelFiles, to_answer: int) -> NoReturn:
 
 
 def _lowered(files: ModelFiles) -> Answer:
+    import gc
+
+    gc.disable()  # while nothing is imported that could be garbage
     from hsdsl.elaborate import elaborate_files
     from hsdsl.lower import lower
 
+    gc.freeze()
+    gc.enable()
     try:
         system = elaborate_files(files).system
         with applied(files.limits):

@@ -18,6 +18,7 @@ from hsdsl.cli.console import WRONG_USAGE, prepare
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
     interrupts.expect()  # before anything that takes long to import
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's other threads would only wait, and take time for it
     gc.set_threshold(100_000)  # collections during imports take a tenth of a short run
     atexit.register(gc.freeze)  # the collection at the end of the process takes a sixth of one
     prepare()

@@ -7,16 +7,15 @@ import math
 import random
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from itertools import chain
+from operator import mul, sub
+from typing import Any
 
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode
-
-if TYPE_CHECKING:
-    import numpy as np
 
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
@@ -121,8 +120,6 @@ def cancelled(value: sp.Expr) -> sp.Expr:
 
 def fixed_point(near: Nearby) -> Point | None:
     """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
-    import numpy as np  # few models need it
-
     equations, flows = [near.guard, *near.moved], near.flows()
     free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
     names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
@@ -130,13 +127,13 @@ def fixed_point(near: Nearby) -> Point | None:
     at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
     slopes = sp.Matrix(equations).jacobian(free) if free else sp.zeros(len(equations), 0)
     for _ in range(MOST_ROUNDS):
-        values = np.array([value_at(e, at) for e in equations])
-        if not np.all(np.isfinite(values)):
+        values = [value_at(e, at) for e in equations]
+        if not all(map(math.isfinite, values)):
             return None
-        step = np.linalg.pinv(_values_at(slopes, at), rcond=SMALL) @ values
-        for name, change in zip(free, step.tolist(), strict=True):
+        step, _ = _least(_values_at(slopes, at), values)
+        for name, change in zip(free, step, strict=True):
             at[name] -= change
-        if not free or np.max(np.abs(step)) <= SMALL:
+        if all(abs(change) <= SMALL for change in step):
             return at
     return None
 
@@ -148,15 +145,33 @@ def value_at(value: sp.Expr, at: Point) -> float:
     return float(number) if number.is_Number and number.is_real else math.nan
 
 
-def _values_at(matrix: sp.Matrix, at: Point) -> np.ndarray:
-    import numpy as np
-
-    return np.array([[value_at(value, at) for value in row] for row in matrix.tolist()]).reshape(matrix.shape)
+def _values_at(matrix: sp.Matrix, at: Point) -> list[list[float]]:
+    return [[value_at(value, at) for value in row] for row in matrix.tolist()]
 
 
 def rank(matrix: sp.Matrix, at: Point) -> int:
     """The rank of a matrix at a point; 0 where it has no finite value."""
-    import numpy as np
+    rows = _values_at(matrix, at)
+    return _least(rows, [0.0] * len(rows))[1] if all(map(math.isfinite, chain(*rows))) else 0
 
-    numbers = _values_at(matrix, at)
-    return int(np.linalg.matrix_rank(numbers, rtol=SMALL)) if np.all(np.isfinite(numbers)) else 0
+
+def _least(rows: Sequence[Sequence[float]], values: Sequence[float]) -> tuple[list[float], int]:
+    """The smallest solution of independent ones of linear equations, and how many these are, by Gram and Schmidt.
+
+    NumPy would take longer to import than all of this does.
+    """
+    left = [(math.hypot(*row), [*row, value]) for row, value in zip(rows, values, strict=True)]
+    step, count, largest = [0.0] * len(rows[0]), 0, max(size for size, _ in left)
+    while left and (best := max(left, key=lambda sized: sized[0]))[0] > SMALL * largest:
+        left.remove(best)
+        *direction, share = (entry / best[0] for entry in best[1])
+        step = [x + share * d for x, d in zip(step, direction, strict=True)]
+        left, count = [_without(row, direction, share) for _, row in left], count + 1
+    return step, count
+
+
+def _without(equation: list[float], direction: list[float], share: float) -> tuple[float, list[float]]:
+    """What is left of an equation beyond another one whose coefficients are ``direction``, and its size."""
+    part = sum(map(mul, equation, direction))
+    *rest, value = map(sub, equation, (part * d for d in (*direction, share)))
+    return math.hypot(*rest), [*rest, value]
