@@ -13,10 +13,9 @@ from typing import Any
 from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import Effort, NoCompiler, TooSlow
+from hsdsl.runtime.compiler import NoCompiler, TooSlow
 from hsdsl.runtime.library import LOOP, is_kept, load
 
-LARGE = 1 << 17  # characters of a program
 SYMBOL = "hs_the_model"
 
 _loading = Lock()
@@ -36,8 +35,8 @@ def runtime() -> ctypes.CDLL:
 
 @cache
 def _runtime() -> ctypes.CDLL:
-    text, symbol, effort = LOOP
-    library = load(text, symbol, lambda: [text], effort)
+    text, symbol = LOOP
+    library = load(text, symbol, lambda: [text])
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -56,8 +55,7 @@ def begin() -> None:
             runtime()
 
     with suppress(NoCompiler):
-        text, _, effort = LOOP
-        if not is_kept(text, effort):
+        if not is_kept(LOOP[0]):
             Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
 
 
@@ -74,7 +72,7 @@ class CompiledModel:
         data = len(program.parameters), len(program.inputs), len(program.switches)
         content = repr(((*data, len(program.outputs), program.initial_states), program.flows))
         try:
-            self._library = load(content, SYMBOL, lambda: _source(program), _model_effort(content))
+            self._library = load(content, SYMBOL, lambda: _source(program))
         except TooSlow as error:
             raise NoCompiler(f"{error}; {_longest(program)}") from None
         self.table = structures.Model.in_dll(self._library, SYMBOL)
@@ -92,11 +90,6 @@ class CompiledModel:
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made on first use."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
-
-
-def _model_effort(content: str) -> Effort:
-    """Of a large model -O2 takes several times as long as -O1, and few runs are long enough to win that back."""
-    return "-O1" if len(content) > LARGE else "-O2"
 
 
 def _longest(program: Program) -> str:

@@ -27,8 +27,9 @@ KIND = "compiled"
 GIVEN_UP = "given-up"  # entries for models that took too long to compile: the seconds that the compiler had
 
 
-# the text, symbol and effort of the loop; -O2 compiles 1.6 times as long
-LOOP: tuple[str, str, Effort] = '#include "hs.c"\n', "hs_simulate", "-O1"
+LOOP = '#include "hs.c"\n', "hs_simulate"  # its text and symbol
+EFFORT: Effort = "-O1"  # -O2 compiles 1.5 times as long, for code that is a hundredth faster
+_OPTIONS = " ".join((EFFORT, *FLAGS))
 
 
 def ship(folder: Path) -> Path:
@@ -39,19 +40,19 @@ def ship(folder: Path) -> Path:
     NoCompiler
         There is no compiler, or it fails.
     """
-    text, symbol, effort = LOOP
-    library = folder / _shipped(text, effort).name
-    _compile(find_compiler(), [text], library, effort)
+    text, symbol = LOOP
+    library = folder / _shipped(text).name
+    _compile(find_compiler(), [text], library)
     _tried(find_compiler(), library, symbol)
     return library
 
 
-def _shipped(content: str, effort: Effort) -> Path:
+def _shipped(content: str) -> Path:
     """Where a library would be that came with this package."""
-    return SHIPPED / f"{key_of(content, _our_text(), ' '.join((effort, *FLAGS)), _processor())}.so"
+    return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
 
 
-def load(content: str, symbol: str, source: Callable[[], Sequence[str]], effort: Effort) -> ctypes.CDLL:
+def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
     """Load the library that ``source`` compiles to and that has ``symbol``.
 
     ``content`` is the source's name in the cache; the source, one text or several that are compiled at the same time,
@@ -62,17 +63,17 @@ def load(content: str, symbol: str, source: Callable[[], Sequence[str]], effort:
     NoCompiler
         There is no compiler, or it fails.
     """
-    shipped = _shipped(content, effort)
+    shipped = _shipped(content)
     loaded = _loaded(shipped) if shipped.exists() else None
     if loaded is not None:
         return loaded
     compiler = find_compiler()
-    key = _key(content, compiler, effort)
+    key = _key(content, compiler)
     loaded = _kept(key)
     if loaded is not None:
         return loaded
     with making(KIND, key):
-        return _kept(key) or _made(compiler, key, symbol, source, effort)
+        return _kept(key) or _made(compiler, key, symbol, source)
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
@@ -87,7 +88,7 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
         return None  # made for something else than what runs now: it is made again
 
 
-def is_kept(content: str, effort: Effort) -> bool:
+def is_kept(content: str) -> bool:
     """Whether the library of ``content`` was compiled before, or came with this package.
 
     Raises
@@ -95,11 +96,11 @@ def is_kept(content: str, effort: Effort) -> bool:
     NoCompiler
         There is no compiler.
     """
-    return _shipped(content, effort).exists() or find(KIND, _key(content, find_compiler(), effort)) is not None
+    return _shipped(content).exists() or find(KIND, _key(content, find_compiler())) is not None
 
 
-def _key(content: str, compiler: Compiler, effort: Effort) -> str:
-    return key_of(content, _our_text(), compiler.identity, " ".join((effort, *FLAGS)), _processor())
+def _key(content: str, compiler: Compiler) -> str:
+    return key_of(content, _our_text(), compiler.identity, _OPTIONS, _processor())
 
 
 @cache
@@ -114,9 +115,7 @@ def _processor() -> str:
     return f"{sys.platform} {platform.machine()} {sys.maxsize}"
 
 
-def _made(
-    compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]], effort: Effort
-) -> ctypes.CDLL:
+def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
     """Compile a library, try it, and keep it where anything can be kept."""
     from hsdsl.runtime.process import workshop
 
@@ -129,7 +128,7 @@ def _made(
         with workshop() as folder:
             library = folder / "model.so"
             try:
-                _compile(compiler, texts, library, effort)
+                _compile(compiler, texts, library)
             except TooSlow:
                 if not is_loop:  # which is compiled in seconds, unless much else runs
                     _give_up(key, allowed)
@@ -155,11 +154,11 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-def _compile(compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort) -> None:
+def _compile(compiler: Compiler, texts: Sequence[str], library: Path) -> None:
     sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
     for source, text in zip(sources, texts, strict=True):
         source.write_text(text)
-    compiler.build(sources, [RUNTIME], library, effort, FLAGS)
+    compiler.build(sources, [RUNTIME], library, EFFORT, FLAGS)
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:

@@ -368,10 +368,10 @@ def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.Monke
 @needs_compiler
 def test_the_runtime_is_compiled_once() -> None:
     kernel._runtime.cache_clear()
-    text, _, effort = kernel.LOOP
+    text, _ = kernel.LOOP
     kernel.begin()
     assert kernel.runtime() is kernel.runtime()
-    assert not kernel.is_kept("nothing", effort) and kernel.is_kept(text, effort)
+    assert not kernel.is_kept("nothing") and kernel.is_kept(text)
 
 
 @needs_compiler

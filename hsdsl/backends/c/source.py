@@ -23,6 +23,10 @@ PART = 1 << 14  # characters of functions that are worth a file of their own
 _HEAD = """\
 /* Generated from a model; see hs.h for what the tables mean. */
 
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("ipa-ra", "tree-slp-vectorize") /* what makes -O2 faster than -O1, but not to compile */
+#endif
+
 #include "hs.h"
 #include "hs_series.h"
 
