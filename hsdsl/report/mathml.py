@@ -13,6 +13,7 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from hsdsl import decimals
 from hsdsl.expression import plain
 from hsdsl.expression.scope import Function, symbol
+from hsdsl.expression.selection import cases
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.names import visible
 
@@ -128,6 +129,15 @@ class _Printer(MathMLPresentationPrinter):
         return self._row("mrow", self._leaf("mi", _NAMED[kind]), self._row("mrow", *inner, self._leaf("mo", ")")))
 
     _print_floor = _print_absolute = _print_minimum = _print_maximum = _print_sign = _print_atan2 = _print_Function
+
+    def _print_below(self, e: Any) -> Any:
+        (one, positive), (other, _) = cases(e).args
+        where = self._row("mrow", self._leaf("mtext", "where\u00a0"), self._print(positive))
+        rows = [
+            self._row("mtr", *(self._row("mtd", part) for part in (self._print(value), condition)))
+            for value, condition in ((one, where), (other, self._leaf("mtext", "elsewhere")))
+        ]
+        return self._row("mrow", self._leaf("mo", "("), self._row("mtable", *rows), self._leaf("mo", ")"))
 
     def _leaf(self, tag: str, text: str) -> Any:
         element = self.dom.createElement(tag)

@@ -99,6 +99,7 @@ def _formulas(text):
         ("min(a, max(b, 2))", "min(a,max(b,2))"),
         ("alpha*sin(omega*t)", "αsin(ωt)"),
         ("sqrt(x)", "x"),
+        ("x + select(x - 1, a, 2)", "x+(awhere\u00a0x−1>02elsewhere)"),
     ],
 )
 def test_formulas_have_the_signs_of_people(text, signs):
