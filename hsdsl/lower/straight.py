@@ -134,7 +134,7 @@ class Gradient:
         direct = {a: derivative(expr, a) for a in present & self._order.keys()}
         through = present & self._slopes.keys()
         for symbol in sorted(through, key=lambda s: s.name):
-            slope = self._cut.name(expr.diff(symbol))
+            slope = self._cut.name(derivative(expr, symbol))
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
         return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
@@ -151,10 +151,24 @@ def moving(expr: sp.Basic) -> frozenset[Any]:
     return frozenset().union(*map(moving, parts))
 
 
-@lru_cache(maxsize=4096)  # the modes of a large model have most of their derivatives in common
+@lru_cache(maxsize=1 << 14)  # the modes of a large model have most of their derivatives in common
 def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """The derivative of an expression by a symbol."""
-    return expr.diff(symbol)
+    """The derivative of an expression by a symbol: that of SymPy, which asks of every part of it whether it is zero."""
+    if symbol not in moving(expr):
+        return sp.S.Zero
+    if expr.is_Symbol:
+        return sp.S.One
+    ordinary = type(expr)._eval_derivative is sp.Function._eval_derivative  # by the chain rule
+    if not (expr.is_Add or expr.is_Mul or ordinary or (expr.is_Pow and expr.exp.is_Number)):
+        return expr.diff(symbol)
+    slopes = [(i, slope) for i, part in enumerate(expr.args) if (slope := derivative(part, symbol)) != 0]
+    if expr.is_Pow:
+        return expr * (slopes[0][1] * expr.exp / expr.base)
+    if ordinary:
+        return sp.Add(*(expr.fdiff(i + 1) * slope for i, slope in slopes))
+    if expr.is_Mul:
+        return sp.Add(*(sp.Mul(*expr.args[:i], slope, *expr.args[i + 1 :]) for i, slope in slopes))
+    return sp.Add(*(slope for _, slope in slopes))
 
 
 def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:

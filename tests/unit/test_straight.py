@@ -10,7 +10,8 @@ import sympy as sp
 from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
-from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient
+from hsdsl.functions import absolute, atan2, below, cosh, floor, maximum, minimum, sign, sinh, tanh
+from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient, derivative
 from hsdsl.model import Model
 
 MANY = multiprecision(60)
@@ -39,6 +40,27 @@ LARGE = {
     "squares of squares": ("l9", doubling("", "L**2/2 + 0.3", 10)),
     "doubling": ("l9", doubling("", "sin(L)*cos(L) + 0.4", 10)),
 }
+
+
+FORMS = [
+    X * Y * sp.sin(X * Y) + 3 * X + Y,
+    (X + Y) ** 5 / sp.sqrt(X**2 + Y**2 + 1),
+    X**Y + Y**X + 2**X + (1 + X) ** sp.Rational(1, 3),
+    sp.log(1 + X**2) * sp.exp(-X * Y) / (1 + X) ** 2,
+    sp.asin(X / 9) + sp.acos(X / 9) * sp.atan(X * Y) + sp.tan(X),
+    sinh(X) * cosh(X * Y) - tanh(Y) / X + atan2(X, Y * X),
+    absolute(X - Y) * sign(X) + floor(X) * X + minimum(X, Y**2) * maximum(X * Y, Y),
+    below(X, Y, X**2, Y * X),
+    sp.pi * Y,
+]
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("symbol", [X, Y], ids=str)
+def test_derivatives_are_those_of_sympy(form: sp.Expr, symbol: sp.Symbol) -> None:
+    expected = form.diff(symbol)
+    assert derivative(form, symbol) == expected
+    assert derivative(expected, symbol) == expected.diff(symbol)
 
 
 def bound(guard: str, lets: str, arithmetic):
