@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import islice
@@ -66,8 +66,8 @@ def _transition(t: Transition) -> dict[str, Any]:
     }
 
 
-def _kind(value: Any) -> Any:
-    return cast(Any, type(value))
+_kind: Callable[[Any], Any] = type
+_keys: Callable[[Any], Any] = tuple
 
 
 def plain(value: Any) -> Any:
@@ -144,12 +144,13 @@ class _Writer:
 
     def texts(self, values: Sequence[Any], newline: str, room: int) -> list[str]:
         """Write each of some values, one that is longer than ``room`` on several lines."""
+        kinds = set(map(_kind, values))
+        if len(kinds) < 2 and (dict not in kinds or len(set(map(_keys, values))) < 2):
+            return self._alike(values, newline, room)
         places: dict[Any, list[int]] = {}
         for place, value in enumerate(values):
             kind = _kind(value)
             places.setdefault(tuple(value) if kind is dict else kind, []).append(place)
-        if len(places) < 2:
-            return self._alike(values, newline, room)
         found = [""] * len(values)
         for some in places.values():
             for place, text in zip(some, self._alike([values[i] for i in some], newline, room), strict=True):
@@ -168,7 +169,7 @@ class _Writer:
             return [known[value] for value in values]
         if kind is dict:
             return self._objects(values, newline, room)
-        if kind is list:
+        if kind in (list, tuple):
             return self._lists(values, newline, room)
         if values and decimals.is_multiprecision(values[0]):
             return [decimals.text(x, self._precision) if decimals.is_finite(x) else "null" for x in values]
@@ -185,7 +186,9 @@ class _Writer:
         line, lines = _forms([key.replace("%", "%%") + "%s" for key in keys], "{}", newline)
         return [_fitting(line % row, room) or lines % row for row in rows]
 
-    def _lists(self, values: Sequence[list[Any]], newline: str, room: int) -> list[str]:
+    def _lists(self, values: Sequence[Sequence[Any]], newline: str, room: int) -> list[str]:
+        if not any(values):
+            return ["[]"] * len(values)
         inner = newline + "  "
         items = iter(self.texts([item for value in values for item in value], inner, WIDTH - len(inner)))
         forms = (_forms(list(islice(items, len(value))), "[]", newline) for value in values)

@@ -138,12 +138,18 @@ class OutputBuffers:
         return Gathered(whole, layouts.width(layouts.of_arcs(whole["arc"]["mode"])))
 
 
-def arcs_of(whole: Columns, program: Program, layouts: StateLayouts) -> Iterator[Arc]:
-    """Make the arcs of whole columns."""
+def last_arc(whole: Columns, program: Program, layouts: StateLayouts) -> Arc:
+    """Make the last arc of whole columns."""
+    begun = np.flatnonzero(whole["arc"]["first"] < len(whole["times"]))
+    return next(arcs_of(whole, program, layouts, int(begun[-1])))
+
+
+def arcs_of(whole: Columns, program: Program, layouts: StateLayouts, start: int = 0) -> Iterator[Arc]:
+    """Make the arcs of whole columns, from one of them on."""
     rows = len(whole["times"])
-    opened: list[tuple[int, int, int, int]] = whole["arc"].tolist()
+    opened: list[tuple[int, int, int, int]] = whole["arc"][start:].tolist()
     ends = [first - 1 for first, *_ in opened[1:]] + [rows - 1]
-    found: list[int] = layouts.of_arcs(whole["arc"]["mode"]).tolist()
+    found: list[int] = layouts.of_arcs(whole["arc"]["mode"])[start:].tolist()
     names, states, kinds = [mode.name for mode in program.modes], layouts.kinds, structures.KINDS
     for (first, jump, index, kind), last, number in zip(opened, ends, found, strict=True):
         if first <= last:

@@ -16,7 +16,7 @@ from hsdsl.runtime.sampling import Sampler
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.diagnostics import LEFT_OUT, TWO_STEP, Diagnostics
-from hsdsl.simulate.output_buffers import arcs_of, transitions_of
+from hsdsl.simulate.output_buffers import arcs_of, last_arc, transitions_of
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
@@ -121,6 +121,11 @@ def _arcs(execution: Execution) -> tuple[Arc, ...]:
     return arcs
 
 
+def _last_arc(execution: Execution) -> Arc:
+    of = _of(execution)
+    return last_arc(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts)
+
+
 def _verdict(execution: Execution) -> Verdict:
     assert execution.assessment is not None
     began = time.perf_counter()
@@ -134,7 +139,7 @@ _LATER: dict[str, Callable[[Execution], Any]] = {
     "settings": _settings,
     "transitions": _transitions,
     "arcs": _arcs,
-    "final": lambda execution: _final(execution.arcs[-1], _of(execution).columns, execution.output_names),
+    "final": lambda execution: _final(_last_arc(execution), _of(execution).columns, execution.output_names),
     "verdict": _verdict,
 }
 
