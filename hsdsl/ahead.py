@@ -9,8 +9,10 @@ from __future__ import annotations
 import atexit
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from typing import NoReturn
 
 from hsdsl import interrupts, program_cache
@@ -79,12 +81,16 @@ def _saves_time() -> bool:
     )
 
 
-def taken(files: ModelFiles) -> tuple[Program, ModelFiles] | None:
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Program, ModelFiles] | None:
     """The program of a model that was begun, and all bytes that it was made from; None where there is none.
+
+    Modules that are needed afterwards are imported while the other process works.
 
     Raises ModelError: the model has errors.
     """
     for other in [other for other in _begun if other.files == files]:
+        for name in needed:
+            import_module(name)
         answer = other.wait()
         _begun.remove(other)
         other.end()

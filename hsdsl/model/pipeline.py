@@ -31,6 +31,9 @@ from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timelin
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
+# what compiles, runs and reports a model
+_RUNNING = ("pickle", "hsdsl.backends.c", "hsdsl.runtime.process", "hsdsl.simulate.verdict", "hsdsl.report")
+
 
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
     """Read a model file once, or take the bytes given for it, and find its program in the cache or elaborate them."""
@@ -40,7 +43,7 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
     if cached is not None:
         program, files = cached
         return Pipeline(None, time.perf_counter() - began, files, program)
-    lowered = ahead.taken(files)
+    lowered = ahead.taken(files, _RUNNING)
     if lowered is not None:
         program, files = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
