@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from hsdsl.execution.records import Deferred
+
 Kind = Literal["flow", "strip"]
 
 
@@ -63,7 +65,7 @@ REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Deferred):
     """What can be said about the theorem's hypotheses for this run: ``holds``, ``left`` or ``unknown``."""
 
     theorem: Literal["holds", "left", "unknown"]

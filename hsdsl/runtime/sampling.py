@@ -13,14 +13,15 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 
 NUMBER = 8  # bytes
+SHARED = ("rows", "arcs", "width", "degree", "times", "values", "recorded", "pieces", "arc")  # with ``hs_record``
 
 
 class Placed(Protocol):
     """Columns that C can be shown."""
 
     @property
-    def where(self) -> tuple[int, ...]:
-        """Rows, arcs, states, degree, outputs; addresses of times, values, outputs, pieces, arcs."""
+    def record(self) -> int:
+        """Where the ``hs_record`` is that says where they are."""
         ...
 
 
@@ -82,7 +83,7 @@ class Sampler:
     ----------
     sampled : Sampled
     columns : object
-        The run's columns; its ``where`` says what of them is where.
+        The run's columns; its ``record`` says what of them is where.
     kinds : tuple of tuples of str
         The states of each kind of arcs.
     layout : array of int32, optional
@@ -98,8 +99,10 @@ class Sampler:
     def _table(self) -> Any:
         """What is the same for any times."""
         table = structures.Sampling.from_buffer_copy(self._sampled.table)
-        table.rows, table.arcs, table.width, table.degree, self._outputs, *places = self._columns.where
-        table.times, table.values, table.recorded, table.pieces, table.arc = places
+        record = structures.Record.from_address(self._columns.record)
+        for name in SHARED:
+            setattr(table, name, getattr(record, name))
+        self._outputs = record.outputs
         table.layout = None if self._layout is None else self._layout.ctypes.data
         return table
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.execution import Array
 from hsdsl.runtime import structures
 
-NUMBER = 8  # bytes
 RECORDS = {"arc": structures.ARC, "transition": structures.TRANSITION, "note": structures.NOTE}
 ARC_NUMBERS, TRANSITION_NUMBERS, NOTE_NUMBERS = (
     record.itemsize // 8 for record in RECORDS.values()
 )  # as long as so many
+HEAD = ctypes.sizeof(structures.Record) // 8
 ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
 )  # fmt: skip
+BY_TRANSITION = ("transition", "before", "after", "alternatives")
 
 
 @dataclass(frozen=True)
@@ -49,32 +51,6 @@ class Counts(NamedTuple):
     alternatives: int
 
 
-class Where(NamedTuple):
-    """Numbers of rows and arcs, sizes of a row, and addresses of columns, for C."""
-
-    rows: int
-    arcs: int
-    width: int
-    degree: int
-    outputs: int
-    times: int
-    values: int
-    recorded: int
-    pieces: int
-    arc: int
-
-
-class Made(NamedTuple):
-    """Numbers of transitions and notes, and addresses of what belongs to transitions, for C."""
-
-    transitions: int
-    notes: int
-    transition: int
-    before: int
-    after: int
-    alternatives: int
-
-
 class Gathered:
     """Columns of a long run, as arrays; rows have as many states as the largest mode has that the run was in."""
 
@@ -92,24 +68,22 @@ class Gathered:
         """How many notes there are."""
         return len(self._arrays["note"])
 
-    @property
-    def where(self) -> Where:
-        """Where they are."""
-        of = self._arrays
+    @cached_property
+    def _record(self) -> Any:
+        of, names = self._arrays, ("times", "values", "outputs", "coefficients", "arc", *BY_TRANSITION)
         rows, degree, width = of["coefficients"].shape
-        places = [of[name].ctypes.data for name in ("times", "values", "outputs", "coefficients", "arc")]
-        return Where(rows, len(of["arc"]), width, degree, of["outputs"].shape[1], *places)
+        sizes = rows, len(of["arc"]), len(of["transition"]), width, degree, of["outputs"].shape[1]
+        return structures.Record(*sizes, *(of[name].ctypes.data for name in names))
 
     @property
-    def made(self) -> Made:
-        """Where transitions are."""
-        of = self._arrays
-        places = [of[name].ctypes.data for name in ("transition", "before", "after", "alternatives")]
-        return Made(len(of["transition"]), len(of["note"]), *places)
+    def record(self) -> int:
+        """Where the ``hs_record`` is that says where they are."""
+        return ctypes.addressof(self._record)
 
 
 class Packed:
-    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them; arrays are made on first use.
+    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them behind their record; arrays are made on
+    first use.
 
     A dozen arrays take longer to make than many a run.
 
@@ -127,15 +101,16 @@ class Packed:
         by_row = 2 + shape.outputs + shape.width * (1 + shape.degree)
         self._counts, self._shape = counts, shape
         self._memory = np.empty(
-            rows * by_row
+            HEAD
+            + rows * by_row
             + transitions * 2 * shape.width
             + ARC_NUMBERS * arcs
             + TRANSITION_NUMBERS * transitions
             + NOTE_NUMBERS * notes
             + (alternatives + 1) // 2
         )
-        self._start = structures.start_of(self._memory)
-        self._width = pack(self._start)
+        self.record = structures.start_of(self._memory)  # where the ``hs_record`` is
+        self._width = pack(self.record)
 
     @cached_property
     def _sizes(self) -> tuple[int, ...]:
@@ -147,7 +122,7 @@ class Packed:
 
     def __getitem__(self, name: str) -> Array:
         place = ORDER.index(name)
-        start = sum(self._sizes[:place])
+        start = HEAD + sum(self._sizes[:place])
         raw: Array = self._memory[start : start + self._sizes[place]]
         if name in RECORDS:
             return raw.view(RECORDS[name])
@@ -164,28 +139,6 @@ class Packed:
     def notes(self) -> int:
         """How many notes there are."""
         return self._counts.notes
-
-    @property
-    def where(self) -> Where:
-        """Where they are."""
-        n, w, m, degree = self._counts.rows, self._width, self._shape.outputs, self._shape.degree
-        times = self._start
-        values = times + NUMBER * n
-        recorded = values + NUMBER * n * w
-        pieces = recorded + NUMBER * n * (m + 1)  # behind the depths
-        arc = pieces + NUMBER * n * degree * w
-        return Where(n, self._counts.arcs, w, degree, m, times, values, recorded, pieces, arc)
-
-    @property
-    def made(self) -> Made:
-        """Where transitions are."""
-        n, arcs, k, notes, _ = self._counts
-        by_row = 2 + self._shape.outputs + self._width * (1 + self._shape.degree)
-        transition = self._start + NUMBER * (n * by_row + ARC_NUMBERS * arcs)
-        before = transition + NUMBER * TRANSITION_NUMBERS * k
-        after = before + NUMBER * k * self._shape.width
-        behind = after + NUMBER * (k * self._shape.width + NOTE_NUMBERS * notes)
-        return Made(k, notes, transition, before, after, behind)
 
 
 Columns = Gathered | Packed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,7 +91,16 @@ class _Written(NamedTuple):
 def _assessment_of(
     under_way: CompiledRun, execution: Execution, finer: Execution | None, followed: bool = False
 ) -> Verdict:
+    if finer is None and not followed:
+        return _of_compiled()(under_way, execution)
     return _assessment(under_way.plan.problem, lambda: under_way.diagnostics, execution, finer, followed)
+
+
+@cache
+def _of_compiled() -> Callable[..., Verdict]:
+    from hsdsl.simulate.verdict.clear import assess_compiled  # not every run needs one
+
+    return assess_compiled
 
 
 def _column(name: str) -> Callable[[Execution], Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import pickle
 import re
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from engines import needs_compiler
 
 import hsdsl
 from hsdsl.simulate import verdict
-from hsdsl.simulate.verdict import run_view
+from hsdsl.simulate.diagnostics import Diagnostics
+from hsdsl.simulate.verdict import RunView, assess, clear, run_view
 from hsdsl.simulate.verdict.screen import Screen, screened
 
 ROOT = Path(__file__).parents[2]
@@ -58,7 +60,7 @@ def run_of(loaded: Any, method: str, tolerance: float) -> Any:
 
 
 def screen_of(run: Any) -> Screen:
-    screen = screened(run.compiled.under_way.plan.problem, run, run.finer)
+    screen = screened(run, run.finer)
     assert screen is not None
     return screen
 
@@ -80,6 +82,7 @@ def both(loaded: Any, method: str, tolerance: float) -> tuple[Any, Any]:
     """The verdict of a run, and that without a screen."""
     found = run_of(loaded, method, tolerance).verdict
     with (
+        patch.object(clear, "screens_of", return_value=None),
         patch.object(run_view, "screened", return_value=None),
         patch.object(verdict, "is_compiled", return_value=False),
     ):
@@ -123,11 +126,13 @@ def test_a_pulse_between_stages_is_found() -> None:
 def test_a_clear_run_has_no_doubts() -> None:
     screen = screen_of(run_of(model("y", "-x + cos(2*t)"), "taylor", 1e-9))
     assert not screen.doubts()
-    assert screen.crossings[0] == 0
+    assert screen.margins.crossed == 0
 
 
 def test_a_far_turning_point_is_the_nearest_miss() -> None:
-    (sentence,) = screen_of(run_of(model("cos(t)", "0", "x >= 2"), "taylor", 1e-9)).nearest_miss
+    run = run_of(model("cos(t)", "0", "x >= 2"), "taylor", 1e-9)
+    modes = run.compiled.under_way.plan.problem.program.modes
+    (sentence,) = screen_of(run).margins.nearest_miss(modes)
     assert "t = 1.570796327" in sentence
     assert "more than a million times" in sentence
 
@@ -146,3 +151,14 @@ def test_ties_that_commute_need_no_closer_look():
     run = run_of(hsdsl.load(ROOT / "models/pronking-runner.yaml"), "taylor", 1e-9)
     screen = screen_of(run)
     assert screen.commuting and not screen.doubts()
+
+
+@needs_compiler
+def test_reasons_that_are_read_later_are_those_of_their_run() -> None:
+    loaded = hsdsl.load(ROOT / "models/pronking-runner.yaml")
+    runs: list[Any] = [loaded.simulate(scheme="located", tolerance=tolerance) for tolerance in (1e-9, 1e-6)]
+    verdicts = [run.verdict for run in runs]
+    assert all("reasons" not in vars(found) for found in verdicts)
+    for run, found in zip(runs, verdicts, strict=True):
+        fresh = assess(RunView(run.compiled.under_way.plan.problem, run), Diagnostics())
+        assert pickle.loads(pickle.dumps(found)) == found == fresh

@@ -54,17 +54,6 @@ typedef struct {
   const int32_t *jumping; /* (edge): whether its reset has functions that jump */
 } hs_formulas;
 
-/* The columns of a run; see hs_pack. A row's piece leaves it. */
-typedef struct {
-  int64_t rows, arcs, transitions;
-  int32_t width, degree;
-  const double *times, *values, *pieces;
-  const hs_arc *arc;
-  const hs_transition *transition;
-  const double *before, *after; /* (transitions, model->width) */
-  const int32_t *alternatives;  /* of all transitions */
-} hs_record;
-
 /* Coefficients of corrections: see hsdsl/simulate/verdict/correction.py. */
 typedef struct {
   double node[4], weight[6][4], bulge[4], slope[4], inside, pole;
@@ -84,8 +73,8 @@ typedef enum {
   HS_FLOW_CHANGE
 } hs_doubt;
 
-/* What needs a closer look at a transition; and that tied ones commute. */
-enum { HS_LOOK_AT_CROSSING = 1, HS_LOOK_AT_RESET = 2, HS_COMMUTES = 4 };
+/* What needs a closer look at a transition. */
+enum { HS_LOOK_AT_CROSSING = 1, HS_LOOK_AT_RESET = 2 };
 
 typedef struct {
   const hs_model *model;
@@ -95,12 +84,15 @@ typedef struct {
   int32_t order;            /* the most of a companion's series; 0 where there is none */
   const hs_correction *correction; /* of a companion without series; 0 likewise */
   double until, relaxation, tolerance;
-  double *workspace;        /* hs_screen_room() numbers, in which what is found begins: */
-  int32_t *crossing;        /* (transition): HS_LOOK_AT_... and HS_COMMUTES */
+  int64_t room;             /* numbers in the workspace, in which what is found begins: */
+  double *workspace;
+  int32_t *crossing;        /* (transition): HS_LOOK_AT_... */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
   double *measured;         /* (row, width): how far each is from the companion; 0 where there is none */
   double *late;             /* (transition): how far they are from the other run's or the companion's, up to each */
+  double *together;         /* when transitions are tied that commute, `commuting` times */
+  int64_t commuting;
   int32_t marks;            /* those of `crossing` together */
   int32_t doubts;
   int64_t crossed;          /* transitions that the flow made; of these: */
@@ -109,7 +101,8 @@ typedef struct {
   int32_t missed_mode, missed_surface;
 } hs_screen;
 
-HS_EXPORT int64_t hs_screen_room(const hs_screen *screen);
-HS_EXPORT void hs_look(hs_screen *screen);
+/* Look at a run, held against a finer one if there is one: 0 where there is surely nothing to find, -1 where there may
+   be. Where that takes more room than there is, nothing was done, and it is so many numbers. */
+HS_EXPORT int64_t hs_look(hs_screen *screen, const hs_record *run, const hs_record *finer);
 
 #endif

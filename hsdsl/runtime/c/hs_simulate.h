@@ -207,9 +207,20 @@ typedef struct hs_task {
   hs_stop stop;
 } hs_task;
 
+/* The columns of a run. A row's piece leaves it. */
+typedef struct {
+  int64_t rows, arcs, transitions;
+  int32_t width, degree, outputs;
+  const double *times, *values, *recorded, *pieces;
+  const hs_arc *arc;
+  const hs_transition *transition;
+  const double *before, *after; /* (transitions, model->width) */
+  const int32_t *alternatives;  /* of all transitions */
+} hs_record;
+
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
-HS_EXPORT int64_t hs_pack(const hs_task *task, hs_real *to);
+HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
 
 /* A run's values at many times: what a caller gives, all of it the caller's own memory. */
 typedef struct {

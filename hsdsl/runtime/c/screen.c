@@ -73,7 +73,7 @@ static void look_at_all(hs_view *v) {
   if (undecided_end(v)) s->doubts |= DOUBT(HS_ENDING);
   for (int64_t j = 0; j < s->run.transitions; j++) {
     if (made[j].alternatives) {
-      if (any_order(v, j)) s->crossing[j] |= HS_COMMUTES;
+      if (any_order(v, j)) s->together[s->commuting++] = made[j].time;
       else s->doubts |= DOUBT(HS_CHOICE);
     }
     if (jumps_close(v, &made[j])) s->crossing[j] |= HS_LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
@@ -101,6 +101,7 @@ static void lay_out_found(hs_screen *s, hs_store *store) {
   s->changing = take(store, rows, sizeof(int32_t));
   s->measured = is_followed(s) ? numbers(store, rows * s->run.width) : 0;
   s->late = numbers(store, transitions);
+  s->together = numbers(store, transitions);
 }
 
 static hs_view make_view(hs_screen *s, hs_store *store) {
@@ -146,13 +147,6 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   return v;
 }
 
-int64_t hs_screen_room(const hs_screen *screen) {
-  hs_store store = {0, 0};
-  hs_screen sizes = *screen;
-  make_view(&sizes, &store);
-  return store.used;
-}
-
 /* From powers to Bernstein coefficients: C(k, l)/C(d, l). */
 static void fill_matrix(double *matrix, int d) {
   for (int k = 0; k <= d; k++) {
@@ -162,23 +156,32 @@ static void fill_matrix(double *matrix, int d) {
   }
 }
 
-void hs_look(hs_screen *s) {
-  hs_store store = {s->workspace, 0};
-  hs_view v = make_view(s, &store);
+/* Begin what is found with nothing. */
+static void begin_screen(hs_view *v) {
+  hs_screen *const s = v->s;
   s->doubts = s->marks = 0;
-  s->crossed = 0;
+  s->crossed = s->commuting = 0;
   s->missed_mode = -1;
   s->slowest = s->least = s->margin = INFINITY;
-  for (int i = 0; i < s->model->states; i++) v.error[i] = v.size[i] = 0.0;
-  for (int i = 0; i < s->model->modes; i++) v.nearest[i].margin = INFINITY;
-  v.tied[0] = 0;
+  for (int i = 0; i < s->model->states; i++) v->error[i] = v->size[i] = 0.0;
+  for (int i = 0; i < s->model->modes; i++) v->nearest[i].margin = INFINITY;
+  v->tied[0] = 0;
   for (int64_t j = 0; j < s->run.transitions; j++) {
-    v.tied[j + 1] = v.tied[j] + s->run.transition[j].alternatives;
+    v->tied[j + 1] = v->tied[j] + s->run.transition[j].alternatives;
     s->crossing[j] = 0;
   }
   for (int64_t i = 0; i < s->run.arcs; i++) s->landing[i] = s->ending[i] = 0;
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
-  fill_matrix(v.matrix, s->run.degree);
+  fill_matrix(v->matrix, s->run.degree);
+}
+
+int64_t hs_look(hs_screen *s, const hs_record *run, const hs_record *finer) {
+  hs_store store = {s->workspace, 0};
+  s->run = *run;
+  if (finer) s->finer = *finer;
+  hs_view v = make_view(s, &store);
+  if (store.used > s->room) return store.used;
+  begin_screen(&v);
   const int apart =
       is_followed(s) ? !plain_arcs(&s->run, s->model) || !accompany(&v)
                : !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
@@ -186,4 +189,5 @@ void hs_look(hs_screen *s) {
   else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);
   else look_at_all(&v);
   if (outgrown(&v)) s->doubts |= DOUBT(HS_PARTED);
+  return s->doubts || s->marks ? -1 : 0;
 }

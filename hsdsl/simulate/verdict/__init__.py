@@ -12,6 +12,7 @@ allows itself.
 `agreement`     the errors of a run, by the same run made finer
 `run_view`      an execution with its modes' routines; `place` is one state of it
 `steps`         its steps as polynomials, many at once, with routines over intervals
+`clear`         compiled runs of which it leaves nothing open
 `looks`         all of the following, of a run that the screen leaves open
 `finding`       one reason; `judged` holds margins against errors
 `reliability`   from when on a run cannot be relied on
@@ -30,10 +31,12 @@ allows itself.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hsdsl.execution import INCOMPLETE, LEFT, Stop, Verdict
+from hsdsl.program import Program
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
@@ -42,9 +45,10 @@ from hsdsl.simulate.verdict.companion import has_companion, is_compiled
 from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.screen import Margins
 from hsdsl.simulate.verdict.strips import lost_in_strips
 
-__all__ = ["RunView", "assess"]
+__all__ = ["RunView", "assess", "margins_of"]
 
 
 @np.errstate(all="ignore")  # what overflows is no number, and decides nothing
@@ -62,7 +66,7 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """
     noted = diagnostics.departures or diagnostics.doubts
     if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
-        accompanied = RunView(run.problem, run.execution, accompanied=True)
+        accompanied = replace(run, accompanied=True)
         if accompanied.screen is not None or not is_compiled(run.execution):
             found = _assessed(accompanied, diagnostics)
             if found.theorem == "holds":
@@ -76,8 +80,7 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
         return Verdict("left", _once(left, unknown))
     screen = run.screen
     if screen is not None and not screen.doubts() and (run.accompanied or not run.execution.enters_beyond):
-        margins = *summary(run, *screen.crossings), *together(screen.commuting), *screen.nearest_miss
-        return Verdict("holds", _once(margins))
+        return Verdict("holds", margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
     from hsdsl.simulate.verdict.looks import looked_at  # of a run that the screen leaves open
 
     found, margins = looked_at(run)
@@ -87,6 +90,12 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if left:
         return Verdict("left", _once(left, unknown))
     return Verdict("unknown", _once(unknown, margins)) if unknown else Verdict("holds", _once(margins))
+
+
+def margins_of(program: Program, made: int, margins: Margins, commuting: Sequence[float]) -> tuple[str, ...]:
+    """The sentences on a run that a screen leaves nothing open of."""
+    crossed = summary(made, margins.crossed, margins.slowest, margins.least)
+    return _once(crossed, together(commuting), margins.nearest_miss(program.modes))
 
 
 def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:

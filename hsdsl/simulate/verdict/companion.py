@@ -100,6 +100,15 @@ def has_companion(problem: Problem, run: Execution) -> bool:
 
     Strips and transitions on entry of a run made in C are found where the companion follows it.
     """
+    return (
+        may_have_companion(problem)
+        and run.stop.complete
+        and (is_compiled(run) or not (run.enters_beyond or any(arc.kind != "flow" for arc in run.arcs)))
+    )
+
+
+def may_have_companion(problem: Problem) -> bool:
+    """Whether a companion may show the errors of runs of a problem."""
     settings, method = problem.settings, problem.settings.method
     return (
         settings.scheme == "located"
@@ -108,8 +117,6 @@ def has_companion(problem: Problem, run: Execution) -> bool:
         and method.order <= (MOST_ORDER if method.is_series else MOST_CORRECTED)
         and problem.arithmetic.digits is None
         and len(problem.timeline.segments) == 1
-        and run.stop.complete
-        and (is_compiled(run) or not (run.enters_beyond or any(arc.kind != "flow" for arc in run.arcs)))
     )
 
 

@@ -21,7 +21,7 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
     found: list[Finding] = []
     slowest: Number | None = None
     least: Number | None = None
-    known = None if run.doubts("crossing") or run.screen is None else run.screen.crossings
+    known = None if run.doubts("crossing") or run.screen is None else run.screen.margins
     made = run.relied_transitions if known is None else run.doubtful_transitions(LOOK_AT_CROSSING)
     made = [t for t in made if not t.entry]
     ends = {arc.jump: arc for arc in run.flows} if made else {}
@@ -40,14 +40,14 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
         if margin is not None:
             least = margin if least is None else min(least, margin)
     if known is not None:
-        return found, summary(run, *known)
-    return found, summary(run, len(made), slowest, least)
+        return found, summary(run.execution.made, known.crossed, known.slowest, known.least)
+    return found, summary(run.execution.made, len(made), slowest, least)
 
 
-def summary(run: RunView, count: int, slowest: Number | None, least: Number | None) -> list[str]:
-    """Say how many transitions the flow made, at which rates, and by which margin."""
+def summary(made: int, count: int, slowest: Number | None, least: Number | None) -> list[str]:
+    """Say how many of the transitions that were made the flow made, at which rates, and by which margin."""
     if not count or slowest is None:
-        return ["no transition"] if not run.execution.made else []
+        return ["no transition"] if not made else []
     each = f"{count} transition{'s' * (count > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
     return [each + (f", {times(least)} what the error could undo" if least is not None else "")]
 

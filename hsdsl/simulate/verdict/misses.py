@@ -81,7 +81,7 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
 def _margins(run: RunView, nearest: Miss | None) -> list[str]:
     """Say which turning point comes closest to its surface."""
     if not run.doubts("nearest") and run.screen is not None:
-        return run.screen.nearest_miss
+        return run.screen.margins.nearest_miss(run.problem.program.modes)
     if nearest is None:
         return []
     return [f"the nearest miss is of {nearest.name} at t = {show(nearest.time)}, by {times(nearest.margin)} the error"]

@@ -39,6 +39,8 @@ class RunView:
         Whether motion along surfaces counts as the flow of a mode of the system, as for derivatives.
     accompanied : bool
         Whether errors are those that a companion shows, not a finer run.
+    looked : Screen or None
+        The screen of a run with a companion, where there was a look already.
     """
 
     problem: Problem
@@ -47,6 +49,7 @@ class RunView:
     upto: float = inf
     followed: bool = False
     accompanied: bool = False
+    looked: Screen | None = None
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -92,8 +95,10 @@ class RunView:
     def screen(self) -> Screen | None:
         """Where a compiled screen finds that a closer look is needed; None where there is none."""
         if self.accompanied:
-            return screened(self.problem, self.execution, None)
-        return None if self.errors is None else screened(self.problem, self.execution, self.errors.finer)
+            screen = self.looked or screened(self.execution, None)
+        else:
+            screen = self.errors and screened(self.execution, self.errors.finer)
+        return None if screen is None or screen.doubts("parted", "accumulation") else screen
 
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at something that the screen names."""

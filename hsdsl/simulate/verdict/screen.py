@@ -7,8 +7,9 @@ make the same transitions. Of others there is none, and every hypothesis is look
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,41 +17,65 @@ from hsdsl.execution import Array, Execution
 from hsdsl.program import ModeProgram
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import runtime
+from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.companion import Companion, is_compiled, order_of
+from hsdsl.simulate.verdict.companion import Companion, may_have_companion, order_of
 from hsdsl.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
 
-LOOK_AT_CROSSING, LOOK_AT_RESET, COMMUTES = 1, 2, 4
+if TYPE_CHECKING:
+    from hsdsl.simulate.compiled import CompiledPlan
+
+MOST_LEFT, MOST_ROOM = 4, 1 << 20  # screens that are kept, and numbers in the memory of one
+LOOK_AT_CROSSING, LOOK_AT_RESET = 1, 2
 DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
 
 
-class Screen:
-    """What the screen found of one run; ``table`` is its ``hs_screen``.
+class Margins(NamedTuple):
+    """What a screen shows of a run that surely has no finding.
 
-    Parameters
-    ----------
-    problem : Problem
-    run, finer : compiled runs
-        Without a finer one, the run is held against its companion.
+    How many transitions the flow made, the least rate and the least margin; of the turning point that comes closest to
+    its surface the margin and the time, its mode (negative for none) and surface.
     """
 
-    def __init__(self, problem: Problem, run: Any, finer: Any) -> None:
-        common: dict[bool, Any] = run.under_way.plan.of_screens
-        if (finer is None) not in common:
-            common[finer is None] = _common(problem, run.under_way.plan, finer is None)
-        self.table = table = structures.Screen.from_buffer_copy(common[finer is None])
-        table.run = _record(run.columns)
-        if finer is not None:
-            table.finer = _record(finer.columns)
-        where, library = ctypes.addressof(table), runtime()
-        self._memory = np.empty(library.hs_screen_room(where))
-        table.workspace = structures.start_of(self._memory)
-        library.hs_look(where)
-        self._columns = run.columns
-        self._modes: tuple[ModeProgram, ...] = problem.program.modes
+    crossed: int
+    slowest: float
+    least: float
+    margin: float
+    missed: float
+    mode: int
+    surface: int
+
+    def nearest_miss(self, modes: Sequence[ModeProgram]) -> list[str]:
+        """The sentence on that turning point."""
+        if self.mode < 0:
+            return []
+        mode, k = modes[self.mode], self.surface
+        edges = mode.edges
+        name = edges[k].name if k < len(edges) else f"the wall {mode.walls[k - len(edges)]} of {mode.name}"
+        return [f"the nearest miss is of {name} at t = {show(self.missed)}, by {times(self.margin)} the error"]
+
+
+class Screen:
+    """What the screen found of one run; ``table`` is its ``hs_screen``, which begins as a copy of ``common``."""
+
+    def __init__(self, common: Any) -> None:
+        self.table: Any = structures.Screen.from_buffer_copy(common)
+        self._where, self._look, self._memory = ctypes.addressof(self.table), runtime().hs_look, np.empty(0)
+        self.columns: Columns | None = None
+
+    def look(self, columns: Columns, finer: int | None = None) -> bool:
+        """Look at a run, and say whether there is surely nothing to find; ``finer`` is the record of a finer one.
+
+        Without that, the run is held against its companion.
+        """
+        self.columns = columns
+        while (left := self._look(self._where, columns.record, finer)) > 0:
+            self._memory = np.empty(left)
+            self.table.workspace, self.table.room = structures.start_of(self._memory), left
+        return not left
 
     @property
     def companion(self) -> Companion:
@@ -67,7 +92,7 @@ class Screen:
     def doubts(self, *words: str) -> bool:
         """Whether a closer look is needed at any of these; without words, at anything."""
         if not words:
-            return bool(self.table.doubts or self.table.marks & ~COMMUTES)
+            return bool(self.table.doubts or self.table.marks)
         return any(self.table.doubts & DOUBTS[word] for word in words)
 
     def marked(self, name: str) -> Array:
@@ -79,70 +104,89 @@ class Screen:
     @cached_property
     def first_rows(self) -> Array:
         """The first row of each arc."""
-        return self._columns["arc"]["first"]
+        assert self.columns is not None
+        return self.columns["arc"]["first"]
 
     def arcs(self, name: str) -> set[int]:
         """The first rows of the arcs that are marked."""
         return set(self.first_rows[self.marked(name) != 0].tolist())
 
     @property
-    def crossings(self) -> tuple[int, float, float]:
-        """How many transitions the flow made, the least rate and the least margin."""
-        return self.table.crossed, self.table.slowest, self.table.least
+    def margins(self) -> Margins:
+        """What it shows of what holds."""
+        of = self.table
+        return Margins(of.crossed, of.slowest, of.least, of.margin, of.missed, of.missed_mode, of.missed_surface)
 
     @property
     def commuting(self) -> list[float]:
         """When transitions were reached together of which every order leads to the same point."""
-        if not self.table.marks & COMMUTES:
-            return []
-        return self._columns["transition"]["time"][self.marked("crossing") & COMMUTES != 0].tolist()
-
-    @property
-    def nearest_miss(self) -> list[str]:
-        """The sentence on the turning point that comes closest to its surface."""
-        table = self.table
-        number: int = table.missed_mode
-        k: int = table.missed_surface
-        if number < 0:
-            return []
-        mode = self._modes[number]
-        edges = mode.edges
-        name = edges[k].name if k < len(edges) else f"the wall {mode.walls[k - len(edges)]} of {mode.name}"
-        return [f"the nearest miss is of {name} at t = {show(table.missed)}, by {times(table.margin)} the error"]
+        return [*structures.array_at(ctypes.c_double, self.table.together, self.table.commuting)]
 
 
-def screened(problem: Problem, run: Execution, finer: Execution | None) -> Screen | None:
+class Screens:
+    """Screens of the runs by a plan, held against companions or finer runs.
+
+    What one leaves can be used by the next.
+    """
+
+    def __init__(self, problem: Problem, plan: CompiledPlan, accompanied: bool) -> None:
+        model, settings, method = plan.compiled, problem.settings, problem.settings.method
+        formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
+        assert method is not None
+        order = order_of(method) if accompanied else None
+        self._common = structures.Screen(
+            model=ctypes.addressof(model.table),
+            timeline=plan.timeline,
+            formulas=ctypes.addressof(formulas.table),
+            order=order or 0,
+            correction=ctypes.addressof(_correction()) if accompanied and order is None else 0,
+            until=settings.until,
+            relaxation=settings.relaxation,
+            tolerance=settings.tolerance,
+        )
+        self._left: list[Screen] = []
+
+    def take(self) -> Screen:
+        """Return a screen that nobody looks at."""
+        try:
+            return self._left.pop()
+        except IndexError:
+            return Screen(self._common)
+
+    def leave(self, screen: Screen) -> None:
+        """Let the next look use a screen that nobody reads any more."""
+        if len(self._left) < MOST_LEFT and screen.table.room <= MOST_ROOM:
+            screen.columns = None
+            self._left.append(screen)
+
+
+def screens_of(plan: CompiledPlan, accompanied: bool) -> Screens | None:
+    """Screens of the runs by a plan, where there are any; see `has_companion` for those that are accompanied."""
+    if accompanied not in plan.of_screens:
+        problem = plan.problem
+        located = problem.settings.scheme == "located" and problem.settings.tolerance is not None
+        can = located and not any(mode.slides for mode in problem.program.modes)
+        can = can and (may_have_companion(problem) or not accompanied)
+        plan.of_screens[accompanied] = Screens(problem, plan, accompanied) if can else None
+    return plan.of_screens[accompanied]
+
+
+def screened(run: Execution, finer: Execution | None) -> Screen | None:
     """Screen a run, where that can be done; without a finer run by its companion."""
-    if problem.settings.scheme != "located" or problem.settings.tolerance is None:
-        return None
-    if not all(map(is_compiled, (run, finer or run))) or any(mode.slides for mode in problem.program.modes):
-        return None
     one: Any = run.compiled
     other: Any = finer and finer.compiled
+    if one is None or (finer and other is None):
+        return None
     if not run.stop.complete or (finer and finer.stop.reason != run.stop.reason):
         return None
     if one.columns.notes or (other and other.columns.notes):
         return None
-    screen = Screen(problem, one, other)
-    return None if screen.doubts("parted", "accumulation") else screen
-
-
-def _common(problem: Problem, plan: Any, accompanied: bool) -> Any:
-    """The table that screens of all runs by a plan begin with."""
-    model, settings, method = plan.compiled, problem.settings, problem.settings.method
-    formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
-    assert method is not None
-    order = order_of(method) if accompanied else None
-    return structures.Screen(
-        model=ctypes.addressof(model.table),
-        timeline=plan.timeline,
-        formulas=ctypes.addressof(formulas.table),
-        order=order or 0,
-        correction=ctypes.addressof(_correction()) if accompanied and order is None else 0,
-        until=settings.until,
-        relaxation=settings.relaxation,
-        tolerance=settings.tolerance,
-    )
+    screens = screens_of(one.under_way.plan, finer is None)
+    if screens is None:
+        return None
+    screen = screens.take()
+    screen.look(one.columns, other and other.columns.record)
+    return screen
 
 
 @cache
@@ -151,11 +195,3 @@ def _correction() -> Any:
     known = correction()
     numbers = (*known.nodes, *known.weights.ravel(), *known.bulge, *known.slope, INSIDE, POLE)
     return structures.Correction.from_buffer((ctypes.c_double * len(numbers))(*numbers))
-
-
-def _record(columns: Any) -> Any:
-    where, made = columns.where, columns.made
-    return structures.Record(
-        where.rows, where.arcs, made.transitions, where.width, where.degree, where.times, where.values, where.pieces,
-        where.arc, made.transition, made.before, made.after, made.alternatives,
-    )  # fmt: skip

@@ -1,0 +1,30 @@
+"""Compiled runs that the screen finds clear by their companions: sentences on their margins are written when read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from hsdsl.execution import Execution, Verdict
+from hsdsl.simulate.verdict import RunView, assess, margins_of
+from hsdsl.simulate.verdict.screen import screens_of
+
+if TYPE_CHECKING:
+    from hsdsl.simulate.compiled import CompiledRun
+
+
+def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
+    """Decide whether the theorem's hypotheses hold for a compiled run, are left, or are unknown."""
+    compiled: Any = execution.compiled
+    columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
+    if screens is None or columns.notes or not execution.stop.complete:
+        return assess(RunView(problem, execution), under_way.diagnostics)
+    screen = screens.take()
+    if not screen.look(columns):
+        return assess(RunView(problem, execution, looked=screen), under_way.diagnostics)
+    shown = problem.program, compiled.made, screen.margins, screen.commuting
+    screens.leave(screen)
+    return Verdict.deferred(_LATER, theorem="holds", _shown=shown)
+
+
+_LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: margins_of(*verdict._shown)}
