@@ -147,15 +147,6 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   return v;
 }
 
-/* From powers to Bernstein coefficients: C(k, l)/C(d, l). */
-static void fill_matrix(double *matrix, int d) {
-  for (int k = 0; k <= d; k++) {
-    matrix[k * (d + 1)] = 1.0;
-    for (int l = 1; l <= d; l++)
-      matrix[k * (d + 1) + l] = matrix[k * (d + 1) + l - 1] * (k - l + 1) / (d - l + 1);
-  }
-}
-
 /* Begin what is found with nothing. */
 static void begin_screen(hs_view *v) {
   hs_screen *const s = v->s;
@@ -172,7 +163,6 @@ static void begin_screen(hs_view *v) {
   }
   for (int64_t i = 0; i < s->run.arcs; i++) s->landing[i] = s->ending[i] = 0;
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
-  fill_matrix(v->matrix, s->run.degree);
 }
 
 int64_t hs_look(hs_screen *s, const hs_record *run, const hs_record *finer) {

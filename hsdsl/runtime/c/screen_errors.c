@@ -84,10 +84,39 @@ static double shift_by(const hs_view *v, double t) {
   return shift;
 }
 
-/* What round-off in the flow alone moves states by, over the run: to `floor`, from what it was found to be before. */
-static int round_off(hs_view *v, const double *before, double *floor) {
+/* Whether no error of a state exceeds a tenth of its largest size by more than round-off of the flow explains. */
+static int explained(const hs_view *v) {
+  const double least = hs_max(v->s->tolerance, ROUNDOFF_SHARE * HS_UNIT);
+  for (int i = 0; i < v->s->model->states; i++) {
+    const double error = hs_max(v->error[i], least * v->size[i]);
+    if (error > 0 && !(error * SAFE <= v->size[i]) && !(error <= SAFE * v->floor[i])) return 0;
+  }
+  return 1;
+}
+
+/* What round-off of the flow at a row moves states by, over the run: to `floor`, from what it was found to be before; 0
+   where that has no bound. */
+static int round_off_at(hs_view *v, int64_t row, const double *before) {
+  const hs_record *const run = &v->s->run;
+  const double span = run->times[run->rows - 1] - run->times[0], unit = ROUNDOFF_SHARE * HS_UNIT;
+  const double t = run->times[row], *x = recorded_row(run, row);
+  v->range[0] = outwards(t - unit * fabs(t), t + unit * fabs(t), 0x1p-52);
+  for (int i = 0; i < v->n; i++) {
+    const double wide = unit * fabs(x[i]) + before[v->table->state[i]];
+    v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
+  }
+  range_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->range);
+  for (int i = 0; i < v->n; i++) {
+    const hs_range f = v->range[v->f->flow.result[i]];
+    if (!hs_finite(f.high - f.low)) return 0;
+    grow(&v->floor[v->table->state[i]], span * (f.high - f.low));
+  }
+  return 1;
+}
+
+/* The same at places all along the run, until all errors are explained. */
+static int round_off(hs_view *v, const double *before) {
   const hs_screen *s = v->s;
-  const double span = s->run.times[s->run.rows - 1] - s->run.times[0], unit = ROUNDOFF_SHARE * HS_UNIT;
   for (int m = 0; m < s->model->modes; m++) {
     int64_t steps = 0, stride = 1;
     for (int pass = 0; pass < 2; pass++) {
@@ -95,50 +124,31 @@ static int round_off(hs_view *v, const double *before, double *floor) {
       for (int64_t a = 0; a < s->run.arcs; a++) {
         if (s->run.arc[a].mode != m || !takes_time(&s->run, a)) continue;
         for (int64_t row = s->run.arc[a].first; row < last_row(&s->run, a); row++) {
-          const double t = s->run.times[row], *x = recorded_row(&s->run, row);
-          if (!(s->run.times[row + 1] > t)) continue;
+          if (!(s->run.times[row + 1] > s->run.times[row])) continue;
           if (pass == 0 || number++ % stride) {
             steps += pass == 0;
             continue;
           }
-          bind(v, m, segment_at(s->timeline, t));
-          v->range[0] = outwards(t - unit * fabs(t), t + unit * fabs(t), 0x1p-52);
-          for (int i = 0; i < v->n; i++) {
-            const double wide = unit * fabs(x[i]) + before[v->table->state[i]];
-            v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
-          }
-          range_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->range);
-          for (int i = 0; i < v->n; i++) {
-            const hs_range f = v->range[v->f->flow.result[i]];
-            if (!hs_finite(f.high - f.low)) return 1;
-            grow(&floor[v->table->state[i]], span * (f.high - f.low));
-          }
+          bind(v, m, segment_at(s->timeline, s->run.times[row]));
+          if (!round_off_at(v, row, before)) return 0;
+          if (explained(v)) return 1;
         }
       }
       stride = steps / PLACES > 1 ? steps / PLACES : 1;
     }
   }
-  return 0;
+  return 1;
 }
 
 /* Whether the error of a state exceeds a tenth of its largest size, and is more than round-off of the flow explains. */
 static int outgrown(hs_view *v) {
-  const double least = hs_max(v->s->tolerance, ROUNDOFF_SHARE * HS_UNIT);
   const int states = v->s->model->states;
   double *const floor = v->floor, *const before = v->floor + states;
-  int any = 0;
-  for (int i = 0; i < states; i++) {
-    const double error = hs_max(v->error[i], least * v->size[i]);
-    any |= error > 0 && !(error * SAFE <= v->size[i]);
-    floor[i] = 0.0;
-  }
-  for (int round = 0; any && round < 3; round++) {
+  for (int i = 0; i < states; i++) floor[i] = 0.0;
+  for (int round = 0; round < 3; round++) {
+    if (explained(v)) return 0;
     copy(before, floor, states);
-    if (round_off(v, before, floor)) return 1;
+    if (!round_off(v, before)) return 1;
   }
-  for (int i = 0; i < states; i++) {
-    const double error = hs_max(v->error[i], least * v->size[i]);
-    if (error > 0 && !(error * SAFE <= v->size[i]) && !(error <= SAFE * floor[i])) return 1;
-  }
-  return 0;
+  return !explained(v);
 }

@@ -5,7 +5,7 @@
 
 /* How far the enclosed flow and the derivatives of states lie beyond each other on a part, and how far these vary. */
 static double flow_beyond(const hs_view *v, int level, int i, double width, double *varies) {
-  const int d = v->s->run.degree;
+  const int d = v->degree;
   const double *const b = coefficients_at(v, level) + i * (d + 1);
   double below = INFINITY, above = -INFINITY;
   for (int k = 0; k < d; k++) below = hs_min(below, b[k + 1] - b[k]), above = hs_max(above, b[k + 1] - b[k]);
@@ -32,7 +32,7 @@ static void look_at_piece(hs_view *v, int64_t row, double share, double *change)
   v->range[0] = outwards(t - length * SHORT / 2, t + length * SHORT / 2, 0x1p-52);
   for (int i = 0; i < v->n; i++) {
     double at = 0.0, slope = 0.0;
-    for (int k = run->degree - 1; k >= 0; k--) {
+    for (int k = v->degree - 1; k >= 0; k--) {
       slope = slope * share + (k + 1) * c[k * run->width + i];
       at = at * share + c[k * run->width + i];
     }
@@ -85,29 +85,13 @@ static int flow_open(hs_view *v, int64_t row, int level, double start, double wi
   return 0;
 }
 
-/* Expand the slope of a state and the state itself around the middle of a step. Sums are of powers of 1 + u. */
-static hs_expansion expand_state(const hs_view *v, int64_t row, int i, double half, hs_expansion *slope) {
-  const hs_record *const run = &v->s->run;
-  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i];
-  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, rest = 0.0, power = ldexp(1.0, -run->degree), at = 0.0;
-  for (int k = run->degree; k > 0; k--, power *= 2) {
-    const double term = c[(k - 1) * run->width] * power;
-    rest = 2 * rest + fabs(third);
-    third += second, second += first, first += value, value += k * term;
-    at += term;
-  }
-  rest += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANDED;
-  *slope = expansion(value / half, first / half, second / half, third / half, rest / half, 0.0);
-  rest = fabs(third) / 4 + rest / 5 + fabs(x + at) * EXPANDED;
-  return expansion(x + at, value, first / 2, second / 3, rest, fabs(value));
-}
-
 /* Expand the flow along a step: how far it may be from the slopes of the states there, and what these show. An eighth
    of that is no pulse. */
 static void expand_flow(hs_view *v, int64_t row) {
   const double begin = v->s->run.times[row], half = (v->s->run.times[row + 1] - begin) / 2;
   v->around[0] = expansion(begin + half, half, 0.0, 0.0, 0.0, half);
   for (int i = 0; i < v->n; i++) v->around[1 + i] = expand_state(v, row, i, half, &v->slopes[i]);
+  v->expanded = 1;
   expand_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->around);
   for (int i = 0; i < v->n; i++) {
     const hs_expansion flow = v->around[v->f->flow.result[i]], slope = v->slopes[i];

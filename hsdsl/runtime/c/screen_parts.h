@@ -1,4 +1,5 @@
-/* Parts of a recorded step: boxes that hold the states there, from the Bernstein coefficients of its polynomial. */
+/* Parts of a recorded step: boxes that hold the states there, from expansions of its polynomial, or from its Bernstein
+   coefficients, which are sharper and take longer. */
 
 #ifndef HS_SCREEN_PARTS_H
 #define HS_SCREEN_PARTS_H
@@ -18,11 +19,22 @@ static double *coefficients_at(const hs_view *v, int level) {
   return v->bernstein + level * (int64_t)(v->s->run.degree + 1) * v->s->model->width;
 }
 
+/* From powers to Bernstein coefficients: C(k, l)/C(d, l). */
+static void fill_matrix(hs_view *v) {
+  const int d = v->filled = v->degree;
+  for (int k = 0; k <= d; k++) {
+    v->matrix[k * (d + 1)] = 1.0;
+    for (int l = 1; l <= d; l++)
+      v->matrix[k * (d + 1) + l] = v->matrix[k * (d + 1) + l - 1] * (k - l + 1) / (d - l + 1);
+  }
+}
+
 /* Bernstein coefficients of the states along a whole step. */
 static void whole_step(hs_view *v, int64_t row) {
   const double *x = recorded_row(&v->s->run, row), *c = recorded_piece(&v->s->run, row);
-  const int d = v->s->run.degree, w = v->s->run.width;
+  const int d = v->degree, w = v->s->run.width;
   double *b = coefficients_at(v, 0);
+  if (v->filled != d) fill_matrix(v);
   for (int i = 0; i < v->n; i++, b += d + 1)
     for (int k = 0; k <= d && v->cut[i]; k++) {
       b[k] = x[i];
@@ -33,7 +45,7 @@ static void whole_step(hs_view *v, int64_t row) {
 
 /* Those of the first half of a part, at the next level; those of the second half take its place. Then of that half. */
 static void take_half(hs_view *v, int level, int second) {
-  const int d = v->s->run.degree;
+  const int d = v->degree;
   double *whole = coefficients_at(v, level), *part = coefficients_at(v, level + 1);
   for (int i = 0; i < v->n; i++, whole += d + 1, part += d + 1) {
     if (!v->cut[i]) continue;
@@ -51,7 +63,7 @@ static void take_half(hs_view *v, int level, int second) {
 /* The box that a part of a step lies in, states moved by so many errors. */
 static void set_part(hs_view *v, int64_t row, int level, double start, double width, double errors) {
   const double *times = v->s->run.times, *b = coefficients_at(v, level);
-  const int d = v->s->run.degree;
+  const int d = v->degree;
   set_times(v, times[row], times[row + 1] - times[row], start, width);
   for (int i = 0; i < v->n; i++, b += d + 1) {
     if (!v->cut[i]) continue;
@@ -59,6 +71,59 @@ static void set_part(hs_view *v, int64_t row, int level, double start, double wi
     for (int k = 1; k <= d; k++) low = hs_min(low, b[k]), high = hs_max(high, b[k]);
     set_box(v, low, high, i, errors * v->own[i]);
   }
+}
+
+/* Expand the slope of a state and the state itself around the middle of a step. Sums are of powers of 1 + u. */
+static hs_expansion expand_state(const hs_view *v, int64_t row, int i, double half, hs_expansion *slope) {
+  const hs_record *const run = &v->s->run;
+  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i];
+  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, rest = 0.0, at = 0.0;
+  double power = ldexp(1.0, -v->degree), further = 1 / power; /* what is left of u**4 and beyond is doubled that often */
+  for (int k = v->degree; k > 0; k--, power *= 2) {
+    const double term = c[(k - 1) * run->width] * power;
+    rest += (further *= 0.5) * fabs(third);
+    third += second, second += first, first += value, value += k * term;
+    at += term;
+  }
+  rest += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANDED;
+  *slope = expansion(value / half, first / half, second / half, third / half, rest / half, 0.0);
+  rest = fabs(third) / 4 + rest / 5 + fabs(x + at) * EXPANDED;
+  return expansion(x + at, value, first / 2, second / 3, rest, fabs(value));
+}
+
+/* Expand the states that are cut. */
+static void expand_cut(hs_view *v, int64_t row) {
+  const double *const times = v->s->run.times, half = (times[row + 1] - times[row]) / 2;
+  v->looks = 0;
+  for (int i = 0; i < v->n && !v->expanded; i++)
+    if (v->cut[i]) v->around[1 + i] = expand_state(v, row, i, half, &v->slopes[i]);
+}
+
+/* The box of the same, from expansions. */
+static void set_expanded_part(hs_view *v, int64_t row, double start, double width, double errors) {
+  const double *const times = v->s->run.times, m = 2 * start + width - 1;
+  set_times(v, times[row], times[row + 1] - times[row], start, width);
+  for (int i = 0; i < v->n; i++) {
+    if (!v->cut[i]) continue;
+    const hs_expansion a = v->around[1 + i];
+    const double bend = (a.second + 3 * m * a.third) * (width * width) / 2;
+    const double middle = a.value + m * (a.first + m * (a.second + m * a.third)) + bend;
+    const double slope = a.first + m * (2 * a.second + 3 * m * a.third);
+    const double wide = width * (fabs(slope) + width * width * fabs(a.third)) + fabs(bend) + a.rest;
+    set_box(v, middle - wide, middle + wide, i, errors * v->own[i] + size_of(a) * EXPANDED);
+  }
+}
+
+/* Look at one half of a part. */
+static void set_half(hs_view *v, int64_t row, int level, int half, double start, double width, double errors) {
+  const double from = start + half * width / 2;
+  v->looks++;
+  if (v->coarse) {
+    set_expanded_part(v, row, from, width / 2, errors);
+    return;
+  }
+  take_half(v, level, half);
+  set_part(v, row, level + 1, from, width / 2, errors);
 }
 
 #endif

@@ -46,7 +46,7 @@ static int leave_out(hs_view *v, const hs_companion *c) {
   double *const e = c->moved, *const beyond = v->enough, *const there = v->own;
   for (int i = 0; i < v->n; i++) {
     double slope = 0.0;
-    for (int k = run->degree - 1; k >= 0; k--) slope += (k + 1) * piece[k * run->width + i];
+    for (int k = v->degree - 1; k >= 0; k--) slope += (k + 1) * piece[k * run->width + i];
     there[i] = v->rounded[v->f->flow.result[i]].value;
     e[i] = (c->h * there[i] - slope) / order;
     beyond[i] = x[i] + e[i];
@@ -59,6 +59,7 @@ static int leave_out(hs_view *v, const hs_companion *c) {
 /* Find where the companion is at the end of the run's step, to y, moved by what the run leaves out, and further away by
    what round-off of the flow may do, `noise`. */
 static int expand_step(hs_view *v, hs_companion *c) {
+  take_step(v, c->row);
   const double *const x = recorded_row(&v->s->run, c->row + 1);
   if (!expand_companion(v, c) || !leave_out(v, c)) return 0;
   for (int i = 0; i < v->n; i++) {

@@ -56,9 +56,8 @@ static int halves_close(hs_view *v, int64_t row, int level, double start, double
   if (level == LEVELS) return 1;
   for (int half = 0; half < 2; half++) {
     const double from = start + half * width / 2;
-    take_half(v, level, half);
-    set_part(v, row, level + 1, from, width / 2, SAFE);
-    if (++v->looks > MOST_LOOKS) return 1;
+    set_half(v, row, level, half, start, width, SAFE);
+    if (v->looks > (v->coarse ? COARSE_LOOKS : MOST_LOOKS)) return 1;
     if (turns_close(v, v->open + level * most, v->open + (level + 1) * most) &&
         halves_close(v, row, level + 1, from, width / 2))
       return 1;
@@ -70,7 +69,7 @@ static int halves_close(hs_view *v, int64_t row, int level, double start, double
 static int turns_along(hs_view *v, int64_t row) {
   const hs_record *run = &v->s->run;
   const double *x = recorded_row(run, row), *c = recorded_piece(run, row);
-  const int d = run->degree, w = run->width, m = v->table->surfaces;
+  const int d = v->degree, w = run->width, m = v->table->surfaces;
   if (!m) return 0;
   for (int i = 0; i < v->n; i++) {
     double total = 0.0, size = 0.0;
@@ -81,8 +80,12 @@ static int turns_along(hs_view *v, int64_t row) {
   for (int k = 0; k < m; k++) v->open[v->s->model->surfaces + k] = 1;
   if (!turns_close(v, v->open + v->s->model->surfaces, v->open)) return 0;
   cut_few(v, v->open);
-  whole_step(v, row);
-  return halves_close(v, row, 0, 0.0, 1.0);
+  for (v->coarse = 1; v->coarse >= 0; v->coarse--) {
+    if (!v->coarse) whole_step(v, row);
+    else expand_cut(v, row);
+    if (!halves_close(v, row, 0, 0.0, 1.0)) return 0;
+  }
+  return 1;
 }
 
 /* Whether an edge's surface may be passed although its `if` is false, along a step. */
@@ -115,8 +118,10 @@ static void look_at_step(hs_view *v, int64_t row, int *known) {
     *known = 0;
     return;
   }
-  if (turns_along(v, row)) s->turning[row] = 1, s->doubts |= DOUBT(HS_TURNING);
+  take_step(v, row);
+  v->expanded = 0;
   if (flow_hides(v, row)) s->changing[row] = 1, s->doubts |= DOUBT(HS_FLOW_CHANGE);
+  if (turns_along(v, row)) s->turning[row] = 1, s->doubts |= DOUBT(HS_TURNING);
   if (!(s->doubts & DOUBT(HS_TRANSPARENT)) && passes(v, row)) s->doubts |= DOUBT(HS_TRANSPARENT);
   if (!*known) all_rates(v, s->run.times[row], recorded_row(&s->run, row), v->at_start);
   all_rates(v, end, recorded_row(&s->run, row + 1), v->at_end);

@@ -13,6 +13,7 @@
 #define LEVELS 10           /* a step is cut in halves */
 #define END_LEVELS 6        /* the part at its end, where a surface is crossed */
 #define MOST_LOOKS 128      /* at parts of one step */
+#define COARSE_LOOKS 16     /* likewise, by expansions of the states */
 #define RESOLVED 8          /* the flow is as it seems where it varies by so much more, or moves by so many errors */
 #define SHORT 0x1p-10      /* of a step: a piece that shows how fast enclosures of the flow widen */
 #define PLACES 64           /* of a mode where the round-off of its flow is looked at */
@@ -32,6 +33,7 @@ typedef struct {
   const double *p;
   int64_t segment, arc, last, fine_row, fine_arc;
   int mode, n, crossed;
+  int degree, filled; /* of the step that is looked at, without coefficients that are zero; and of the matrix */
   double *error, *size, *floor, *late; /* of all states; of each transition */
   double *lines; /* series of the companion */
   double *noise; /* what round-off of the flow may do in a step of the companion */
@@ -45,6 +47,7 @@ typedef struct {
   double *enough, *missed; /* how wrong states were where each mode's nearest miss is */
   int *open, *unseen;
   int *cut; /* whether a state is, where a step is cut in halves */
+  int expanded, coarse; /* whether all states are expanded along the step, and whether parts are of expansions */
   hs_range *range;
   hs_rounded *rounded;
   hs_expansion *around, *slopes;
@@ -80,6 +83,15 @@ static const double *recorded_piece(const hs_record *run, int64_t row) {
   return run->pieces + row * run->degree * run->width;
 }
 static const double *recorded_row(const hs_record *run, int64_t row) { return run->values + row * run->width; }
+
+/* Look at the step from a row: some states, as those of a fall, need few powers. */
+static void take_step(hs_view *v, int64_t row) {
+  const double *const c = recorded_piece(&v->s->run, row);
+  const int w = v->s->run.width;
+  for (v->degree = v->s->run.degree; v->degree > 1; v->degree--)
+    for (int i = 0; i < v->n; i++)
+      if (c[(v->degree - 1) * w + i] != 0.0) return;
+}
 
 /* The polynomial of the step from a row at a share of it. */
 static void along_step(const hs_view *v, const hs_record *run, int64_t row, double share, double *to) {
