@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Literal
 
 from hsdsl.parts import Part
-from hsdsl.sparsity import Elimination, elimination
+from hsdsl.sparsity import Elimination, Variation, elimination, variation
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
 JUMPS = re.compile(r"\b(?:sign|floor|atan2|select)\(")
@@ -148,17 +148,28 @@ class Jacobian:
     """Derivatives of a mode's flow by its states: of n * n, row by row, those that are not zero everywhere.
 
     ``routines`` has one routine, ``jacobian``, called like those of a mode, for the values at ``places``. ``order`` is
-    that in which implicit steps eliminate the states; none where they solve dense systems.
+    that in which implicit steps eliminate the states; none where they solve dense systems. Where states are
+    derivatives of others, ``varied`` has for each column those of the first ``own`` that it has derivatives of, and
+    ``own_order`` is the order of these.
     """
 
     routines: Routines
     places: tuple[int, ...]
+    n: int
     order: tuple[int, ...] = ()
+    own: int = 0
+    varied: tuple[tuple[int, ...], ...] = ()
+    own_order: tuple[int, ...] = ()
 
     @property
     def elimination(self) -> Elimination | None:
         """The pattern of a sparse elimination."""
         return elimination(self.places, self.order) if self.order else None
+
+    @property
+    def variation(self) -> Variation | None:
+        """The blocks of a system with derivatives of its states."""
+        return variation(self.places, self.n, self.own, self.varied, self.own_order) if self.varied else None
 
 
 @dataclass(frozen=True)

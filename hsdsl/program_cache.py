@@ -30,7 +30,10 @@ from hsdsl.program import Program
 KIND = "programs"
 _PACKAGE = Path(__file__).parent
 # what a program depends on, besides the modules of the package itself
-_READERS = ("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model")
+_READERS = (
+    *("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model"),
+    "sensitivity",
+)
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
 Row = list[Any]

@@ -1,8 +1,8 @@
-"""The pattern of a sparse elimination: which entries the factors of c I - h J have, for the places of J's entries.
+"""Patterns of the matrices c I - h J: which entries their factors have, and which of their blocks are equal.
 
-Rows and columns are taken in one order, pivots are the diagonal ones, and the pattern is symmetric: the matrices of an
-implicit step tend to a multiple of the identity as the step becomes short. See T. A. Davis, Direct Methods for Sparse
-Linear Systems, SIAM 2006, Ch. 4 (doi:10.1137/1.9780898718881).
+In a sparse elimination rows and columns are taken in one order, pivots are the diagonal ones, and the pattern is
+symmetric: the matrices of an implicit step tend to a multiple of the identity as the step becomes short. See T. A.
+Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, Ch. 4 (doi:10.1137/1.9780898718881).
 """
 
 from __future__ import annotations
@@ -70,6 +70,85 @@ def elimination(places: tuple[int, ...], order: tuple[int, ...]) -> Elimination:
         place=[where[position[k // n]][position[k % n]] for k in places],
         own=own,
     )
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The blocks of J where states are derivatives of others: x' = f(x), and S' = f_x S + f_p for each column S.
+
+    J is f_x for x and again for each column, next to which it has how f_x S + f_p varies with x. So the factors of
+    c I - h f_x serve every column: each is a right-hand side more. What does not flow has no equation.
+
+    Attributes
+    ----------
+    own : int
+        How many states x has; they are the first ones.
+    columns : list of int
+        Where each column begins, and where the last one ends: behind it states do not flow.
+    rows : list of int
+        For each state of a column, from ``columns[0]`` on, which state of x it is the derivative of.
+    entries : int
+        How many entries of J are those of f_x for x; they are the first ones.
+    links : list of int
+        The entries of J that are derivatives of a column by x.
+    linked, linking : list of int
+        For each of them which state it is the derivative of, and by which.
+    itself : list of int
+        For each state which entry of J is the derivative of its flow by itself, -1 for none.
+    groups : list of int
+        Numbers of states of x that depend on each other, where f_x is dense. Rows of one group exchange places in an
+        elimination, and no others: what no other group moves stays exactly zero.
+    elimination : Elimination, optional
+        The pattern for f_x, where it is sparse.
+    """
+
+    own: int
+    columns: list[int]
+    rows: list[int]
+    entries: int
+    links: list[int]
+    linked: list[int]
+    linking: list[int]
+    itself: list[int]
+    groups: list[int]
+    elimination: Elimination | None
+
+
+@lru_cache(maxsize=64)
+def variation(
+    places: tuple[int, ...], n: int, own: int, varied: tuple[tuple[int, ...], ...], order: tuple[int, ...]
+) -> Variation:
+    """The blocks of J with entries at ``places``; ``varied`` has for each column the states of x it has derivatives of.
+
+    ``order`` is that in which f_x is eliminated, empty where it is dense.
+    """
+    inside = [k for k in places if k // n < own]
+    links = [index for index, k in enumerate(places) if k // n >= own > k % n]
+    itself = {k // n: index for index, k in enumerate(places) if k // n == k % n}
+    return Variation(
+        own=own,
+        columns=list(accumulate(map(len, varied), initial=own)),
+        rows=[row for column in varied for row in column],
+        entries=len(inside),
+        links=links,
+        linked=[places[index] // n for index in links],
+        linking=[places[index] % n for index in links],
+        itself=[itself.get(i, -1) for i in range(n)],
+        groups=[] if order else _groups([(k // n, k % n) for k in inside], own),
+        elimination=elimination(tuple(k // n * own + k % n for k in inside), order) if order else None,
+    )
+
+
+def _groups(places: Sequence[tuple[int, int]], n: int) -> list[int]:
+    """For each unknown the first one that it depends on, through others or not, and that depends on it."""
+    reached = [1 << i for i in range(n)]
+    for i, j in places:
+        reached[i] |= 1 << j
+    for k in range(n):
+        for i in range(n):
+            if reached[i] >> k & 1:
+                reached[i] |= reached[k]
+    return [next(j for j in range(n) if reached[i] >> j & reached[j] >> i & 1) for i in range(n)]
 
 
 def filled(places: Sequence[tuple[int, int]], n: int) -> int:

@@ -165,7 +165,9 @@ class Mode:
     has the numbers of the system's shapes, one shape behind the other.
     ``slides`` names the two modes between which a mode of a completion slides. A final mode without flow has
     ``states == ()`` here: it has the states it is entered with. The last ``derived`` states are derivatives of the
-    others, and the flow's Jacobian leaves out how they depend on these.
+    others, and the flow's Jacobian leaves out how they depend on these unless ``varied`` has them: for each column, the
+    numbers of the states that it has derivatives of. What follows the last column does not flow, and no
+    flow depends on it.
     The states before the last, one for each number in ``measured``, take the slopes of the states with these numbers
     where a step by an implicit method ends; the last state is then 1.
     """
@@ -181,6 +183,7 @@ class Mode:
     slides: tuple[str, str] | None = None
     scene: tuple[sp.Expr | None, ...] = ()
     derived: int = 0
+    varied: tuple[tuple[int, ...], ...] = ()
     measured: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:

@@ -44,8 +44,10 @@ class Factors:
         return found
 
 
-def factored(matrix: Matrix, scales: Sequence[Number] | None = None) -> Factors:
+def factored(matrix: Matrix, scales: Sequence[Number] | None = None, groups: Sequence[int] | None = None) -> Factors:
     """Factor a square matrix; its rows, as its columns, belong to unknowns of these scales, all alike where left out.
+
+    Only rows of one of the ``groups`` exchange places; left out, all rows do.
 
     Raises
     ------
@@ -55,7 +57,8 @@ def factored(matrix: Matrix, scales: Sequence[Number] | None = None) -> Factors:
     rows, order = [list(row) for row in matrix], list(range(len(matrix)))
     scales = scales or [1] * len(rows)
     for k in range(len(rows)):
-        pivot = _pivot([abs(rows[i][k]) for i in range(k, len(rows))], [scales[i] for i in order[k:]]) + k
+        among = _among(k, len(rows), groups)
+        pivot = among[_pivot([abs(rows[i][k]) for i in among], [scales[order[i]] for i in among])]
         rows[k], rows[pivot], order[k], order[pivot] = rows[pivot], rows[k], order[pivot], order[k]
         upper = rows[k]
         if not abs(upper[k]) > 0:
@@ -67,6 +70,11 @@ def factored(matrix: Matrix, scales: Sequence[Number] | None = None) -> Factors:
                 for j in range(k + 1, len(row)):
                     row[j] = row[j] - row[k] * upper[j]
     return Factors(rows, order)
+
+
+def _among(k: int, n: int, groups: Sequence[int] | None) -> Sequence[int]:
+    """The rows that may be the pivot's for column k."""
+    return [i for i in range(k, n) if groups[i] == groups[k]] if groups else range(k, n)
 
 
 def _pivot(column: Vector, scales: Vector) -> int:
@@ -109,7 +117,9 @@ class ComplexFactors:
             b[i] = b[i] - (c * b[j] + d * a[j])
 
 
-def factored_complex(real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None) -> ComplexFactors:
+def factored_complex(
+    real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None, groups: Sequence[int] | None = None
+) -> ComplexFactors:
     """Factor a square matrix of complex numbers; the size of a pivot is the sum of its parts' sizes.
 
     Raises
@@ -121,7 +131,8 @@ def factored_complex(real: Matrix, imaginary: Matrix, scales: Sequence[Number] |
     n = len(order)
     scales = scales or [1] * n
     for k in range(n):
-        pivot = _pivot([abs(re[i][k]) + abs(im[i][k]) for i in range(k, n)], [scales[i] for i in order[k:]]) + k
+        among = _among(k, n, groups)
+        pivot = among[_pivot([abs(re[i][k]) + abs(im[i][k]) for i in among], [scales[order[i]] for i in among])]
         for rows in (re, im):
             rows[k], rows[pivot] = rows[pivot], rows[k]
         order[k], order[pivot] = order[pivot], order[k]

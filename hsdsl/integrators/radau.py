@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.integrators.blocks import BlockFactors, ComplexBlockFactors, linked
 from hsdsl.integrators.collocation import coefficients
 from hsdsl.integrators.implicit import RADAU as RADAU
 from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
@@ -26,7 +27,7 @@ from hsdsl.integrators.scales import resolved, rows_of
 from hsdsl.integrators.sparse import ComplexSparseFactors, SparseFactors, sparse_factored, sparse_factored_complex
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
 from hsdsl.kernel import Routine
-from hsdsl.sparsity import Elimination
+from hsdsl.sparsity import Elimination, Variation
 
 
 def radau_stepper(
@@ -37,16 +38,18 @@ def radau_stepper(
     smooth: bool = True,
     pattern: Elimination | None = None,
     measured: Sequence[int] = (),
+    varied: Variation | None = None,
 ) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
 
     ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump;
-    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode.
+    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
+    derivatives of others.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern, measured)
+    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern, measured, varied)
 
     def error(h: Number, stages: Stages, end: State) -> State:
         return stages[3]
@@ -54,7 +57,8 @@ def radau_stepper(
     return Stepper(RADAU.name, steps.step, steps.piece, error, landing=steps.landing, scales=steps.scales)
 
 
-_Both = tuple[Factors | SparseFactors, ComplexFactors | ComplexSparseFactors]
+_Plain = tuple[Factors | SparseFactors, ComplexFactors | ComplexSparseFactors]
+_Both = _Plain | tuple[BlockFactors, ComplexBlockFactors]
 
 
 class Steps:
@@ -75,8 +79,10 @@ class Steps:
         smooth: bool = True,
         pattern: Elimination | None = None,
         measured: Sequence[int] = (),
+        varied: Variation | None = None,
     ) -> None:
-        self._pattern, self._measured = pattern, measured
+        self._pattern, self._varied = varied.elimination if varied else pattern, varied
+        self._measured = measured
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
         self._largest, self._smooth = scales, smooth
         self._scales, self._floors = scales, list[Number]()
@@ -175,13 +181,23 @@ class Steps:
             self._factored_for = h
             self.factorings += 1
             try:
-                self._factors = self._dense(h, self._rows) if self._pattern is None else self._sparse(h, self._pattern)
+                self._factors = self._blocks(h, self._rows)
             except Singular as problem:
                 self._factors = None
                 raise NoConvergence(str(problem)) from None
         return self._factors
 
-    def _dense(self, h: Number, rows: Matrix) -> _Both:
+    def _blocks(self, h: Number, rows: Matrix) -> _Both:
+        """Factor what the states have, and their derivatives share."""
+        of = self._varied
+        own = rows if of is None else [row[: of.own] for row in rows[: of.own]]
+        real, turning = self._dense(h, own) if self._pattern is None else self._sparse(h, self._pattern)
+        if of is None:
+            return real, turning
+        links = linked(of, h, rows)
+        return BlockFactors(of, links, real), ComplexBlockFactors(of, links, turning)
+
+    def _dense(self, h: Number, rows: Matrix) -> _Plain:
         known, zero, n = self._known, self._arithmetic.zero, len(rows)
         real = [[-h * d for d in row] for row in rows]
         shifted = [list(row) for row in real]
@@ -190,9 +206,10 @@ class Steps:
             real[i][i] = known.gamma + real[i][i]
             shifted[i][i] = known.alpha + shifted[i][i]
             turned[i][i] = -known.beta
-        return factored(real, self._largest), factored_complex(shifted, turned, self._largest)
+        groups = self._varied.groups if self._varied else None
+        return factored(real, self._largest, groups), factored_complex(shifted, turned, self._largest, groups)
 
-    def _sparse(self, h: Number, pattern: Elimination) -> _Both:
+    def _sparse(self, h: Number, pattern: Elimination) -> _Plain:
         """Factor the same matrices in the pattern of a sparse elimination."""
         assert self._rows is not None
         known, zero = self._known, self._arithmetic.zero

@@ -250,18 +250,23 @@ class LoweredMode:
         return residual.is_polynomial(*own)
 
     def _jacobian(self) -> lowered.Jacobian:
-        """The derivatives of the flow; of derived states by derived ones alone: the others would be second ones."""
-        own, width = len(self.states) - self.mode.derived, len(self.states)
+        """The derivatives of the flow; of derived states, unless varied, by derived ones alone, and no second ones."""
+        varied, width = self.mode.varied, len(self.states)
+        own = width - self.mode.derived
         parts = (
             (0, Gradient(self.flow[:own], self.states)),
-            (own, Gradient(self.flow[own:], self.states[own:], letter="h")),
+            (own, Gradient(self.flow[own:], self.states[0 if varied else own :], letter="h")),
         )
         column = {state: i for i, state in enumerate(self.states)}
         rows = [(k, row) for first, part in parts for k, row in enumerate(part.sparse, first)]
         places = tuple(k * width + column[state] for k, row in rows for state in row)
         values = tuple(slope for _, row in rows for slope in row.values())
         definition = Definition("jacobian", self.arguments, values, [s for _, part in parts for s in part.statements])
-        return lowered.Jacobian(print_routines((definition,), self.names.data), places, ordering(places, width))
+        routines, order = print_routines((definition,), self.names.data), ordering(places, width)
+        if not varied:
+            return lowered.Jacobian(routines, places, width, order)
+        inside = [k // width * own + k % width for k in places if k // width < own]
+        return lowered.Jacobian(routines, places, width, order, own, varied, ordering(inside, own))
 
     def _diagnosis(self, expressions):
         for k, result in enumerate(self.place(expressions)):

@@ -29,6 +29,7 @@ FLAGS = (
     "-fno-math-errno",
     "-fopenmp-simd",  # loops over the states of an implicit step, two or more at once
     "-DHS_LANES",
+    "-DHS_COLUMNS",  # implicit steps of systems with derivatives, which exports do without
     *(f"-fno-builtin-{name}" for name in (*EXACT, "exp", "log", "pow", "atan2")),  # those of the library, as Python's
     "-fPIC",
     "-fvisibility=hidden",

@@ -118,7 +118,7 @@ class _Writer:
     def _states(self, mode: str, names: Sequence[str]) -> Iterator[str]:
         """The states of a mode: the model's, their derivatives, those of the last transition's time."""
         yield from names
-        yield from (derivative_name(x, self.labels[k]) for x, k in self._pairs(mode, names))
+        yield from (derivative_name(x, self.labels[k]) for k, x in self._pairs(mode, names))
         yield from (shift_name(self.labels[k]) for k in self._shifting(mode))
         if self.entries:
             yield LAST
@@ -141,8 +141,15 @@ class _Writer:
             for x, f in zip(mode.states, mode.flow, strict=True)
         ]
 
-    def _pairs(self, mode: str, names: Sequence[str]) -> list[tuple[str, int]]:
-        return [(x, k) for x in names for k in self.columns if (mode, x, k) in self.dependence.states]
+    def _pairs(self, mode: str, names: Sequence[str]) -> list[tuple[int, str]]:
+        """The derivatives that a mode has, column by column."""
+        return [(k, x) for k in self.columns for x in names if (mode, x, k) in self.dependence.states]
+
+    def _varied(self, mode: Mode) -> Iterator[tuple[int, ...]]:
+        pairs = self._pairs(mode.name, mode.states)
+        for k in self.columns if self.implicit else ():
+            if column := tuple(mode.states.index(x) for j, x in pairs if j == k):
+                yield column
 
     def _shifting(self, mode: str) -> list[int]:
         return [k for k in self.columns if (mode, k) in self.dependence.times]
@@ -151,20 +158,21 @@ class _Writer:
         """A derivative at a fixed time: g_x S + g_p."""
         moved = (
             (symbol(x), symbol(derivative_name(x, self.labels[k])))
-            for x, j in self._pairs(mode.name, mode.states)
+            for j, x in self._pairs(mode.name, mode.states)
             if j == k
         )
         return sp.Add(*(row.get(x, sp.S.Zero) * s for x, s in moved), self.of.by(row, k))
 
     def _mode(self, mode: Mode) -> Mode:
         rows = dict(zip(mode.states, self.dependence.flows[mode.name], strict=True))
-        derivatives = [self._total(rows[x], mode, k) for x, k in self._pairs(mode.name, mode.states)]
+        derivatives = [self._total(rows[x], mode, k) for k, x in self._pairs(mode.name, mode.states)]
         states = tuple(self._states(mode.name, mode.states)) if mode.states else ()
         still = [sp.S.Zero] * (len(states) - len(mode.flow) - len(derivatives))
         jumps = self.dependence.jumps[mode.name]
         return replace(
             mode,
-            derived=0 if self.implicit else len(states) - len(mode.states),
+            derived=len(states) - len(mode.states),
+            varied=tuple(self._varied(mode)),
             measured=tuple(map(mode.states.index, self._measured(mode.name))) if mode.states else (),
             states=states,
             flow=(*mode.flow, *derivatives, *still),
@@ -195,7 +203,7 @@ class _Writer:
             x: self.of.along(row, mode, slopes) - after[x] if leap != 0 else leap for x, (row, leap) in rows.items()
         }
         derivatives = [
-            self._total(rows[x][0], mode, k) + leaps[x] * shifts[k] for x, k in self._pairs(entered, edge.target_states)
+            self._total(rows[x][0], mode, k) + leaps[x] * shifts[k] for k, x in self._pairs(entered, edge.target_states)
         ]
         states = tuple(self._states(entered, edge.target_states))
         further = (*derivatives, *(shifts[k] for k in self._shifting(entered)), *([TIME] if self.entries else []))

@@ -66,7 +66,7 @@ class Run(Problem):
             return taylor_stepper(method, series, self.arithmetic)
         jacobian = self.kernel.jacobian(mode, here.segment.data)
         smooth, scales = not here.mode.jumps, here.arc.scales
-        own = here.mode.jacobian.elimination, here.mode.measured
+        own = here.mode.jacobian.elimination, here.mode.measured, here.mode.jacobian.variation
         return method.stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own)
 
     def place(

@@ -14,7 +14,8 @@ from textwrap import dedent
 from hsdsl.backends.c.printer import function_body
 from hsdsl.backends.c.routine import routine_function
 from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, surface_lines
-from hsdsl.program import EdgeProgram, Jacobian, ModeProgram, Program, Routines, Tape
+from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
+from hsdsl.sparsity import Elimination, Variation
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"^ +[px]\d+ = given\[\d+\]\n", re.MULTILINE)
@@ -104,7 +105,8 @@ def _written(program: Program) -> tuple[_Writer, str]:
         f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
         f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
         f"{len(program.outputs)}, {len(writer.data) - program.contact_count}, {program.contact_count}, "
-        f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {table}}};\n"
+        f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {varied(program)}, "
+        f"{table}}};\n"
     )
     return writer, model
 
@@ -129,6 +131,11 @@ def factors(program: Program) -> int:
     """How many entries a matrix of an implicit step has, of the mode with most."""
     found = ((m.jacobian.elimination, len(m.states)) for m in program.flows)
     return max(n * n if of is None else of.size for of, n in found)
+
+
+def varied(program: Program) -> int:
+    """How many derivatives of a flow the largest mode has whose states are derivatives of others."""
+    return max(len(m.jacobian.places) if m.jacobian.varied else 0 for m in program.flows)
 
 
 def constant_bodies(program: Program) -> dict[str, str]:
@@ -200,13 +207,14 @@ class _Writer:
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
-            self.elimination(mode.jacobian),
+            self.elimination(mode.jacobian.elimination),
             str(int(mode.affine)),
             str(int(mode.jumps)),
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
             str(len(mode.measured)),
             self.table("int", "measured", list(map(str, mode.measured))),
+            self.variation(mode.jacobian.variation),
         ]
         return f"{{{', '.join(fields)}}}"
 
@@ -214,14 +222,23 @@ class _Writer:
         """Write a routine with the places of its values."""
         return f"{{{routine}, {len(places)}, {self.table('int', 'places', list(map(str, places)))}}}"
 
-    def elimination(self, jacobian: Jacobian) -> str:
+    def elimination(self, of: Elimination | None) -> str:
         """Write the pattern of a sparse elimination."""
-        of = jacobian.elimination
         if of is None:
             return "0"
         lists = (of.order, of.start, of.column, of.diagonal, of.place, of.own)
         tables = ", ".join(self.table("int", "elimination", list(map(str, each))) for each in lists)
         return self.table("hs_elimination", "pattern", [f"{{{of.size}, {tables}}}"])
+
+    def variation(self, of: Variation | None) -> str:
+        """Write which states are derivatives of others."""
+        if of is None:
+            return "0"
+        lists = (of.columns, of.rows, of.links, of.linked, of.linking, of.itself, of.groups)
+        columns, rows, *others = (self.table("int", "variation", list(map(str, each))) for each in lists)
+        sizes = f"{of.own}, {len(of.columns) - 1}, {columns}, {rows}, {of.entries}, {len(of.links)}"
+        numbers = ", ".join((sizes, *others))
+        return self.table("hs_variation", "varied", [f"{{{numbers}, {self.elimination(of.elimination)}}}"])
 
     def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""

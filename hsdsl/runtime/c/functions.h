@@ -60,11 +60,11 @@ static hs_real root(hs_real x, int m);
 static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows);
 
 /* linear.c */
-HS_INLINE int factored(int n, hs_real *restrict a, int *restrict order, const hs_real *scales);
+HS_INLINE int factored(int n, hs_real *restrict a, int *restrict order, const hs_real *scales, const int *groups);
 HS_INLINE void solve(int n, const hs_real *restrict a, const int *restrict order, const hs_real *restrict right,
                      hs_real *restrict found);
 HS_INLINE int factored_complex(int n, hs_real *restrict re, hs_real *restrict im, int *restrict order,
-                               const hs_real *scales);
+                               const hs_real *scales, const int *groups);
 HS_INLINE void solve_complex(int n, const hs_real *restrict re, const hs_real *restrict im, const int *restrict order,
                              const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b);
 
@@ -79,9 +79,9 @@ static void sparse_solve_complex(int n, const hs_elimination *of, const hs_real 
                                  hs_real *restrict one, hs_real *restrict two);
 
 /* newton.c, and what it calls of the implicit method */
-HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h);
-HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h);
-HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h);
+HS_INLINE int iterate(hs_run *run, hs_blocks of, hs_time t, hs_real h);
+HS_INLINE int to_tolerance(hs_run *run, hs_blocks of, hs_time t, hs_real h);
+HS_INLINE int to_roundoff(hs_run *run, hs_blocks of, hs_time t, hs_real h);
 
 /* stepper.c */
 HS_INLINE int step(hs_run *run, int n, hs_time t, hs_real h);

@@ -57,6 +57,22 @@ typedef struct {
   const int *own;
 } hs_elimination;
 
+/* States that are derivatives of others: see Variation in hsdsl/sparsity.py. */
+typedef struct {
+  int own;
+  int count; /* of columns */
+  const int *columns;
+  const int *rows;
+  int entries;
+  int links;
+  const int *link;
+  const int *linked;
+  const int *linking;
+  const int *itself;
+  const int *groups;
+  const hs_elimination *elimination; /* 0 where the matrix of the own states is dense */
+} hs_variation;
+
 enum { HS_LOOKED_AT = 1, HS_HELD = 2 };
 
 typedef struct {
@@ -100,6 +116,7 @@ typedef struct {
   int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
   int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */
   const int *measured;
+  const hs_variation *variation; /* 0 where no states are derivatives of others */
 } hs_mode;
 
 typedef struct {
@@ -115,6 +132,7 @@ typedef struct {
   int states; /* of all modes, by name */
   int derivatives; /* of a flow that are not zero everywhere, of the mode with most */
   int factors; /* entries of a matrix of an implicit step, of the mode with most */
+  int varied; /* derivatives of the flow by the states, of the mode with most; 0 where none has a variation */
   const hs_mode *mode;
 } hs_model;
 

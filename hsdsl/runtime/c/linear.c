@@ -23,13 +23,15 @@ HS_INLINE int is_larger(hs_real a, hs_real of_a, hs_real b, hs_real of_b) {
 }
 
 /* Factor the matrix a of n rows in place, inverse pivots on its diagonal; not 0 where it has no inverse. `scales` are
-   those of the unknowns. */
-HS_INLINE int factored(int n, hs_real *restrict a, int *restrict order, const hs_real *scales) {
+   those of the unknowns; only rows of one of the `groups` exchange places, where these are not 0. */
+HS_INLINE int factored(int n, hs_real *restrict a, int *restrict order, const hs_real *scales, const int *groups) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
     for (int i = k + 1; i < n; i++)
-      if (is_larger(fabs(a[i * n + k]), scales[order[i]], fabs(a[pivot * n + k]), scales[order[pivot]])) pivot = i;
+      if (!(groups && groups[i] != groups[k]) &&
+          is_larger(fabs(a[i * n + k]), scales[order[i]], fabs(a[pivot * n + k]), scales[order[pivot]]))
+        pivot = i;
     exchange_rows(a, n, k, pivot);
     exchange_places(order, k, pivot);
     if (!(fabs(a[k * n + k]) > 0)) return 1;
@@ -57,13 +59,14 @@ HS_INLINE void solve(int n, const hs_real *restrict a, const int *restrict order
 
 /* The same of a complex matrix, real and imaginary parts apart; the size of a pivot is the sum of its parts' sizes. */
 HS_INLINE int factored_complex(int n, hs_real *restrict re, hs_real *restrict im, int *restrict order,
-                               const hs_real *scales) {
+                               const hs_real *scales, const int *groups) {
   for (int i = 0; i < n; i++) order[i] = i;
   for (int k = 0; k < n; k++) {
     int pivot = k;
     for (int i = k + 1; i < n; i++)
-      if (is_larger(fabs(re[i * n + k]) + fabs(im[i * n + k]), scales[order[i]],
-                    fabs(re[pivot * n + k]) + fabs(im[pivot * n + k]), scales[order[pivot]]))
+      if (!(groups && groups[i] != groups[k]) &&
+          is_larger(fabs(re[i * n + k]) + fabs(im[i * n + k]), scales[order[i]],
+                        fabs(re[pivot * n + k]) + fabs(im[pivot * n + k]), scales[order[pivot]]))
         pivot = i;
     exchange_rows(re, n, k, pivot);
     exchange_rows(im, n, k, pivot);

@@ -50,13 +50,14 @@ static int unsettled(hs_convergence *convergence) {
 }
 
 /* Iterate until what is left is a small share of the tolerance. */
-HS_INLINE int to_tolerance(hs_run *run, int n, hs_time t, hs_real h) {
+HS_INLINE int to_tolerance(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
+  const int n = of.n;
   hs_convergence *const convergence = &run->radau.convergence;
   const hs_real tolerance = run->control.tolerance, noise = NEWTON_NOISE * HS_UNIT / tolerance;
   const hs_real enough = hs_max(10 * HS_UNIT / tolerance, hs_min(MOST_LEFT, hs_max(LEAST_LEFT, sqrt(tolerance))));
   hs_real left = pow(hs_max(convergence->left, HS_UNIT), (hs_real)4 / 5), before = 0.0;
   for (int count = 1;; count++) {
-    const int status = iterate(run, n, t, h);
+    const int status = iterate(run, of, t, h);
     if (status) return status;
     const int rated = count > 1 && count > 1 + followers(run, n);
     const hs_real size = scaled(run, n) / tolerance;
@@ -96,12 +97,13 @@ HS_INLINE int below_digits(const hs_run *run, int n, hs_real rate) {
 }
 
 /* Iterate until the next correction would be below the last digit, or they are all noise. */
-HS_INLINE int to_roundoff(hs_run *run, int n, hs_time t, hs_real h) {
+HS_INLINE int to_roundoff(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
+  const int n = of.n;
   hs_convergence *const convergence = &run->radau.convergence;
   const hs_real allowed = hs_max(NEWTON_NOISE * HS_UNIT, NEWTON_SHARE * run->control.tolerance);
   hs_real before = 0.0;
   for (int count = 1; count <= MOST_TO_ROUNDOFF; count++) {
-    const int status = iterate(run, n, t, h);
+    const int status = iterate(run, of, t, h);
     if (status) return status;
     const hs_real size = scaled(run, n), rate = before == 0 ? SLOW_RATE : size / before;
     if (size == 0 || (rate < SLOW_RATE && below_digits(run, n, rate))) {

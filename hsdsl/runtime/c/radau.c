@@ -9,74 +9,70 @@ HS_INLINE void weighted3(int n, const hs_real *w, hs_real *const v[3], hs_real *
   for (int s = 0; s < n; s++) out[s] = p * a[s] + q * b[s] + r * c[s];
 }
 
-/* Solve with the factors of the real matrix. */
-HS_INLINE void solved_real(hs_run *run, int n, const hs_real *right, hs_real *found) {
-  hs_radau *const radau = &run->radau;
-  if (n > 3 && run->here.table->elimination)
-    sparse_solve(n, run->here.table->elimination, radau->real, right, radau->scratch[0], found);
-  else
-    solve(n, radau->real, radau->order, right, found);
-}
-
 HS_INLINE void plus(int n, const hs_real *a, const hs_real *b, hs_real *sum) {
   HS_SIMD
   for (int s = 0; s < n; s++) sum[s] = a[s] + b[s];
 }
 
-/* Make h g - (G, B) u of the sums g, to `right`. */
-HS_INLINE void right_sides(int n, hs_real h, const hs_collocation *known, hs_real *const *u, hs_real *const *right) {
-  const hs_real *const a = u[0], *const b = u[1], *const c = u[2];
+HS_INLINE hs_real summed3(const hs_real *w, hs_real a, hs_real b, hs_real c) { return w[0] * a + w[1] * b + w[2] * c; }
+
+/* Make h g - (G, B) u, where g is what takes A apart of the slopes, to `right`. */
+HS_INLINE void right_sides(hs_radau *radau, int n, hs_real h, const hs_collocation *known) {
+  const hs_real *const a = radau->apart[0], *const b = radau->apart[1], *const c = radau->apart[2];
+  const hs_real *const e = radau->slopes[0], *const f = radau->slopes[1], *const g = radau->slopes[2];
   const hs_real gamma = known->gamma, alpha = known->alpha, beta = known->beta;
-  hs_real *const p = right[0], *const q = right[1], *const r = right[2];
+  hs_real *const p = radau->right[0], *const q = radau->right[1], *const r = radau->right[2];
   HS_SIMD
   for (int s = 0; s < n; s++) {
-    p[s] = h * p[s] - gamma * a[s];
-    q[s] = h * q[s] - (alpha * b[s] + beta * c[s]);
-    r[s] = h * r[s] - (alpha * c[s] - beta * b[s]);
+    p[s] = h * summed3(known->unmix[0], e[s], f[s], g[s]) - gamma * a[s];
+    q[s] = h * summed3(known->unmix[1], e[s], f[s], g[s]) - (alpha * b[s] + beta * c[s]);
+    r[s] = h * summed3(known->unmix[2], e[s], f[s], g[s]) - (alpha * c[s] - beta * b[s]);
   }
 }
 
-/* Add the changes d to u: the largest change of each state, and the sum of all. */
-HS_INLINE hs_real corrected(int n, hs_real *const *d, hs_real *const *u, hs_real *largest) {
-  const hs_real *const a = d[0], *const b = d[1], *const c = d[2];
-  for (int i = 0; i < 3; i++) {
-    const hs_real *const change = d[i];
-    hs_real *const apart = u[i];
-    HS_SIMD
-    for (int s = 0; s < n; s++) apart[s] = apart[s] + change[s];
-  }
+/* Add the changes, and make of that the increments; the largest change of each state, and whether all are finite. */
+HS_INLINE int corrected(hs_radau *radau, int n, const hs_collocation *known) {
+  const hs_real *const a = radau->change[0], *const b = radau->change[1], *const c = radau->change[2];
+  hs_real *const u = radau->apart[0], *const v = radau->apart[1], *const w = radau->apart[2];
+  hs_real *const x = radau->z[0], *const y = radau->z[1], *const z = radau->z[2], *const largest = radau->largest;
+  hs_real *const total = radau->right[0];
   HS_SIMD
-  for (int s = 0; s < n; s++) largest[s] = hs_max(hs_max(fabs(a[s]), fabs(b[s])), fabs(c[s]));
-  hs_real total = 0.0;
-  for (int s = 0; s < n; s++) total = total + (fabs(a[s]) + fabs(b[s]) + fabs(c[s]));
-  return total;
+  for (int s = 0; s < n; s++) {
+    const hs_real e = u[s] + a[s], f = v[s] + b[s], g = w[s] + c[s];
+    u[s] = e, v[s] = f, w[s] = g;
+    x[s] = summed3(known->mix[0], e, f, g);
+    y[s] = summed3(known->mix[1], e, f, g);
+    z[s] = summed3(known->mix[2], e, f, g);
+    largest[s] = hs_max(hs_max(fabs(a[s]), fabs(b[s])), fabs(c[s]));
+    total[s] = fabs(a[s]) + fabs(b[s]) + fabs(c[s]);
+  }
+  return hs_finite(sum(total, n));
 }
 
 /* One iteration of Newton's method on Z = h A f(x + Z), in the coordinates that take A apart: the increments after it
    and the largest change of each state. Not 0 where the flow has no value there, or the change has none. */
-HS_INLINE int iterate(hs_run *run, int n, hs_time t, hs_real h) {
+HS_INLINE int iterate(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
+  const int n = of.n;
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
-  hs_real *const *const u = radau->apart, *const *const d = radau->change, *const *const f = radau->slopes;
+  hs_real *const *const d = radau->change;
   for (int i = 0; i < 3; i++) {
     plus(n, run->x, radau->z[i], run->at);
-    if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, f[i])) return NO_VALUE;
+    if (run->here.table->flow(run->here.p, t + known->node[i] * h, run->at, radau->slopes[i])) return NO_VALUE;
   }
-  for (int i = 0; i < 3; i++) weighted3(n, known->unmix[i], f, radau->right[i]);
-  right_sides(n, h, known, u, radau->right);
-  const hs_real *const pair[2] = {radau->right[1], radau->right[2]};
-  solved_real(run, n, radau->right[0], d[0]);
-  if (n > 3 && run->here.table->elimination)
-    sparse_solve_complex(n, run->here.table->elimination, radau->re, radau->im, pair, radau->scratch[0],
-                         radau->scratch[1], d[1], d[2]);
-  else
-    solve_complex(n, radau->re, radau->im, radau->turned, pair, d[1], d[2]);
-  const hs_real total = corrected(n, d, u, radau->largest);
-  for (int i = 0; i < 3; i++) weighted3(n, known->mix[i], u, radau->z[i]);
-  return hs_finite(total) ? 0 : NO_CONVERGENCE;
+  right_sides(radau, n, h, known);
+  solve_all(run, of, radau->right[0], d[0]);
+  solve_all_complex(run, of, radau->right + 1, d[1], d[2]);
+  return corrected(radau, n, known) ? 0 : NO_CONVERGENCE;
 }
 
-static void radau_forget(hs_radau *radau) {
+static void radau_forget(hs_run *run) {
+  hs_radau *const radau = &run->radau;
+  const hs_variation *const v = columns_of(run->here.table);
+  for (int s = v ? v->columns[v->count] : run->width; s < run->width; s++) { /* these do not flow */
+    for (int i = 0; i < 3; i++) radau->z[i][s] = radau->last[i][s] = 0.0;
+    radau->largest[s] = radau->error[s] = 0.0;
+  }
   radau->derived = radau->factored = radau->stepped = 0;
   radau->convergence.rate = radau->convergence.left = 1.0;
   radau->convergence.aged = 0;
@@ -99,7 +95,8 @@ HS_INLINE int derive(hs_run *run, hs_time t) {
   hs_radau *const radau = &run->radau;
   const hs_sparse *const rows = &run->here.table->jacobian;
   if (rows->values(run->here.p, t, run->x, radau->fresh)) return NO_VALUE;
-  if (!run->here.table->elimination) hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
+  if (!run->here.table->elimination && !columns_of(run->here.table))
+    hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
   swap(&radau->rows, &radau->fresh);
   radau->derived = 1;
   radau->derived_at = t;
@@ -108,11 +105,13 @@ HS_INLINE int derive(hs_run *run, hs_time t) {
 }
 
 /* The same matrices in the pattern of a sparse elimination. */
-static int sparse_factor(hs_run *run, int n, hs_real h, const hs_elimination *of) {
+static int sparse_factor(hs_run *run, hs_blocks blocks, hs_real h) {
+  const hs_elimination *const of = blocks.of;
+  const int n = blocks.own, count = blocks.v ? blocks.v->entries : run->here.table->jacobian.count;
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   for (int i = 0; i < of->size; i++) radau->real[i] = radau->re[i] = radau->im[i] = 0.0;
-  for (int i = 0; i < run->here.table->jacobian.count; i++)
+  for (int i = 0; i < count; i++)
     radau->real[of->place[i]] = radau->re[of->place[i]] = -h * radau->rows[i];
   for (int i = 0; i < n; i++) {
     const int own = of->diagonal[i];
@@ -124,18 +123,30 @@ static int sparse_factor(hs_run *run, int n, hs_real h, const hs_elimination *of
          sparse_factored_complex(n, of, radau->re, radau->im, radau->scratch[0], radau->scratch[1]);
 }
 
+/* The derivatives of the own states by each other, times -h, to radau->real. */
+HS_INLINE void spread_own(hs_run *run, hs_blocks of, hs_real h) {
+  hs_radau *const radau = &run->radau;
+  const int n = of.own, width = run->here.dimension, *const place = run->here.table->jacobian.place;
+  for (int i = 0; i < n * n; i++) radau->real[i] = of.v ? (hs_real)0.0 : -h * radau->rows[i];
+  for (int i = 0; of.v && i < of.v->entries; i++)
+    radau->real[place[i] / width * n + place[i] % width] = -h * radau->rows[i];
+}
+
 /* Factor gamma - h J and alpha - i beta - h J, unless that is done. */
-HS_INLINE int factor_for(hs_run *run, int n, hs_real h) {
+HS_INLINE int factor_for(hs_run *run, hs_blocks of, hs_real h) {
+  const int n = of.own;
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   if (radau->factored && radau->factored_for == h) return 0;
-  if (n > 3 && run->here.table->elimination) {
+  if (of.v) link_columns(run, of.v, h);
+  if (of.of) {
     radau->factored_for = h;
-    radau->factored = !sparse_factor(run, n, h, run->here.table->elimination);
+    radau->factored = !sparse_factor(run, of, h);
     return radau->factored ? 0 : NO_CONVERGENCE;
   }
+  spread_own(run, of, h);
   for (int i = 0; i < n * n; i++) {
-    radau->real[i] = radau->re[i] = -h * radau->rows[i];
+    radau->re[i] = radau->real[i];
     radau->im[i] = 0.0;
   }
   for (int i = 0; i < n; i++) {
@@ -144,134 +155,170 @@ HS_INLINE int factor_for(hs_run *run, int n, hs_real h) {
     radau->im[i * n + i] = -known->beta;
   }
   radau->factored_for = h;
-  radau->factored = !factored(n, radau->real, radau->order, run->scales) &&
-                    !factored_complex(n, radau->re, radau->im, radau->turned, run->scales);
+  const int *const groups = of.v ? of.v->groups : 0;
+  radau->factored = !factored(n, radau->real, radau->order, run->scales, groups) &&
+                    !factored_complex(n, radau->re, radau->im, radau->turned, run->scales, groups);
   return radau->factored ? 0 : NO_CONVERGENCE;
 }
 
-/* Go on with the last step's polynomial: behind its end, or inside it where it was tried from here. To radau->z. */
+/* Go on with the last step's polynomial: behind its end, or inside it where it was tried from here. To radau->z, and
+   apart. */
 HS_INLINE void guess(hs_run *run, int n, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   const int behind = radau->stepped && t == radau->start + radau->length;
   const int known_here = behind || (radau->stepped && t == radau->start);
   const hs_real share = h / radau->length;
-  hs_real *const c[3] = {radau->slopes[0], radau->slopes[1], radau->slopes[2]}; /* of the polynomial */
-  for (int m = 0; known_here && m < 3; m++) weighted3(n, known->power[m], radau->last, c[m]);
-  for (int i = 0; i < 3; i++) {
-    const hs_real at = (behind ? 1.0 : 0.0) + known->node[i] * share;
-    const hs_real *const end = radau->last[2];
-    hs_real *const z = radau->z[i];
-    for (int s = 0; !known_here && s < n; s++) z[s] = 0.0;
-    if (!known_here) continue;
-    HS_SIMD
-    for (int s = 0; s < n; s++) z[s] = at * (c[0][s] + at * (c[1][s] + at * c[2][s])) - (behind ? end[s] : 0.0);
+  const hs_real base = behind ? 1.0 : 0.0;
+  const hs_real *const e = radau->last[0], *const f = radau->last[1], *const g = radau->last[2];
+  hs_real *const x = radau->z[0], *const y = radau->z[1], *const z = radau->z[2];
+  hs_real *const u = radau->apart[0], *const v = radau->apart[1], *const w = radau->apart[2];
+  const hs_real first = base + known->node[0] * share, second = base + known->node[1] * share,
+                third = base + known->node[2] * share;
+  for (int s = 0; !known_here && s < n; s++) x[s] = y[s] = z[s] = u[s] = v[s] = w[s] = 0.0;
+  if (!known_here) return;
+  HS_SIMD
+  for (int s = 0; s < n; s++) {
+    const hs_real end = behind ? g[s] : 0.0, a = summed3(known->power[0], e[s], f[s], g[s]),
+                  b = summed3(known->power[1], e[s], f[s], g[s]), c = summed3(known->power[2], e[s], f[s], g[s]);
+    x[s] = first * (a + first * (b + first * c)) - end;
+    y[s] = second * (a + second * (b + second * c)) - end;
+    z[s] = third * (a + third * (b + third * c)) - end;
+    u[s] = summed3(known->unmix[0], x[s], y[s], z[s]);
+    v[s] = summed3(known->unmix[1], x[s], y[s], z[s]);
+    w[s] = summed3(known->unmix[2], x[s], y[s], z[s]);
   }
 }
 
 /* Solve for the step with the derivatives that there are. */
-HS_INLINE int settle_in(hs_run *run, int n, hs_time t, hs_real h, int exactly, int closer) {
+HS_INLINE int settle_in(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactly, int closer) {
+  const int n = of.n;
   hs_radau *const radau = &run->radau;
   radau->scales = radau->lifted ? run->resolved : run->scales;
-  for (int s = 0; radau->lifted && s < n; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
+  for (int s = 0; radau->lifted && s < run->here.dimension; s++) run->resolved[s] = hs_max(run->scales[s], radau->least[s]);
   radau_scales(run, t, h, closer);
   guess(run, n, t, h);
-  const int status = factor_for(run, n, h);
+  const int status = factor_for(run, of, h);
   if (status) return status;
-  for (int i = 0; i < 3; i++) weighted3(n, run->method->collocation->unmix[i], radau->z, radau->apart[i]);
-  return exactly ? to_roundoff(run, n, t, h) : to_tolerance(run, n, t, h);
+  return exactly ? to_roundoff(run, of, t, h) : to_tolerance(run, of, t, h);
 }
 
 static int settle_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
-  return settle_in(run, 2, t, h, exactly, closer);
+  const hs_blocks of = {2, 2, 0, 0};
+  return settle_in(run, of, t, h, exactly, closer);
 }
 
 static int settle_3(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
-  return settle_in(run, 3, t, h, exactly, closer);
+  const hs_blocks of = {3, 3, 0, 0};
+  return settle_in(run, of, t, h, exactly, closer);
 }
 
 static int settle_n(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
-  return settle_in(run, run->here.dimension, t, h, exactly, closer);
+  return settle_in(run, blocks_of(run->here.table), t, h, exactly, closer);
 }
 
-HS_INLINE int settle(hs_run *run, int n, hs_time t, hs_real h, int exactly, int closer) {
-  return (n == 2 ? settle_2 : n == 3 ? settle_3 : settle_n)(run, t, h, exactly, closer);
+/* The same where two or three states have columns. */
+static int settle_columns_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
+  const hs_variation *const v = columns_of(run->here.table);
+  const hs_blocks of = {v->columns[v->count], 2, v, 0};
+  return settle_in(run, of, t, h, exactly, closer);
+}
+
+static int settle_columns_3(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
+  const hs_variation *const v = columns_of(run->here.table);
+  const hs_blocks of = {v->columns[v->count], 3, v, 0};
+  return settle_in(run, of, t, h, exactly, closer);
+}
+
+HS_INLINE int settle(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactly, int closer) {
+  const int varied = columns_of(run->here.table) != 0;
+  switch (of.own) {
+    case 2: return (varied ? settle_columns_2 : settle_2)(run, t, h, exactly, closer);
+    case 3: return (varied ? settle_columns_3 : settle_3)(run, t, h, exactly, closer);
+    default: return settle_n(run, t, h, exactly, closer);
+  }
 }
 
 /* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */
-HS_INLINE int solved(hs_run *run, int n, hs_time t, hs_real h, int exactly) {
+HS_INLINE int solved(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactly) {
   hs_radau *const radau = &run->radau;
   const int renew = radau->convergence.aged && radau->derived_at != t;
   if ((!radau->derived || renew) && derive(run, t)) return NO_VALUE;
   if (radau->derived_at != t) {
-    const int status = settle(run, n, t, h, exactly, 0);
+    const int status = settle(run, of, t, h, exactly, 0);
     if (status != NO_CONVERGENCE) return status;
     if (derive(run, t)) return NO_VALUE;
   }
-  const int status = settle(run, n, t, h, exactly, 0);
-  return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, n, t, h, exactly, 1) : status;
+  const int status = settle(run, of, t, h, exactly, 0);
+  return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, of, t, h, exactly, 1) : status;
 }
 
 /* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */
-HS_INLINE int estimate(hs_run *run, int n, hs_time t, hs_real h) {
+HS_INLINE int estimate(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
+  const int n = of.n;
   hs_radau *const radau = &run->radau;
   const hs_collocation *const known = run->method->collocation;
   hs_real *const inside = radau->slopes[0], *const embedded = radau->change[0], *const along = radau->change[1];
-  weighted3(n, known->value, radau->z, run->at);
-  plus(n, run->x, run->at, run->at);
+  const hs_real *const u = radau->z[0], *const v = radau->z[1], *const w = radau->z[2], *const x = run->x;
+  hs_real *const at = run->at, *const error = radau->error;
+  HS_SIMD
+  for (int s = 0; s < n; s++) at[s] = x[s] + summed3(known->value, u[s], v[s], w[s]);
   if (run->here.table->flow(run->here.p, t + known->share * h, run->at, inside)) return NO_VALUE;
-  weighted3(n, known->estimate, radau->z, radau->right[0]);
-  weighted3(n, known->slope, radau->z, radau->right[1]);
   hs_real *const first = radau->right[0], *const second = radau->right[1];
   const hs_real *const slope = run->slope;
   HS_SIMD
   for (int s = 0; s < n; s++) {
-    first[s] = h * slope[s] + first[s];
-    second[s] = h * inside[s] - second[s];
+    first[s] = h * slope[s] + summed3(known->estimate, u[s], v[s], w[s]);
+    second[s] = h * inside[s] - summed3(known->slope, u[s], v[s], w[s]);
   }
-  solved_real(run, n, radau->right[0], embedded);
-  solved_real(run, n, radau->right[1], along);
-  for (int s = 0; s < n; s++) radau->error[s] = fabs(embedded[s]) >= fabs(along[s]) ? embedded[s] : along[s];
+  solve_all(run, of, radau->right[0], embedded);
+  solve_all(run, of, radau->right[1], along);
+  for (int s = 0; s < n; s++) error[s] = fabs(embedded[s]) >= fabs(along[s]) ? embedded[s] : along[s];
   return 0;
 }
 
 /* The same to round-off, for any number of states. */
 static int solved_exactly(hs_run *run, hs_time t, hs_real h) {
-  return run->here.dimension ? solved(run, run->here.dimension, t, h, 1) : 0;
+  return run->here.dimension ? solved(run, blocks_of(run->here.table), t, h, 1) : 0;
 }
 
-HS_INLINE int radau_step_in(hs_run *run, int n, hs_time t, hs_real h) {
+HS_INLINE int radau_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
   hs_radau *const radau = &run->radau;
+  const int n = of.n;
   if (!n) return 0;
   const int adaptive = run->control.tolerance > 0;
-  const int status = adaptive ? solved(run, n, t, h, 0) : solved_exactly(run, t, h);
+  const int status = adaptive ? solved(run, of, t, h, 0) : solved_exactly(run, t, h);
   if (status) return status;
   radau->stepped = 1;
   radau->start = t;
   radau->length = h;
   for (int i = 0; i < 3; i++) copy(radau->last[i], radau->z[i], n);
-  if (adaptive && estimate(run, n, t, h)) return NO_VALUE;
-  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + radau->z[2][s];
+  if (adaptive && estimate(run, of, t, h)) return NO_VALUE;
+  plus(of.v ? run->here.dimension : n, run->x, radau->z[2], run->z);
   return 0;
 }
 
-/* Try a step, solved to its tolerance; compiled for two and three states apart, a tenth faster. */
+/* Try a step, solved to its tolerance; compiled for two and three states apart, a tenth faster, and a third where these
+   have columns. */
 static int radau_step(hs_run *run, hs_time t, hs_real h) {
-  switch (run->here.dimension) {
-    case 2: return radau_step_in(run, 2, t, h);
-    case 3: return radau_step_in(run, 3, t, h);
-    default: return radau_step_in(run, run->here.dimension, t, h);
+  static const hs_blocks two = {2, 2, 0, 0}, three = {3, 3, 0, 0};
+  const hs_blocks of = blocks_of(run->here.table), columns_2 = {of.n, 2, of.v, 0}, columns_3 = {of.n, 3, of.v, 0};
+  const int varied = columns_of(run->here.table) != 0;
+  switch (of.own) {
+    case 2: return varied ? radau_step_in(run, columns_2, t, h) : radau_step_in(run, two, t, h);
+    case 3: return varied ? radau_step_in(run, columns_3, t, h) : radau_step_in(run, three, t, h);
+    default: return radau_step_in(run, of, t, h);
   }
 }
 
 /* The sum of the absolute terms of a state's derivative at run->z, as the flow's derivatives tell. */
 static hs_real terms_of(const hs_run *run, int state) {
   const hs_sparse *const rows = &run->here.table->jacobian;
-  const int n = run->here.dimension, sparse = run->here.table->elimination != 0;
+  const int n = run->here.dimension, packed = run->here.table->elimination || columns_of(run->here.table);
   hs_real total = 0.0;
   for (int i = 0; i < rows->count; i++) {
     const int place = rows->place[i];
-    if (place / n == state) total = total + fabs(run->radau.rows[sparse ? i : place] * run->z[place % n]);
+    if (place / n == state) total = total + fabs(run->radau.rows[packed ? i : place] * run->z[place % n]);
   }
   return total;
 }

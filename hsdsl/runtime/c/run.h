@@ -116,6 +116,7 @@ typedef struct {
   hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
   int *order, *turned;             /* the order of their rows */
   hs_real *scratch[2];             /* of sparse systems */
+  hs_real *linked, *spread[4];     /* of variations: see blocks.c */
   hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
   hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
   hs_real *slopes[3], *right[3];
@@ -124,6 +125,23 @@ typedef struct {
   hs_real *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
   int lifted;
 } hs_radau;
+
+/* A mode's columns of derivatives; exported C has none. */
+static inline const hs_variation *columns_of(const hs_mode *mode) {
+#if defined(HS_COLUMNS)
+  return mode->variation;
+#else
+  return (void)mode, (const hs_variation *)0;
+#endif
+}
+
+/* What a step solves for: n states that flow, the `own` ones of which have a matrix, and columns of derivatives of them
+   where they have a variation; 0 for none. `of` is the pattern of the matrix where it is sparse, else 0. */
+typedef struct {
+  int n, own;
+  const hs_variation *v;
+  const hs_elimination *of;
+} hs_blocks;
 
 /* Numbers that lay_out_method() takes of it, as a constant: see workspace.h. */
 #define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
@@ -267,10 +285,13 @@ static inline int all_finite(const hs_real *v, int n) {
   return 1;
 }
 
+/* Four sums at a time need not wait for each other; it tells whether all are finite. */
 static inline hs_real sum(const hs_real *v, int n) {
-  hs_real total = 0.0;
-  for (int i = 0; i < n; i++) total += v[i];
-  return total;
+  hs_real a = 0.0, b = 0.0, c = 0.0, d = 0.0;
+  int i = 0;
+  for (; i + 3 < n; i += 4) a += v[i], b += v[i + 1], c += v[i + 2], d += v[i + 3];
+  for (; i < n; i++) a += v[i];
+  return (a + b) + (c + d);
 }
 
 static inline void swap(hs_real **a, hs_real **b) {

@@ -59,8 +59,10 @@ static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
 /* The derivative of a state's flow by itself. */
 static hs_real own_derivative(const hs_run *run, const hs_real *rows, int s) {
   const hs_elimination *of = run->here.table->elimination;
-  if (!of) return rows[s * run->here.dimension + s];
-  return of->own[s] < 0 ? (hs_real)0.0 : rows[of->own[s]];
+  const hs_variation *v = columns_of(run->here.table);
+  if (!of && !v) return rows[s * run->here.dimension + s];
+  const int entry = v ? v->itself[s] : of->own[s];
+  return entry < 0 ? (hs_real)0.0 : rows[entry];
 }
 
 /* The scales over a step of length h from (t, x), none below a share of what the terms of its flow could move the state

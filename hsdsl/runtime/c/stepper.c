@@ -6,6 +6,7 @@
 #pragma GCC push_options
 #pragma GCC optimize("O2")
 #endif
+#include "blocks.c"
 #include "radau.c"
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
@@ -56,7 +57,7 @@ static const hs_real *closer_scales(hs_run *run, hs_real h) {
 
 static int is_implicit(const hs_method *method) { return method->kind == HS_RADAU; }
 
-static void lay_out_radau(hs_radau *radau, int w, int factors, hs_store *store) {
+static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_store *store) {
   hs_real **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
   hs_real **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
   for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
@@ -66,6 +67,8 @@ static void lay_out_radau(hs_radau *radau, int w, int factors, hs_store *store) 
   radau->least = numbers(store, w);
   radau->scratch[0] = numbers(store, w);
   radau->scratch[1] = numbers(store, w);
+  radau->linked = numbers(store, varied);
+  for (int i = 0; i < 4; i++) radau->spread[i] = numbers(store, varied ? w : 0);
   radau->order = take(store, w, sizeof(int));
   radau->turned = take(store, w, sizeof(int));
 }
@@ -74,11 +77,11 @@ static void lay_out_radau(hs_radau *radau, int w, int factors, hs_store *store) 
 static void lay_out_method(hs_run *run, hs_store *store) {
   if (run->method->kind == HS_TAYLOR)
     run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
-  if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, run->width, run->model->factors, store);
+  if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, run->width, run->model->factors, run->model->varied, store);
 }
 
 /* Forget what a method knows of the place it was at: the mode or the segment of the inputs is another one. */
 static void forget_steps(hs_run *run) {
   run->expanded = 0;
-  radau_forget(&run->radau);
+  if (run->method->kind == HS_RADAU) radau_forget(run);
 }

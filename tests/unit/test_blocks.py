@@ -1,0 +1,101 @@
+"""Systems of states and their derivatives, against the same ones solved whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hsdsl
+from hsdsl.arithmetic import FLOAT64
+from hsdsl.integrators import radau
+from hsdsl.integrators.radau import Steps
+from hsdsl.lower.ordering import ordering
+from hsdsl.sparsity import variation
+
+STATES, STEP = 5, 0.3
+COLUMNS = ((0, 1, 2, 3, 4), (1, 3, 4), (4,))  # 4 depends on all, 1 and 3 on each other, 0 and 2 on themselves
+NEXT = ((0,), (1, 3), (2,), (1, 3), (0, 1, 2, 3, 4))
+
+
+def whole(random: np.random.Generator) -> np.ndarray:
+    """A Jacobian of five states, three columns of their derivatives, and two states that do not flow."""
+    block = np.zeros((STATES, STATES))
+    for i, row in enumerate(NEXT):
+        block[i, list(row)] = random.normal(size=len(row)) * 10.0 ** random.integers(-3, 4, size=len(row))
+    n = STATES + sum(map(len, COLUMNS)) + 2
+    found = np.zeros((n, n))
+    found[:STATES, :STATES] = block
+    at = STATES
+    for column in COLUMNS:
+        rows = range(at, at + len(column))
+        found[np.ix_(rows, rows)] = block[np.ix_(column, column)]
+        found[np.ix_(rows, range(STATES))] = random.normal(size=(len(column), STATES)) * (random.random(STATES) < 0.5)
+        at += len(column)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("is_sparse", [False, True])
+def test_blocks_solve_the_whole_system(seed: int, is_sparse: bool) -> None:
+    random = np.random.default_rng(seed)
+    jacobian = whole(random)
+    n, places = len(jacobian), tuple(np.flatnonzero(jacobian).tolist())
+    inside = [k // n * STATES + k % n for k in places if k // n < STATES]
+    order = tuple(range(STATES)) if is_sparse else ordering(inside, STATES)
+    of = variation(places, n, STATES, COLUMNS, order)
+    assert (of.elimination is not None) == is_sparse
+    steps = Steps(lambda t, *x: jacobian.ravel().tolist(), 1e-6, FLOAT64, [1.0] * n, varied=of)
+    steps._derive(0.0, (0.0,) * n)
+    real, turning = steps._factor(STEP)
+    known, right, flowing = steps._known, random.normal(size=(3, n)), n - 2
+    right[:, flowing:] = 0
+    systems = (known.gamma * np.eye(n) - STEP * jacobian, (known.alpha - 1j * known.beta) * np.eye(n) - STEP * jacobian)
+    solved = np.linalg.solve(systems[0], right[0]), np.linalg.solve(systems[1], right[1] + 1j * right[2])
+    found = real.solve(right[0].tolist())
+    both = turning.solve(right[1].tolist(), right[2].tolist())
+    for mine, exact in ((np.array(found), solved[0]), (np.array(both[0]) + 1j * np.array(both[1]), solved[1])):
+        assert np.allclose(mine, exact, rtol=1e-9, atol=1e-9 * abs(exact).max())
+
+
+def test_what_nothing_moves_stays_zero() -> None:
+    """Of a column whose right-hand side moves only the last state, though its row has by far the largest numbers."""
+    jacobian = whole(np.random.default_rng(3))
+    jacobian[4, :5] *= 1e6
+    n, places = len(jacobian), tuple(np.flatnonzero(jacobian).tolist())
+    steps = Steps(
+        lambda t, *x: jacobian.ravel().tolist(), 1e-6, FLOAT64, [1.0] * n, varied=variation(places, n, 5, COLUMNS, ())
+    )
+    steps._derive(0.0, (0.0,) * n)
+    found = steps._factor(STEP)[0].solve([1.0 if i == 9 else 0.0 for i in range(n)])
+    assert found[9] != 0 and not any(found[5:9])
+
+
+def test_matrices_are_those_of_the_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many derivatives there are, a step factors no larger matrices than one of the run."""
+    sizes, factored = set[int](), radau.factored
+
+    def noted(matrix, *others):
+        sizes.add(len(matrix))
+        return factored(matrix, *others)
+
+    monkeypatch.setattr(radau, "factored", noted)
+    model = hsdsl.load("models/stiff-switch.yaml")
+    model.sensitivity("fast,slow,high,initial.y2", until=0.01, tolerance=1e-5, engine="python")
+    assert sizes == {2}
+
+
+def test_derivatives_that_start_as_zero() -> None:
+    """The derivative of a state that a parameter does not move is zero to the last bit, and steps do not notice it."""
+    model = hsdsl.loads("""
+hsdsl: 1
+parameters: {k: 3e5, a: 1.5}
+modes:
+  A:
+    flow: {x: 3 - a*x, y: -k*(y - x - z), z: -10*k*(z - x/2)}
+    transitions: [{when: y >= 5, to: A, reset: {x: y/2}}]  # not reached; there x would depend on k
+initial: {mode: A, x: 0.1, y: 0.1, z: 0.02}
+experiment: {until: 0.02, method: radau}
+""")
+    found = model.sensitivity("k", tolerance=1e-9)
+    assert found.final.state["x"]["k"] == 0
+    assert len(found.execution.times) < 2 * len(model.simulate(tolerance=1e-9, scheme="located").times)
