@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 from hsdsl import interrupts, program_cache
-from hsdsl.errors import ModelError
+from hsdsl.errors import ModelError, UsageError
 from hsdsl.files import ModelFiles
 from hsdsl.limits import applied, cores
 from hsdsl.program import Program
@@ -53,10 +54,14 @@ class _Other:
 
 
 _begun: list[_Other] = []
+_seen: list[ModelFiles] = []
 
 
 def begin(files: ModelFiles) -> None:
     """Begin to lower a model in another process, where that saves time: see :func:`taken`."""
+    if files in _seen:
+        return
+    _seen.append(files)
     if not _saves_time() or program_cache.is_kept(files):
         return
     answer, to_answer = os.pipe()
@@ -69,6 +74,16 @@ def begin(files: ModelFiles) -> None:
             _work(files, to_answer)
         _begun.append(_Other(files, process, answer))
     os.close(to_answer)
+
+
+def begin_run(words: list[str]) -> None:
+    """Begin with the model of a command line that runs it as it is, before what reads other command lines is loaded."""
+    match words:
+        case ["run", model, *options] if set(options) <= {"--json", "--quiet", "-q"} and os.path.isfile(model):
+            with suppress(UsageError):  # which the command reports
+                begin(ModelFiles.read(Path(model)))
+        case _:
+            pass
 
 
 def _saves_time() -> bool:

@@ -11,7 +11,7 @@ import gc
 import os
 import sys
 
-from hsdsl import interrupts
+from hsdsl import ahead, interrupts
 from hsdsl.cli.console import WRONG_USAGE, prepare
 
 
@@ -24,6 +24,7 @@ def main() -> None:
     prepare()
     code = 0
     try:
+        ahead.begin_run(sys.argv[1:])
         from hsdsl.cli.verbs import obey
 
         code = obey(sys.argv[1:])

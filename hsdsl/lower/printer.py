@@ -43,6 +43,10 @@ class KernelPrinter(PythonCodePrinter):
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
 
+    def doprint(self, expr):
+        """Print an expression; SymPy's own method loads what prints assignments."""
+        return self._print(sp.sympify(expr))
+
     def _print_Rational(self, expr):
         return constant_name(Fraction(int(expr.p), int(expr.q)))
 

@@ -23,6 +23,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no oth
 def loaded(monkeypatch, tmp_path):
     """Begin although much is loaded in this process, with nothing in the cache."""
     monkeypatch.setattr(ahead, "_saves_time", lambda: True)
+    monkeypatch.setattr(ahead, "_seen", [])
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
@@ -65,3 +66,21 @@ def test_another_model_is_not_taken_for_it_and_nothing_is_left():
     assert not ahead._begun
     with pytest.raises(ProcessLookupError):
         os.kill(other.process, 0)
+
+
+@pytest.mark.parametrize("options", [[], ["--json"], ["-q", "--json"]])
+def test_a_plain_run_begins_before_its_words_are_read(options):
+    model = str(MODELS / "thermostat.yaml")
+    ahead.begin_run(["run", model, *options])
+    ahead.begin(ModelFiles.read(Path(model)))  # as the command does
+    (other,) = ahead._begun
+    assert ahead.taken(ModelFiles.read(Path(model))) is not None
+    assert other not in ahead._begun
+
+
+@pytest.mark.parametrize("words", [[], ["run"], ["lint", "m.yaml"], ["run", "m.yaml", "--until", "1"], ["run", "none"]])
+def test_other_commands_begin_themselves(words, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("m.yaml").write_text("hsdsl: 1")
+    ahead.begin_run(words)
+    assert not ahead._begun
