@@ -1,9 +1,10 @@
-"""Expansions of functions in C (``hsdsl/runtime/c/expansions.c``): no value is further away than the rest."""
+"""Expansions of functions and steps in C (``expansions.c``, ``screen_parts.h``): no value is beyond what they bound."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,24 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import FLAGS, find_compiler
 
 pytestmark = needs_compiler
-ONE = """#include "expansions.c"
+ONE = """#include "screen_parts.h"
 HS_EXPORT void expand_one(int kind, int other, const hs_expansion *a, const hs_expansion *b, hs_expansion *to) {
   const hs_operation operation = {kind, 0, other};
-  *to = expansion_of(&operation, *a, *b);
+  *to = expansion_of(&operation, a, b);
+}
+HS_EXPORT void enclose(int degree, const double *coefficients, double start, double width, double *to) {
+  const double times[2] = {0.0, 1.0};
+  double none = 0.0;
+  int cut = 1;
+  hs_range range[2];
+  hs_expansion around[2], slope;
+  hs_screen s = {.run = {.rows = 2, .width = 1, .degree = degree, .times = times, .values = coefficients,
+                         .pieces = coefficients + 1}};
+  hs_view v = {.s = &s, .n = 1, .cut = &cut, .range = range, .around = around, .slopes = &slope, .own = &none};
+  take_step(&v, 0);
+  expand_cut(&v, 0);
+  set_expanded_part(&v, 0, start, width, 0.0);
+  to[0] = range[1].low, to[1] = range[1].high, to[2] = v.degree;
 }
 """
 POWER = 5
@@ -35,11 +50,11 @@ Expansion = ctypes.c_double * 6
 
 
 @pytest.fixture(scope="module")
-def expand_one(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder: Path = tmp_path_factory.mktemp("expansions")
     (folder / "one.c").write_text(ONE)
     find_compiler().build([folder / "one.c"], [structures.FOLDER], folder / "one.so", "-O1", (*FLAGS, "-w"))
-    return ctypes.CDLL(str(folder / "one.so")).expand_one
+    return ctypes.CDLL(str(folder / "one.so"))
 
 
 def along(a: Any, share: Any) -> Any:
@@ -48,7 +63,7 @@ def along(a: Any, share: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_no_value_is_further_away_than_the_rest(name: str, expand_one: Any) -> None:
+def test_no_value_is_further_away_than_the_rest(name: str, compiled: Any) -> None:
     rng = np.random.default_rng(7)
     known = sharp = 0
     for _ in range(300):
@@ -57,7 +72,7 @@ def test_no_value_is_further_away_than_the_rest(name: str, expand_one: Any) -> N
         numbers[:, 0] = rng.normal(size=2) * 2
         numbers[:, 4] = abs(numbers[:, 4]) * rng.choice([0, 1], size=2)
         a, b, found = (Expansion(*each, abs(each[1])) for each in (*numbers, np.zeros(5)))
-        expand_one(structures.OPERATORS.index(name), POWER, a, b, found)
+        compiled.expand_one(structures.OPERATORS.index(name), POWER, a, b, found)
         if not np.isfinite(found[4]):
             continue
         for share in rng.uniform(-1, 1, size=(5, 2, len(U))):
@@ -70,7 +85,28 @@ def test_no_value_is_further_away_than_the_rest(name: str, expand_one: Any) -> N
     assert sharp >= 5 or name in ("div", "log")
 
 
-def test_the_slope_is_shown_where_its_terms_cancel(expand_one: Any) -> None:
+def test_the_slope_is_shown_where_its_terms_cancel(compiled: Any) -> None:
     a, b, found = Expansion(1, 3, 0, 0, 0, 3), Expansion(1, -3, 0, 0, 0, 3), Expansion()
-    expand_one(structures.OPERATORS.index("add"), 0, a, b, found)
+    compiled.expand_one(structures.OPERATORS.index("add"), 0, a, b, found)
     assert (found[1], found[5]) == (0, 6)
+
+
+@pytest.mark.parametrize("decay", [0.2, 0.6, 1.0])
+@pytest.mark.parametrize("degree", [1, 3, 4, 14])
+def test_boxes_of_parts_hold_the_step(degree: int, decay: float, compiled: Any) -> None:
+    rng = np.random.default_rng(degree)
+    sharp = 0
+    for _ in range(100):
+        piece = rng.normal(size=degree + 1) * decay ** np.arange(degree + 1)
+        padded, found = (ctypes.c_double * 16)(*piece), (ctypes.c_double * 3)()
+        width = 2.0 ** -rng.integers(0, 7)
+        start = width * rng.integers(0, 1 / width)
+        compiled.enclose(15, padded, ctypes.c_double(start), ctypes.c_double(width), found)
+        exact = [Fraction(each) for each in piece]
+        shares = [Fraction(start) + Fraction(width) * k / 16 for k in range(17)]
+        values = [sum(c * s**k for k, c in enumerate(exact)) for s in shares]
+        assert Fraction(found[0]) <= min(values)
+        assert max(values) <= Fraction(found[1])
+        assert found[2] == degree
+        sharp += found[1] - found[0] <= 2 * float(max(values) - min(values)) + 1e-3
+    assert sharp >= (80 if decay < 0.5 or degree < 4 else 1)

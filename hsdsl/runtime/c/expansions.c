@@ -141,26 +141,26 @@ static hs_expansion expanded_least(hs_expansion a, hs_expansion b) {
   return b.value - a.value > apart ? a : a.value - b.value > apart ? b : anything;
 }
 
-static hs_expansion expansion_of(const hs_operation *o, hs_expansion a, hs_expansion b) {
-  const double c = a.value, r = reach(a);
+static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
+  const double c = a->value, r = reach(*a);
   switch (o->kind) {
-  case HS_ADD: return expanded_sum(a, b);
-  case HS_SUB: return expanded_sum(a, negated(b));
-  case HS_MUL: return expanded_product(a, b);
-  case HS_DIV: return expanded_product(a, expanded_reciprocal(b));
-  case HS_NEG: return negated(a);
-  case HS_SQUARE: return expanded_product(a, a);
-  case HS_POWER: return expanded_power(a, o->b);
-  case HS_ABS: return fabs(c) > r ? expanded_multiple(a, sign_of(c)) : anything;
-  case HS_MIN: return expanded_least(a, b);
-  case HS_MAX: return negated(expanded_least(negated(a), negated(b)));
-  case HS_SQRT: return expanded_root(a);
-  case HS_EXP: return expanded_exponential(a);
-  case HS_LOG: return expanded_logarithm(a);
-  case HS_SIN: return expanded_sine(a, sin(c), cos(c));
-  case HS_COS: return expanded_sine(a, cos(c), -sin(c));
-  case HS_TANH: return expanded_tanh(a);
-  case HS_ATAN: return expanded_angle(a);
+  case HS_ADD: return expanded_sum(*a, *b);
+  case HS_SUB: return expanded_sum(*a, negated(*b));
+  case HS_MUL: return expanded_product(*a, *b);
+  case HS_DIV: return expanded_product(*a, expanded_reciprocal(*b));
+  case HS_NEG: return negated(*a);
+  case HS_SQUARE: return expanded_product(*a, *a);
+  case HS_POWER: return expanded_power(*a, o->b);
+  case HS_ABS: return fabs(c) > r ? expanded_multiple(*a, sign_of(c)) : anything;
+  case HS_MIN: return expanded_least(*a, *b);
+  case HS_MAX: return negated(expanded_least(negated(*a), negated(*b)));
+  case HS_SQRT: return expanded_root(*a);
+  case HS_EXP: return expanded_exponential(*a);
+  case HS_LOG: return expanded_logarithm(*a);
+  case HS_SIN: return expanded_sine(*a, sin(c), cos(c));
+  case HS_COS: return expanded_sine(*a, cos(c), -sin(c));
+  case HS_TANH: return expanded_tanh(*a);
+  case HS_ATAN: return expanded_angle(*a);
   case HS_SIGN: return fabs(c) > r ? constant_expansion(sign_of(c)) : anything;
   case HS_FLOOR: return floor(c - r) == floor(c + r) ? constant_expansion(floor(c)) : anything;
   default: return anything;
@@ -170,6 +170,6 @@ static hs_expansion expansion_of(const hs_operation *o, hs_expansion a, hs_expan
 static void expand_operations(const hs_formulas *f, int first, int last, int base, hs_expansion *v) {
   for (int i = first; i < last; i++) {
     const hs_operation *const o = &f->operation[i];
-    v[base + i] = expansion_of(o, v[o->a], v[o->kind == HS_POWER ? o->a : o->b]);
+    v[base + i] = expansion_of(o, &v[o->a], &v[o->kind == HS_POWER ? o->a : o->b]);
   }
 }

@@ -82,7 +82,7 @@ HS_INLINE int correct_in(hs_view *v, hs_companion *c, int n, double *restrict ap
   double *g[NODES], *const u = v->defects + NODES * v->s->run.width, few[2][SMALL];
   double *restrict const right = n > SMALL ? v->slope : few[0], *restrict const d = n > SMALL ? c->y : few[1];
   for (int k = 0; k < NODES; k++) g[k] = v->defects + k * v->s->run.width;
-  for (int i = 0; i < n; i++) c->noise[i] = c->x[i] < start[i] ? -c->noise[i] : c->noise[i], u[i] = 0.0;
+  for (int i = 0; i < n; i++) c->noise[i] = copysign(c->noise[i], c->x[i] - start[i]), u[i] = 0.0;
   if (factor_correction(v, c, n) || defect_at(v, c, n, known->inside, start, 0.0, 0.0, u, g[0])) return 0;
   solve_correction(v, c, n, g[0], u);
   for (int i = 0; i < n; i++) apart[i] = fabs(c->x[i] - start[i] + known->pole * u[i]);

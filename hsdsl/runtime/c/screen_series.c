@@ -64,7 +64,7 @@ static int expand_step(hs_view *v, hs_companion *c) {
   if (!expand_companion(v, c) || !leave_out(v, c)) return 0;
   for (int i = 0; i < v->n; i++) {
     const double away = c->y[i] + c->moved[i];
-    c->y[i] = x[i] + (away + (away < 0 ? -c->noise[i] : c->noise[i]));
+    c->y[i] = x[i] + (away + copysign(c->noise[i], away));
   }
   return 1;
 }

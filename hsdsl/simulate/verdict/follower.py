@@ -63,12 +63,12 @@ class Follower:
         slope, noise = self._enclosed(mode, self.times[row + 1], end)
         if self.most is None:
             away = np.array(self.x) - x
-            inside, further = self._corrected(mode, x, piece, h, end, np.where(away < 0, -h * noise, h * noise))
+            inside, further = self._corrected(mode, x, piece, h, end, np.copysign(h * noise, away))
             self._compare(row + 1, x, tuple((x + away + inside).tolist()))
             return tuple((end + (away + further)).tolist())
         away = self._away(mode, x, piece, h).sum(axis=0)
         away += self._left_out(mode, self.times[row + 1], end, piece, h, slope)
-        return tuple((end + away + np.where(away < 0, -h * noise, h * noise)).tolist())
+        return tuple((end + away + np.copysign(h * noise, away)).tolist())
 
     def _corrected(self, mode: int, x: Array, piece: Array, h: float, end: Array, moved: Array) -> tuple[Array, Array]:
         """How much further away a step takes it, inside and at the end; what is moved goes on as the flow does."""
