@@ -158,6 +158,8 @@ def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         return sp.S.Zero
     if expr.is_Symbol:
         return sp.S.One
+    if isinstance(expr, below):
+        return below(*expr.args[:2], *(derivative(choice, symbol) for choice in expr.args[2:]))
     ordinary = type(expr)._eval_derivative is sp.Function._eval_derivative  # by the chain rule
     if not (expr.is_Add or expr.is_Mul or ordinary or (expr.is_Pow and expr.exp.is_Number)):
         return expr.diff(symbol)
