@@ -28,7 +28,7 @@ from hsdsl.simulate.verdict.formulas import Compiled
 if TYPE_CHECKING:
     from hsdsl.simulate.compiled import CompiledPlan
 
-MOST_LEFT, MOST_ROOM = 4, 1 << 20  # screens that are kept, and numbers in the memory of one
+MOST_LEFT, MOST_ROOM = 4, 1 << 17  # screens that are kept, and numbers in the memory of one
 LOOK_AT_CROSSING, LOOK_AT_RESET = 1, 2
 DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
 
