@@ -25,7 +25,6 @@ from functools import cache
 from math import comb, factorial, sqrt
 
 import numpy as np
-from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -77,6 +76,8 @@ def corrected(defect: Callable[[float, Array, Array], Array], apart: Array, slop
 @cache
 def correction() -> Correction:
     """Make the coefficients."""
+    from numpy.polynomial import Legendre, Polynomial  # few runs need them
+
     roots: list[float] = Legendre([*np.zeros(NODES - 1), -1.0, 1.0]).roots().real.tolist()
     nodes = np.array([*((1 + root) / 2 for root in sorted(roots)[:-1]), 1.0])
     to_powers = np.linalg.inv(np.vander(nodes, increasing=True))
