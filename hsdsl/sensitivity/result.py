@@ -236,6 +236,7 @@ class Sensitivity:
         time = self._shifts(after)
         before = self._followed(made.source, made.time, made.before, time, False)
         reached = self._followed(made.target, made.time, after, time, True)
+        reached |= {x: before[x] for x in self._kept(made) if x in before and x in reached}
         return TransitionSlopes(
             made.index,
             made.edge,
@@ -243,6 +244,13 @@ class Sensitivity:
             {x: self._known(row, exists) for x, row in before.items() if x in self._shown("", made.before)[1]},
             {x: self._known(row, exists) for x, row in reached.items() if x in self._shown("", after)[1]},
         )
+
+    def _kept(self, made: Transition) -> Iterator[str]:
+        """The states that a transition leaves as they are: the flow behind it need not be large for theirs."""
+        modes = self.setting.plain.program.modes
+        edges = next((mode.edges for mode in modes if mode.name == made.source), ())
+        edge = next((edge for edge in edges if edge.name == made.edge), None)
+        yield from (x for i, x in enumerate(edge.target_states) if i not in edge.changes) if edge else ()
 
     def _shown(self, mode: str, state: Mapping[str, Any]) -> tuple[str, Collection[str]]:
         """The name of a mode and its states; of a system of parts those of the product mode at a state."""

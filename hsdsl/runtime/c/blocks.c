@@ -6,7 +6,7 @@
 
 HS_INLINE hs_blocks blocks_of(const hs_mode *mode) {
   const hs_variation *const v = columns_of(mode);
-  hs_blocks found = {mode->dimension, mode->dimension, v, mode->dimension > 3 ? mode->elimination : 0};
+  hs_blocks found = {mode->dimension, mode->dimension, v, mode->dimension > 3 ? mode->elimination : 0, 0};
   if (v) found.n = v->columns[v->count], found.own = v->own, found.of = v->elimination;
   return found;
 }
@@ -34,7 +34,10 @@ HS_INLINE void add_linked(const hs_radau *radau, const hs_variation *v, const hs
 }
 
 /* A column as a vector of the own states, zero for derivatives that it does not have: itself, or in `spread`. */
-HS_INLINE const hs_real *spread_column(const hs_variation *v, int own, int k, const hs_real *all, hs_real *spread) {
+HS_INLINE const hs_real *spread_column(const hs_blocks of, int k, const hs_real *all, hs_real *spread) {
+  const hs_variation *const v = of.v;
+  const int own = of.own;
+  if (of.whole) return all + (k + 1) * own;
   const int begin = v->columns[k], count = v->columns[k + 1] - begin;
   if (count == own) return all + begin;
   for (int i = 0; i < own; i++) spread[i] = 0.0;
@@ -43,11 +46,17 @@ HS_INLINE const hs_real *spread_column(const hs_variation *v, int own, int k, co
 }
 
 /* Where the solution of a column goes, and from there to its place. */
-HS_INLINE hs_real *room_of_column(const hs_variation *v, int own, int k, hs_real *all, hs_real *spread) {
+HS_INLINE hs_real *room_of_column(const hs_blocks of, int k, hs_real *all, hs_real *spread) {
+  const hs_variation *const v = of.v;
+  const int own = of.own;
+  if (of.whole) return all + (k + 1) * own;
   return v->columns[k + 1] - v->columns[k] == own ? all + v->columns[k] : spread;
 }
 
-HS_INLINE void place_column(const hs_variation *v, int own, int k, const hs_real *column, hs_real *all) {
+HS_INLINE void place_column(const hs_blocks of, int k, const hs_real *column, hs_real *all) {
+  const hs_variation *const v = of.v;
+  const int own = of.own;
+  if (of.whole) return;
   const int begin = v->columns[k], count = v->columns[k + 1] - begin;
   if (count == own) return;
   for (int i = 0; i < count; i++) all[begin + i] = column[v->rows[begin - own + i]];
@@ -63,9 +72,9 @@ HS_INLINE void solve_all(hs_run *run, hs_blocks blocks, hs_real *right, hs_real 
   if (!v) return;
   add_linked(radau, v, found, right);
   for (int k = 0; k < v->count; k++) {
-    hs_real *const room = room_of_column(v, own, k, found, radau->spread[1]);
-    solve_own(radau, own, of, spread_column(v, own, k, right, radau->spread[0]), room);
-    place_column(v, own, k, room, found);
+    hs_real *const room = room_of_column(blocks, k, found, radau->spread[1]);
+    solve_own(radau, own, of, spread_column(blocks, k, right, radau->spread[0]), room);
+    place_column(blocks, k, room, found);
   }
 }
 
@@ -81,12 +90,12 @@ HS_INLINE void solve_all_complex(hs_run *run, hs_blocks blocks, hs_real *const *
   add_linked(radau, v, a, right[0]);
   add_linked(radau, v, b, right[1]);
   for (int k = 0; k < v->count; k++) {
-    const hs_real *const both[2] = {spread_column(v, own, k, right[0], spread[0]),
-                                    spread_column(v, own, k, right[1], spread[1])};
-    hs_real *const c = room_of_column(v, own, k, a, spread[2]), *const d = room_of_column(v, own, k, b, spread[3]);
+    const hs_real *const both[2] = {spread_column(blocks, k, right[0], spread[0]),
+                                    spread_column(blocks, k, right[1], spread[1])};
+    hs_real *const c = room_of_column(blocks, k, a, spread[2]), *const d = room_of_column(blocks, k, b, spread[3]);
     solve_own_complex(radau, own, of, both, c, d);
-    place_column(v, own, k, c, a);
-    place_column(v, own, k, d, b);
+    place_column(blocks, k, c, a);
+    place_column(blocks, k, d, b);
   }
 }
 

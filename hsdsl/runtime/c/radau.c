@@ -204,12 +204,12 @@ HS_INLINE int settle_in(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exa
 }
 
 static int settle_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
-  const hs_blocks of = {2, 2, 0, 0};
+  const hs_blocks of = {2, 2, 0, 0, 0};
   return settle_in(run, of, t, h, exactly, closer);
 }
 
 static int settle_3(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
-  const hs_blocks of = {3, 3, 0, 0};
+  const hs_blocks of = {3, 3, 0, 0, 0};
   return settle_in(run, of, t, h, exactly, closer);
 }
 
@@ -217,26 +217,31 @@ static int settle_n(hs_run *run, hs_time t, hs_real h, int exactly, int closer) 
   return settle_in(run, blocks_of(run->here.table), t, h, exactly, closer);
 }
 
-/* The same where two or three states have columns. */
+/* The same where columns have the derivatives of two or three states. */
 static int settle_columns_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   const hs_variation *const v = columns_of(run->here.table);
-  const hs_blocks of = {v->columns[v->count], 2, v, 0};
+  const hs_blocks of = {2 * (1 + v->count), 2, v, 0, 1};
   return settle_in(run, of, t, h, exactly, closer);
 }
 
 static int settle_columns_3(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   const hs_variation *const v = columns_of(run->here.table);
-  const hs_blocks of = {v->columns[v->count], 3, v, 0};
+  const hs_blocks of = {3 * (1 + v->count), 3, v, 0, 1};
   return settle_in(run, of, t, h, exactly, closer);
 }
 
+/* Whether there are such columns, and nothing less. */
+HS_INLINE int has_columns(const hs_run *run) {
+  const hs_variation *const v = columns_of(run->here.table);
+  return v && v->columns[v->count] == v->own * (1 + v->count);
+}
+
 HS_INLINE int settle(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactly, int closer) {
-  const int varied = columns_of(run->here.table) != 0;
-  switch (of.own) {
-    case 2: return (varied ? settle_columns_2 : settle_2)(run, t, h, exactly, closer);
-    case 3: return (varied ? settle_columns_3 : settle_3)(run, t, h, exactly, closer);
-    default: return settle_n(run, t, h, exactly, closer);
-  }
+  if (!columns_of(run->here.table) && of.n == 2) return settle_2(run, t, h, exactly, closer);
+  if (!columns_of(run->here.table) && of.n == 3) return settle_3(run, t, h, exactly, closer);
+  if (has_columns(run) && of.own == 2) return settle_columns_2(run, t, h, exactly, closer);
+  if (has_columns(run) && of.own == 3) return settle_columns_3(run, t, h, exactly, closer);
+  return settle_n(run, t, h, exactly, closer);
 }
 
 /* Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do. */
@@ -301,14 +306,15 @@ HS_INLINE int radau_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
 /* Try a step, solved to its tolerance; compiled for two and three states apart, a tenth faster, and a third where these
    have columns. */
 static int radau_step(hs_run *run, hs_time t, hs_real h) {
-  static const hs_blocks two = {2, 2, 0, 0}, three = {3, 3, 0, 0};
-  const hs_blocks of = blocks_of(run->here.table), columns_2 = {of.n, 2, of.v, 0}, columns_3 = {of.n, 3, of.v, 0};
-  const int varied = columns_of(run->here.table) != 0;
-  switch (of.own) {
-    case 2: return varied ? radau_step_in(run, columns_2, t, h) : radau_step_in(run, two, t, h);
-    case 3: return varied ? radau_step_in(run, columns_3, t, h) : radau_step_in(run, three, t, h);
-    default: return radau_step_in(run, of, t, h);
+  static const hs_blocks two = {2, 2, 0, 0, 0}, three = {3, 3, 0, 0, 0};
+  const hs_blocks of = blocks_of(run->here.table);
+  if (!columns_of(run->here.table) && of.n == 2) return radau_step_in(run, two, t, h);
+  if (!columns_of(run->here.table) && of.n == 3) return radau_step_in(run, three, t, h);
+  if (has_columns(run) && (of.own == 2 || of.own == 3)) {
+    const hs_blocks pairs = {2 * (1 + of.v->count), 2, of.v, 0, 1}, triples = {3 * (1 + of.v->count), 3, of.v, 0, 1};
+    return of.own == 2 ? radau_step_in(run, pairs, t, h) : radau_step_in(run, triples, t, h);
   }
+  return radau_step_in(run, of, t, h);
 }
 
 /* The sum of the absolute terms of a state's derivative at run->z, as the flow's derivatives tell. */

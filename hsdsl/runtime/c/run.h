@@ -136,11 +136,13 @@ static inline const hs_variation *columns_of(const hs_mode *mode) {
 }
 
 /* What a step solves for: n states that flow, the `own` ones of which have a matrix, and columns of derivatives of them
-   where they have a variation; 0 for none. `of` is the pattern of the matrix where it is sparse, else 0. */
+   where they have a variation; 0 for none. `of` is the pattern of the matrix where it is sparse, else 0. `whole` says
+   that every column has derivatives of all own states: then n is (1 + columns) own. */
 typedef struct {
   int n, own;
   const hs_variation *v;
   const hs_elimination *of;
+  int whole;
 } hs_blocks;
 
 /* Numbers that lay_out_method() takes of it, as a constant: see workspace.h. */
