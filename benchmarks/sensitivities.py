@@ -1,13 +1,16 @@
 """What derivatives cost: the processor time of a sensitivity as a multiple of that of the run, both prepared before.
 
 Both are timed in turns in one process; the ratios are medians. Methods of high order keep a finer tolerance for
-derivatives: the last column is the ratio to a run that keeps it too.
+derivatives: the last column is the ratio to a run that keeps it too. With the name of a model it prints the ratios for
+the first name, the first two names, and so on.
 
     python benchmarks/sensitivities.py
+    python benchmarks/sensitivities.py stiff-switch
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from statistics import median
@@ -59,8 +62,25 @@ def line(name: str) -> str:
     return f"{name:26} {took * 1e3:8.3f} {one:12.2f} {every:7.2f} {1 + len(names):10} {every / finer:15.2f}"
 
 
+def growth(name: str) -> str:
+    """The ratios of a model by how many derivatives there are."""
+    model = hsdsl.load(f"models/{name}.yaml")
+    states = model.program.modes[model.program.initial_mode].states
+    names = [*model.program.parameters, *(f"initial.{x}" for x in states)]
+    firsts = [names[: k + 1] for k in range(len(names))]
+    calls: list[Callable[[], Any]] = [lambda: model.simulate(scheme="located", method="auto", tolerance=TOLERANCE)]
+    calls += [lambda first=first: model.sensitivity(first, tolerance=None) for first in firsts]
+    for call in calls:
+        call()
+    took, shares = ratios(calls)
+    return f"{name}, run of {took * 1e3:.3f} ms: " + ", ".join(f"{k} {r:.2f}" for k, r in enumerate(shares, 1))
+
+
 def main() -> None:
-    """Print a line for each model."""
+    """Print a line for each model, or one for each that is named."""
+    if len(sys.argv) > 1:
+        print(*map(growth, sys.argv[1:]), sep="\n")
+        return
     print(f"{'model':26} {'run, ms':>8} {'of one name':>12} {'of all':>7} {'names + 1':>10} {'same tolerance':>15}")
     for name in MODELS:
         print(line(name), flush=True)
