@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 Number = Any  # float or mpmath.mpf, as the arithmetic makes them
@@ -51,7 +51,7 @@ class Arithmetic:
     isfinite: Callable[[Number], bool]
     functions: Mapping[str, Any]
 
-    @property
+    @cached_property
     def zero(self) -> Number:
         """Zero of this type."""
         return self.constant(Fraction(0))

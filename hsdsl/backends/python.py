@@ -27,6 +27,7 @@ class PythonKernel:
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
         self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
+        self._bound: dict[int, tuple[Sequence[Number], ModeKernel]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
         self._constants = dict(zip(program.constants.names, constants(), strict=True))
 
@@ -64,7 +65,13 @@ class PythonKernel:
         return name in self._constants
 
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
-        """Bind a mode to parameter values and input segments."""
+        """Bind a mode to parameter values and input segments; the last binding of each mode is kept."""
+        last = self._bound.get(mode)
+        if last is None or last[0] is not data or not isinstance(data, tuple):  # what else there is may have changed
+            last = self._bound[mode] = data, self._bind(mode, data)
+        return last[1]
+
+    def _bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         routines = self._program.flows[mode].routines
         if mode not in self._modes:
             self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")

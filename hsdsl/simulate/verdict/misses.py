@@ -107,25 +107,20 @@ def _turning(run: RunView, steps: Parts) -> list[Open]:
     with np.errstate(all="ignore"):
         parts, open_ = undecided(steps, decides, HALVINGS)
     order = np.lexsort((parts.start, parts.row))
-    found: list[Open] = []
-    for k in range(count):
-        mine = [i for i in order if open_[i, k]]
-        spans = [
-            Open(int(parts.row[i]), k, float(parts.start[i]), float(parts.start[i] + parts.width[i])) for i in mine
-        ]
-        found += _together(spans)
+    found = (each for k in range(count) for each in _joined(parts, order[open_[order, k]], k))
     return sorted(found, key=lambda each: (each.row, each.start))
 
 
-def _together(spans: list[Open]) -> list[Open]:
-    """Join parts that follow each other."""
-    joined: list[Open] = []
-    for span in spans:
-        if joined and joined[-1].row == span.row and span.start <= joined[-1].end:
-            joined[-1] = joined[-1]._replace(end=max(span.end, joined[-1].end))
-        else:
-            joined.append(span)
-    return joined
+def _joined(parts: Parts, which: NDArray[np.int64], surface: int) -> list[Open]:
+    """Join those of the parts that follow each other; they are in order, and none overlap."""
+    if not which.size:
+        return []
+    row, start = parts.row[which], parts.start[which]
+    end = start + parts.width[which]
+    apart = (row[1:] != row[:-1]) | (start[1:] > end[:-1])
+    first, last = np.r_[True, apart], np.r_[apart, True]
+    joined = zip(row[first].tolist(), start[first].tolist(), end[last].tolist(), strict=True)
+    return [Open(at, surface, begin, until) for at, begin, until in joined]
 
 
 def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | None:
