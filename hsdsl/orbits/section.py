@@ -90,7 +90,7 @@ class Section:
 
     def slopes(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Array:
         """The derivatives of a passage that ends with a transition."""
-        moves, n = found.transitions[index], len(self.states)
+        moves, n = found.transition(index), len(self.states)
         slopes = np.zeros((n + 1, n + 2))
         columns = [*range(n), *([n] if self.phase else []), *([n + 1] if parameter else [])]
         for column, by in zip(columns, wrt, strict=True):

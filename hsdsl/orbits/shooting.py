@@ -116,13 +116,15 @@ def drifting(passage: Return) -> tuple[int, ...]:
 
 def _shifts(passage: Return, by: str) -> bool:
     """Whether a state that begins elsewhere shifts states by constants all along a passage, and no transition."""
-    run = passage.execution
-    for arc in run.arcs:
-        rows = [row for row in range(arc.first, arc.last + 1) if run.times[row] <= passage.time]
-        for column in (k for k, x in enumerate(arc.states) if rows and x in _columns(own(arc.states), by)):
+    run, table = passage.execution, passage.execution.arc_table
+    arc = np.repeat(np.arange(len(table.first)), np.diff(table.first, append=len(run.times)))
+    for number, states in enumerate(table.layouts):
+        rows = np.flatnonzero((run.times <= passage.time) & (table.layout[arc] == number))
+        for column in (k for k, x in enumerate(states) if x in _columns(own(states), by)):
             moved = run.values[rows, column].astype(float)
-            still = moved[0] if arc.states[column] != shift_name(by) else 0.0
-            if np.max(np.abs(moved - still)) >= SYMMETRY:
+            if states[column] != shift_name(by):
+                moved -= run.values[table.first[arc[rows]], column].astype(float)
+            if np.max(np.abs(moved), initial=0.0) >= SYMMETRY:
                 return False
     return True
 

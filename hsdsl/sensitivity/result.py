@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
+from hsdsl.execution import Array, Execution, Samples, Verdict
 from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import landing, parted
 from hsdsl.sensitivity.state_names import MEASURED, derivative_name, own, rate_name, shift_name, slope_name
@@ -229,9 +229,11 @@ class Sensitivity:
     @cached_property
     def transitions(self) -> tuple[TransitionSlopes, ...]:
         """The derivatives of every transition."""
-        return tuple(self._transition(made) for made in self.execution.transitions)
+        return tuple(map(self.transition, range(len(self.execution.transitions))))
 
-    def _transition(self, made: Transition) -> TransitionSlopes:
+    def transition(self, index: int) -> TransitionSlopes:
+        """The derivatives of one transition."""
+        made = self.execution.transitions[index]
         after, exists = made.after or {}, self._exists_at(made.index)
         time = self._shifts(after)
         before = self._followed(made.source, made.time, made.before, time, False)
