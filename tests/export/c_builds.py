@@ -19,7 +19,8 @@ from hsdsl.runtime.library import RUNTIME
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COMPILERS: dict[str, list[str]] = {name: [path] for name in ("gcc", "clang") if (path := which(name))}
-if find_spec("ziglang") and "clang" not in COMPILERS:
+OF_PACKAGES = {"clang"} if find_spec("ziglang") and "clang" not in COMPILERS else set[str]()
+if OF_PACKAGES:
     COMPILERS["clang"] = [sys.executable, "-m", "ziglang", "cc", "-Wno-unused-command-line-argument"]
 USING = """
 hsdsl: 1

@@ -11,7 +11,7 @@ from shutil import which
 from typing import Any
 
 import pytest
-from export.c_builds import COMPILERS, USING, built, exported, output
+from export.c_builds import COMPILERS, OF_PACKAGES, USING, built, exported, output
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -26,7 +26,8 @@ FAST = {"bouncing-ball", "thermostat", "digital-control"}
 EACH = [
     pytest.param(
         path.stem, compiler,
-        marks=() if path.stem in FAST else pytest.mark.campaign if (k + i) % len(COMPILERS) else pytest.mark.slow,
+        marks=[pytest.mark.exports] * (compiler in OF_PACKAGES) if path.stem in FAST
+        else pytest.mark.campaign if (k + i) % len(COMPILERS) else pytest.mark.slow,
     )
     for k, path in enumerate(sorted(MODELS.glob("*.yaml")))
     for i, compiler in enumerate(COMPILERS)

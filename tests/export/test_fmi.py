@@ -25,6 +25,8 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'h
 from fmpy.fmi1 import FMICallException  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
+pytestmark = pytest.mark.exports
+
 STANDARD = Path(fmpy.__file__).parent / "c-code"  # the headers of both versions
 MODELS = Path(__file__).parents[2] / "models"
 NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml"))]

@@ -24,6 +24,7 @@ os.environ.setdefault("XLA_FLAGS", "--xla_cpu_max_isa=AVX")
 jax: Any = pytest.importorskip("jax")
 from export.jax_modules import SETTINGS, assert_same, imported, jitted  # noqa: E402
 
+pytestmark = pytest.mark.exports
 jnp = jax.numpy
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"

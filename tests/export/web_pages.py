@@ -21,13 +21,17 @@ CHROMIUM = next(filter(None, map(which, ("chromium", "chromium-browser", "google
 DRIVER = which("chromedriver")
 MISSING = [name for name, there in (("Chromium", CHROMIUM), ("chromedriver", DRIVER)) if not there]
 MISSING += [f"the package {name}" for name in ("selenium", "ziglang") if find_spec(name) is None]
-needs_compiler = pytest.mark.skipif(find_spec("ziglang") is None, reason="without the package ziglang")
+
+
+def needs_compiler(tests: Any) -> Any:
+    """Mark tests that compile for the web; without a compiler they are skipped."""
+    return pytest.mark.exports(pytest.mark.skipif(find_spec("ziglang") is None, reason="without ziglang")(tests))
 
 
 def in_browser(tests: Any) -> Any:
     """Mark tests that need a browser; without one they are skipped."""
     skipped = pytest.mark.skipif(bool(MISSING), reason=f"without {', '.join(MISSING)}")
-    return pytest.mark.tools(skipped(tests))
+    return pytest.mark.exports(pytest.mark.tools(skipped(tests)))
 
 
 def exported(model: Model, folder: Path, **arguments: Any) -> Path:
