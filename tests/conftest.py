@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -37,3 +38,32 @@ def control_c() -> Iterator[None]:
     sys.unraisablehook = hook
     if ours:
         signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="session")
+def compiled_loop() -> Path | None:
+    """The hand-written loop as the user's cache keeps it: seconds of compiling for tests with a cache of their own."""
+    from hsdsl.cache import find
+    from hsdsl.runtime import library
+    from hsdsl.runtime.compiler import NoCompiler, find_compiler
+
+    text, symbol = library.LOOP
+    with suppress(NoCompiler):
+        library.load(text, symbol, lambda: [text])
+        return find(library.KIND, library._key(text, find_compiler()))
+    return None
+
+
+@pytest.fixture
+def with_loop(compiled_loop: Path | None) -> Callable[[], None]:
+    """Put the compiled loop into the cache that the test has."""
+
+    def put() -> None:
+        from hsdsl.cache import keep
+        from hsdsl.runtime import library
+
+        if compiled_loop is not None:
+            content = compiled_loop.read_bytes()
+            keep(library.KIND, compiled_loop.parent.name, ".so", lambda target: target.write_bytes(content) and None)
+
+    return put

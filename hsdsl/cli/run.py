@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -59,7 +58,6 @@ def run(
         if outputs is None and plot is None and animate is None and experiment.in_numbers():
             ahead.begin(ModelFiles.read(model, None, text))
         loaded = _load(model, text, engine, precision, experiment.scheme)
-        gc.freeze()  # what was imported is no garbage: a run with many transitions is not held up by it
         settings = experiment.settings(engine=engine, precision=precision)
         names = chosen_names(outputs, loaded.columns)
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)

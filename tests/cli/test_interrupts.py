@@ -31,7 +31,7 @@ COMMANDS = {
     "distance": ["distance", BALL, "--from", "fly h=1 v=0", "--to", "fly h=2 v=0", "--json"],
     "doctor": ["doctor", "--json"],
 }
-MANY = [4, pytest.param(200, marks=pytest.mark.campaign)]
+MANY = [2, pytest.param(200, marks=pytest.mark.campaign)]
 
 
 def started(arguments: list[str], folder: Path) -> subprocess.Popen[bytes]:

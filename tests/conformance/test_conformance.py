@@ -30,6 +30,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,13 @@ def read(path: Path) -> Any:
 
 
 SETTINGS: dict[str, dict[str, str]] = read(HERE / "settings.yaml")
+NUMBERS = ("step", "tolerance", "relaxation")
+
+
+def given(setting: str) -> dict[str, Any]:
+    """A setting as arguments of a run; its numbers are exact, and need no parsing each time."""
+    named = {name: value for name, value in SETTINGS[setting].items() if name != "only"}
+    return {name: Fraction(value) if name in NUMBERS else value for name, value in named.items()}
 
 
 @dataclass(frozen=True)
@@ -290,8 +298,7 @@ def no_run_is_endless() -> Iterator[None]:
 @pytest.mark.parametrize(("name", "run", "setting", "scheme", "engine"), parameters())
 def test_conformance(name: str, run: Run, setting: str, scheme: str, engine: str) -> None:
     with mp.workdps(45):
-        arguments = {**SETTINGS[setting], **run.arguments, "engine": engine, "scheme": scheme}
-        arguments.pop("only", None)
+        arguments = {**given(setting), **run.arguments, "engine": engine, "scheme": scheme}
         for whole in ("precision", "max_transitions"):
             if whole in arguments:
                 arguments[whole] = int(arguments[whole])

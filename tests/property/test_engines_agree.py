@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 import pytest
 from engines import assert_engines_agree, needs_compiler
@@ -15,6 +16,7 @@ from hsdsl.model import Model
 from hsdsl.runtime.structures import SCHEMES
 
 pytestmark = needs_compiler
+STOPPING = (1, 4, 5, 6, 8, 9, 11, 14, 17, 19)  # in every way, and none refused
 
 
 def runs_of(text: str, every: tuple[dict, ...], schemes: list[str]) -> list[Execution]:
@@ -30,24 +32,24 @@ def runs_of(text: str, every: tuple[dict, ...], schemes: list[str]) -> list[Exec
         return []
 
 
-def check(seeds: range) -> Counter[str]:
+def check(seeds: Iterable[int]) -> Counter[str]:
     return Counter(run.stop.reason for seed in seeds for run in runs_of(random_model(seed), SETTINGS, list(SCHEMES)))
 
 
-def check_smooth(seeds: range) -> Counter[str]:
+def check_smooth(seeds: Iterable[int]) -> Counter[str]:
     schemes = list(SCHEMES)
     texts = map(smooth_model, seeds)
     return Counter(run.stop.reason for text in texts for run in runs_of(text, SMOOTH_SETTINGS, schemes))
 
 
 def test_random_models_run_alike() -> None:
-    reasons = check(range(20))
-    assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain"}, reasons
+    reasons = check(STOPPING)
+    assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain", "zeno"}, reasons
 
 
 def test_smooth_random_models_run_alike_by_taylor_series() -> None:
-    reasons = check_smooth(range(20))
-    assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain"}, reasons
+    reasons = check_smooth(STOPPING)
+    assert set(reasons) >= {"until", "transition_limit", "not_finite", "left_domain", "zeno"}, reasons
 
 
 @pytest.mark.parametrize(

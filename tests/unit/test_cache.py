@@ -187,9 +187,10 @@ READ_ONLY = "mount --bind {0} {0} && mount -o remount,bind,ro {0} && ! touch {0}
 
 @needs_compiler
 @posix
-def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: Path) -> None:
+def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: Path, with_loop) -> None:
     if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode:
         pytest.skip("no name spaces here")
+    with_loop()
     subprocess.run(RUN, check=True, capture_output=True)
     before = sorted(folder.rglob("*"))
     code = "import hsdsl.runtime.library as l; l._compile = None; from hsdsl.cli import main; main()"
@@ -267,7 +268,8 @@ def test_without_a_folder_it_compiles_for_this_process(monkeypatch, tmp_path: Pa
 
 
 @needs_compiler
-def test_processes_may_compile_the_same_at_once() -> None:
+def test_processes_may_compile_the_same_at_once(with_loop) -> None:
+    with_loop()
     command = [sys.executable, "-m", "hsdsl", "run", str(MODELS[0]), "--json", "--engine", "c", "--scheme", "relaxed"]
     running = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(3)]
     for process in running:
@@ -285,7 +287,8 @@ def test_a_program_seen_before_is_the_program(path: Path) -> None:
     assert second.system.digest == first.system.digest
 
 
-def test_a_run_seen_before_is_the_run() -> None:
+def test_a_run_seen_before_is_the_run(with_loop) -> None:
+    with_loop()
     path = ROOT / "models" / "pronking-runner.yaml"
     first, second = hsdsl.load(path), hsdsl.load(path)
     assert alike(first.simulate(engine="python")) == alike(hsdsl.load(path).simulate(engine="python"))
@@ -329,7 +332,8 @@ def test_what_is_no_program_is_not_taken(folder: Path) -> None:
 
 @needs_compiler
 @pytest.mark.parametrize("program", [LIGHT, LIGHT_COMMAND], ids=["call", "command"])
-def test_a_run_of_a_model_seen_before_imports_little(program: str) -> None:
+def test_a_run_of_a_model_seen_before_imports_little(program: str, with_loop) -> None:
+    with_loop()
     command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
     said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
     by_another_process = program == LIGHT_COMMAND  # see `hsdsl.ahead`
@@ -343,7 +347,10 @@ OTHERS = ("hsdsl.report.summary", "hsdsl.elaborate", "hsdsl.lower", "hsdsl.backe
 
 @needs_compiler
 @pytest.mark.parametrize(("name", "more"), [("thermostat", LOOKS), ("oscillator-with-stop-1", ())])
-def test_a_run_of_a_model_seen_before_imports_no_loop_and_no_summary(name: str, more: tuple[str, ...]) -> None:
+def test_a_run_of_a_model_seen_before_imports_no_loop_and_no_summary(
+    name: str, more: tuple[str, ...], with_loop
+) -> None:
+    with_loop()
     unneeded = (*HEAVY, *PYTHON_LOOP, *OTHERS, *more)
     command = [sys.executable, "-c", LIGHT_COMMAND, str(ROOT / "models" / f"{name}.yaml"), *unneeded]
     said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]

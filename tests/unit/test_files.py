@@ -175,7 +175,8 @@ PIPES = [
 
 @posix
 @pytest.mark.parametrize("command", PIPES)
-def test_a_model_comes_through_a_pipe(command, tmp_path):
+def test_a_model_comes_through_a_pipe(command, tmp_path, with_loop):
+    with_loop()
     (tmp_path / "m.yaml").write_text(WITH_DATA)
     (tmp_path / "rest").write_text("# the end\n")
     (tmp_path / "u.csv").write_text("time,u\n0,7\n")
@@ -184,7 +185,8 @@ def test_a_model_comes_through_a_pipe(command, tmp_path):
 
 
 @posix
-def test_every_verb_reads_a_pipe_once(tmp_path):
+def test_every_verb_reads_a_pipe_once(tmp_path, with_loop):
+    with_loop()
     (tmp_path / "m.yaml").write_text(LOCATED)
     for verb in ("validate -", "lint -", "distance - --from 'm x=0' --to 'm x=1'", "distance - m.yaml", "lint --fix -"):
         done = shell(f"cat m.yaml | hsdsl {verb}", tmp_path)

@@ -22,7 +22,7 @@ from hsdsl.program_cache import _rows
 from hsdsl.runtime.kernel import SYMBOL
 from hsdsl.sparsity import elimination
 
-SIZES = 70, 140
+SIZES = 40, 80
 RUNNER = Path(__file__).parents[2] / "models" / "pronking-runner.yaml"
 FUNCTION = re.compile(r"^static .*?^}$", re.MULTILINE | re.DOTALL)
 
