@@ -105,7 +105,7 @@ def followers(given: Mapping[str, Any]) -> tuple[list[Affine], list[Any]]:
 
 def exact_slopes(exact: Any, given: Mapping[str, Any], by: str, until: Any, guesses: list[float]) -> list[list[Any]]:
     """Differences of what `executions` gives."""
-    moved = [given | {by: given[by] * (1 + way * STEP)} for way in (1, -1)]
+    moved = [{**given, by: given[by] * (1 + way * STEP)} for way in (1, -1)]
     ahead, behind = (executions(*exact(each), until, guesses) for each in moved)
     return [
         [(p - q) / (2 * STEP * given[by]) for p, q in zip(a, b, strict=True)]
