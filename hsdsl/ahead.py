@@ -22,7 +22,8 @@ from hsdsl.files import ModelFiles
 from hsdsl.limits import applied, cores
 from hsdsl.program import Program
 
-Answer = tuple[Program, ModelFiles] | ModelError | None
+Lowered = tuple[Program, Program | None, ModelFiles]  # as it is, with modes of sliding where it has them, its bytes
+Answer = Lowered | ModelError | None
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ def _saves_time() -> bool:
     )
 
 
-def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Program, ModelFiles] | None:
-    """The program of a model that was begun, and all bytes that it was made from; None where there is none.
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
+    """The programs of a model that was begun, and all bytes that they were made from; None where there is none.
 
     Modules that are needed afterwards are imported while the other process works.
 
@@ -133,6 +134,7 @@ def _lowered(files: ModelFiles) -> Answer:
     import gc
 
     gc.disable()  # while nothing is imported that could be garbage
+    from hsdsl.completion import with_sliding
     from hsdsl.elaborate import elaborate_files
     from hsdsl.lower import lower
 
@@ -141,7 +143,12 @@ def _lowered(files: ModelFiles) -> Answer:
     try:
         system = elaborate_files(files).system
         with applied(files.limits):
-            return lower(system), files.with_data(system.files)
+            program = sliding = lower(system)
+            if system.experiment.completion != "auto":
+                sliding = None
+            elif (slides := with_sliding(system)) is not system:
+                sliding = lower(slides)
+            return program, sliding, files.with_data(system.files)
     except ModelError as error:
         return error
 

@@ -38,6 +38,7 @@ _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() i
 LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
 Row = list[Any]
 Part = tuple[tuple[str, ...], ...]  # names that a model is reduced to, and then those that the rest is reduced to
+SLIDING = ("", "sliding")  # in their place: the model with a mode for each surface that two modes press on
 
 
 def key_of(files: ModelFiles, part: Part = ()) -> str:

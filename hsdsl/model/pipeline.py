@@ -23,6 +23,7 @@ from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.parts import numbered
 from hsdsl.program import Program
+from hsdsl.program_cache import SLIDING
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Problem, prepare
@@ -45,9 +46,11 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         return Pipeline(None, time.perf_counter() - began, files, program)
     lowered = ahead.taken(files, _RUNNING)
     if lowered is not None:
-        program, files = lowered
+        program, sliding, files = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
         made.keep(program)
+        if sliding is not None:
+            made.keep(sliding, (SLIDING,))
         return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
@@ -63,7 +66,7 @@ class Pipeline:
     """The stages of a checked model, and runs prepared from them; ``seconds`` is the time spent on them.
 
     Pickled it is the model's files and its program. ``part`` has the names that it was reduced to, and ``left_out`` the
-    states that it lost by that; ``slides`` says that surfaces on which modes press have modes of their own.
+    states that it lost by that; it has `SLIDING` where surfaces on which modes press have modes of their own.
     """
 
     def __init__(
@@ -74,13 +77,12 @@ class Pipeline:
         program: Program | None = None,
         part: program_cache.Part = (),
         left_out: tuple[str, ...] = (),
-        slides: bool = False,
     ) -> None:
         if system is not None:
             self.system = system
         if program is not None:
             self.program = program
-        self._files, self._part, self._left_out, self._slides = files, part, left_out, slides
+        self._files, self._part, self._left_out = files, part, left_out
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
@@ -113,13 +115,15 @@ class Pipeline:
     @cached_property
     def system(self) -> HybridSystem:
         """The mathematics; of a cached model it is elaborated from the bytes read at first."""
+        assert self._files is not None
+        return self._part_of(_elaborated(self._files))
+
+    def _part_of(self, system: HybridSystem) -> HybridSystem:
         from hsdsl.elaborate.slicing import only
 
-        assert self._files is not None
-        system = _elaborated(self._files)
         for names in self._part:
-            system = only(system, names)
-        return self._with_sliding(system) if self._slides else system
+            system = self._with_sliding(system) if names == SLIDING else only(system, names)
+        return system
 
     def _with_sliding(self, system: HybridSystem) -> HybridSystem:
         from hsdsl.completion import with_sliding
@@ -130,10 +134,19 @@ class Pipeline:
     @cached_property
     def sliding(self) -> Pipeline:
         """The pipeline of the model with a mode for each surface that two modes press on."""
+        if SLIDING in self._part:
+            return self
+        files, part = self._files, (*self._part, SLIDING)
+        cached = None if files is None else program_cache.find(files, part)
+        if cached is not None:
+            program, files = cached
+            whole = len(program.modes) == len(self.program.modes)
+            return self if whole else Pipeline(None, self.seconds["load"], files, program, part, self._left_out)
         system = self._with_sliding(self.system)
-        whole = self._slides or system is self.system
-        files, part, left_out = self._files, self._part, self._left_out
-        return self if whole else Pipeline(system, self.seconds["load"], files, None, part, left_out, slides=True)
+        if system is self.system:
+            self.keep(self.program, part)
+            return self
+        return Pipeline(system, self.seconds["load"], files, None, part, self._left_out)
 
     @cached_property
     def program(self) -> Program:
@@ -149,7 +162,7 @@ class Pipeline:
     def keep(self, program: Program, part: program_cache.Part = ()) -> None:
         """Keep a program for later runs."""
         known = program.method in (None, "auto", *METHODS)  # else it is refused, with its place
-        if known and self._files is not None and not self._slides:
+        if known and self._files is not None:
             program_cache.keep(self._files, program, part)
 
     @property
@@ -237,13 +250,9 @@ class Pipeline:
     def drivable(self) -> Pipeline:
         """The pipeline of the same model with inputs that can be driven from outside."""
         from hsdsl.elaborate import drivable
-        from hsdsl.elaborate.slicing import only
 
         assert self._files is not None
-        system = drivable(self._files)
-        for names in self._part:
-            system = only(system, names)
-        return Pipeline(system)
+        return Pipeline(self._part_of(drivable(self._files)))
 
     def derived(self, name: tuple[str, ...], make: Callable[[], HybridSystem]) -> Pipeline:
         """The pipeline of a system made of this one, whose program is kept under a name of its own."""

@@ -30,9 +30,9 @@ def loaded(monkeypatch, tmp_path):
 def test_the_program_and_its_files_are_those_made_here():
     files = ModelFiles.read(MODELS / "digital-control.yaml")
     ahead.begin(files)
-    program, complete = ahead.taken(files) or pytest.fail("no answer")
+    program, sliding, complete = ahead.taken(files) or pytest.fail("no answer")
     system = elaborate_files(files).system
-    assert program == lower(system)
+    assert program == lower(system) and sliding is None
     assert complete == files.with_data(system.files)
     assert ahead.taken(files) is None
 
