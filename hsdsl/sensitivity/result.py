@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.execution import Array, Execution, Samples, Verdict
+from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import landing, parted
 from hsdsl.sensitivity.state_names import MEASURED, derivative_name, own, rate_name, shift_name, slope_name
