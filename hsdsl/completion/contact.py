@@ -8,14 +8,25 @@ the reset's directions that keeps R(x) = x.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.core.relational import Relational
 
 from hsdsl.completion.counts import counts_of
-from hsdsl.completion.nearby import SMALL, Nearby, Point, cancelled, fixed_point, mode_of_part, rank, symbols, value_at
+from hsdsl.completion.nearby import (
+    SMALL,
+    Nearby,
+    Point,
+    along,
+    cancelled,
+    fixed_point,
+    mode_of_part,
+    rank,
+    symbols,
+    value_at,
+)
 from hsdsl.completion.printer import text_of
 from hsdsl.system import TIME, Edge, Mode, Surface
 
@@ -85,7 +96,7 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
         return None
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
                       reset=symbols(mode.states), reset_texts=mode.states)  # fmt: skip
-    further, ends = _ends_of_condition(release, edge.condition)
+    further, ends = _ends_of_condition(release, edge.condition, lambda value: _is_kept(value, near, rows, push, at))
     rate = cancelled(near.along(near.guard))
     return Contact(
         k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts
@@ -138,8 +149,19 @@ def _push(near: Nearby, at: Point):
     return rate, None
 
 
-def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> tuple[list[Edge], list[sp.Basic]]:
-    """Edges where an `if` may end, one for each inequality in it and each way that counts, and when it does there."""
+def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Expr, at: Point) -> bool:
+    """Whether a value is zero all along the guard, and rises where the flow presses: what it decides never ends."""
+    constrained = {near.states[i]: row for i, row in rows.items()}
+    stays = along(value, near.among(value), lambda x: constrained[x] if x in constrained else near.flow(x))
+    presses = value_at(near.along(value), at) * value_at(push, at) > 0
+    return presses and abs(value_at(value, at)) <= SMALL and abs(value_at(stays, at)) <= SMALL
+
+
+def _ends_of_condition(release: Edge, condition: sp.Basic | None, is_kept: Callable[[sp.Expr], bool]):
+    """Edges where an `if` may end, one for each inequality in it and each way that counts, and when it does there.
+
+    An inequality of a value that ``is_kept`` ends nowhere.
+    """
     edges: list[Edge] = []
     ends: list[sp.Basic] = []
     if condition is None:
@@ -148,6 +170,8 @@ def _ends_of_condition(release: Edge, condition: sp.Basic | None) -> tuple[list[
     plain = isinstance(condition, Relational) or (isinstance(condition, sp.And) and set(condition.args) == set(atoms))
     for atom in atoms:
         falling = atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
+        if is_kept(falling):
+            continue
         for residual, beyond in ((-falling, sp.false),) if plain else ((-falling, sp.false), (falling, sp.true)):
             edges.append(replace(release, surface=zero_surface(residual)))
             ends.append(sp.Not(condition.xreplace({atom: beyond})))

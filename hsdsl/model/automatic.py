@@ -78,7 +78,7 @@ def _adaptive(
             return METHODS["radau"], str(stiff)
     if mode in near and not _has_derivatives(kernel, timeline, mode, x):
         return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
-    kinked = next((each.name for each in program.modes if each.tape is None), None)
+    kinked = next((each.name for each in program.flows if each.tape is None), None)
     if kinked is not None:
         return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max or floor of a state"
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"

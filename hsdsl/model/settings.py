@@ -137,7 +137,7 @@ def check_method(method: Method | None, program: Program, arithmetic: Arithmetic
             f"of {arithmetic.digits}",
             f"use method '{AUTO}', whose coefficients are exact",
         )
-    kinked = next((mode.name for mode in program.modes if mode.tape is None), None)
+    kinked = next((mode.name for mode in program.flows if mode.tape is None), None)
     if method is not None and method.is_series and kinked is not None:
         raise UsageError(
             f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max or floor "

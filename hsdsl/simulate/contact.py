@@ -35,11 +35,8 @@ def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
     return in_contact(run, here, holding) if holding else here
 
 
-def keeping(run: Run, here: ModeState, surfaces: Iterable[int], touched: Collection[int] = ()) -> list[int]:
-    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there.
-
-    The guards of the edges ``touched`` hold it already.
-    """
+def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
+    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there."""
     edges, sizes, found = here.mode.edges, Vector(), list[int]()
     for k in surfaces if run.settings.completion != "none" else ():
         if not k < len(edges) or edges[k].contact is None:
@@ -54,13 +51,13 @@ def keeping(run: Run, here: ModeState, surfaces: Iterable[int], touched: Collect
         except DOMAIN_ERRORS:
             continue
         found.append(k)
-    return [k for k in found if is_possible(run, here, k, here.t, here.x, {*touched, *found})]
+    return found
 
 
 def pressing(run: Run, here: ModeState, kept: list[int]) -> list[int] | None:
     """Those of some guards that hold the state together; None where that is not one choice.
 
-    The flow that the others leave presses on each that holds, and on none of those that do not.
+    The flow that the others leave presses on each that holds while its `if` does, and on none of those that do not.
     """
     holding: list[int] | None = kept
     for _ in range(len(kept) + 2):
@@ -77,7 +74,8 @@ def pushes(run: Run, here: ModeState, holding: list[int], kept: list[int]) -> li
         r = looked.kernel.surfaces(here.t, *here.x)
         if any(r[k] != r[k] for k in kept):
             return None
-        return [k for k in kept if r[k] < -looked.surfaces.roundoff_bound(k, here.t, here.x)]
+        pushed = [k for k in kept if r[k] < -looked.surfaces.roundoff_bound(k, here.t, here.x)]
+        return [k for k in pushed if is_possible(run, here, k, here.t, here.x, holding)]
     except DOMAIN_ERRORS:
         return []
 

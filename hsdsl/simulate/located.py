@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import behind_end, contact_at, in_touch
+from hsdsl.simulate.contact import behind_end, contact_at, in_touch, is_possible
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
@@ -149,11 +149,18 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
     beyond = pieces[0].coefficients[0] > first
     for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
-        if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]:
+        if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0] or holds_next(run, here, k, time, q):
             if not rise.certain:
                 run.diagnostics.unsettled(here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return touched(run, here, span, k, pieces)
+
+
+def holds_next(run: Run, here: ModeState, k: int, t: Number, x: State) -> bool:
+    """Whether the `if` of an edge that leads back, of a surface that the state was on, holds next along the flow."""
+    edge = here.mode.edges[k]
+    returns = edge.target == here.index and edge.target_states == here.mode.states == here.arc.states
+    return returns and k in here.surfaces.active and is_possible(run, here, k, t, x, ())
 
 
 def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:

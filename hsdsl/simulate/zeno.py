@@ -106,7 +106,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         if edge.contact is None or run.settings.completion == "none":
             possible = is_possible(run, here, k, end, q, touched)
             return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
-        if keeping(run, there, edges, touched) != edges:
+        if keeping(run, there, edges) != edges:
             return here
         if not {*edges} & {*(pressing(run, there, sorted({*touched, *edges})) or ())}:
             return here

@@ -240,6 +240,84 @@ experiment: {{until: 4}}
     assert run.final.state["x"] == pytest.approx(falls, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("floor", "speed", "right"),
+    [
+        ("A*sin(w*t)", "A*w*cos(w*t)", 0.1 * math.sin(21)),
+        ("0.1*exp(-t)", "-0.1*exp(-t)", 0.1 * math.exp(-3)),
+        ("t**2/7 - t/3", "2*t/7 - 1/3", 2 / 7),
+    ],
+)
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "radau"])
+def test_an_if_that_motion_along_its_guard_keeps_at_its_limit_does_not_end(
+    floor: str, speed: str, right: float, method: str
+) -> None:
+    """A body falls relative to the floor that carries it, however both move."""
+    text = f"""
+hsdsl: 1
+parameters: {{A: 0.1, w: 7}}
+modes:
+  a:
+    flow: {{x: v, v: -9.81}}
+    transitions: [{{when: x <= {floor}, if: v < {speed}, to: a, reset: {{v: "{speed} - 0.3*(v - ({speed}))"}}}}]
+initial: {{mode: a, x: 1, v: 0}}
+experiment: {{until: 3}}
+"""
+    run = assert_engines_agree(hsdsl.loads(text), method=method)
+    assert run.stop.reason == "until" and run.final.state["x"] == pytest.approx(right, abs=1e-8)
+
+
+def test_lifting_the_upper_of_two_bodies_leaves_the_lower_one_on_its_floor() -> None:
+    text = """
+hsdsl: 1
+inputs: {u: {times: [0, 0.7], values: [0, 1], hold: zero}}
+modes:
+  a:
+    flow: {x: v, y: w, v: -10 + 6*u, w: -10 + 14*u}
+    transitions:
+      - {name: floor, when: x <= 0, if: v < 0, to: a, reset: {v: -v/3}}
+      - {name: bodies, when: y <= x, if: w < v, to: a, reset: {v: (v + w)/2, w: (v + w)/2}}
+initial: {mode: a, x: 0, y: 0, v: 0, w: 0}
+experiment: {until: 2}
+"""
+    for method in ("taylor", "dopri5", "radau"):
+        run = assert_engines_agree(hsdsl.loads(text), method=method)
+        assert run.final.state["x"] == pytest.approx(0, abs=1e-12)
+        assert run.final.state["y"] == pytest.approx(4 * 1.3**2 / 2, abs=1e-9)
+
+
+@pytest.mark.parametrize("reset", ["select(abs(v) - 0.2, -v/2, 0)", "max(0, -v/2 - 0.05)", "-v*select(n - 9, 0, 1/2)"])
+def test_a_body_whose_rest_is_not_known_does_not_pass_its_floor(reset: str) -> None:
+    text = f"""
+hsdsl: 1
+modes:
+  a:
+    flow: {{x: v, v: -2, n: 0}}
+    transitions: [{{when: x <= 0, if: v < 0, to: a, reset: {{v: "{reset}", n: n + 1}}}}]
+initial: {{mode: a, x: 1, v: 0, n: 0}}
+experiment: {{until: 6, max_transitions: 500}}
+"""
+    run = assert_engines_agree(hsdsl.loads(text))
+    assert run.final.state["x"] == pytest.approx(0, abs=1e-12)
+    assert run.stop.reason in ("zeno", "transition_limit")
+
+
+def test_motion_along_a_guard_whose_flow_has_a_choice_is_stepped_by_an_automatic_method() -> None:
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, v: -2, top: 0}
+    transitions: [{when: x <= 0, to: a, reset: {v: -v/2, top: "select(top + v, top, -v)"}}]
+initial: {mode: a, x: 1, v: 0, top: 0}
+experiment: {until: 6}
+"""
+    run = assert_engines_agree(hsdsl.loads(text))
+    assert run.final.state == pytest.approx({"x": 0, "v": 0, "top": 2}, abs=1e-12)
+    with pytest.raises(hsdsl.UsageError, match="needs smooth flows"):
+        hsdsl.loads(text).simulate(method="taylor")
+
+
 def test_motion_along_a_curved_guard_goes_on_behind_what_interrupts_it() -> None:
     """Kinks of inputs and impacts of others find the state on its guard to round-off, not to the tolerance."""
     text = """

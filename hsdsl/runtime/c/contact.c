@@ -89,15 +89,14 @@ static void bind_mode(hs_run *run) {
   run->here.p = run->own_p;
 }
 
-/* Where the flow that the guards of other edges leave, of those `touched` and of those `found`, each 0 for none, takes a
-   state: off by round-off where the reset of edge k changes it, to run->after. */
-static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
+/* Where the flow that the guards of other edges leave, of those `touched`, 0 for none, takes a state: off by round-off
+   where the reset of edge k changes it, to run->after. */
+static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
   const hs_mode *const own = run->here.table;
   const hs_edge *const edge = &own->edge[k];
   int others = 0;
   hs_real after = 0.0;
-  for (int j = 0; j < own->edges; j++)
-    others += run->others[j] = j != k && ((touched && touched[j]) || (found && found[j]));
+  for (int j = 0; touched && j < own->edges; j++) others += run->others[j] = j != k && touched[j];
   if (others) bind_contacts(run, run->others, run->others);
   const int raised = run->here.table->flow(run->here.p, t, x, run->at);
   if (others) bind_mode(run);
@@ -112,30 +111,28 @@ static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *t
 }
 
 /* Whether the `if` of edge k, of the state's mode, holds at a point, or next along the flow that others leave. */
-static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched, const int *found) {
+static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
   const int now = condition(run, k, t, x);
   if (now || !run->here.table->edge[k].conditional) return now == 1;
-  return !pressed(run, k, t, x, touched, found) && condition(run, k, t, run->after) == 1;
+  return !pressed(run, k, t, x, touched) && condition(run, k, t, run->after) == 1;
 }
 
 /* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
-   many. Those `touched` hold it already. */
-static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks, const int *touched) {
+   many. */
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
   const hs_mode_state *here = &run->here;
-  int *const found = run->beyond;
   int count = 0, sized = 0; /* sized: whether the flow's sizes are known, -1 where they have no value */
   for (int k = 0; k < here->table->edges; k++) {
     const hs_edge *edge = &here->table->edge[k];
-    found[k] = 0;
-    if (!marks[k] || edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
+    const int marked = marks[k];
+    marks[k] = 0;
+    if (!marked || edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
     if (edge->push_order == 2) {
       if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
       if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
     }
-    found[k] = 1;
+    count += marks[k] = 1;
   }
-  for (int k = 0; k < here->table->edges; k++)
-    count += marks[k] = found[k] && is_possible(run, k, t, x, touched, found);
   return count;
 }
 
@@ -156,9 +153,12 @@ static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, con
       run->active_surfaces[k] = active;
       apart |= run->values[k] != run->values[k];
     }
-    same &= !pushed[k] == !held[k];
   }
   bind_mode(run);
+  for (int k = 0; k < edges; k++) {
+    pushed[k] = pushed[k] && is_possible(run, k, t, x, held);
+    same &= !pushed[k] == !held[k];
+  }
   return apart ? RAISED : same;
 }
 
@@ -193,7 +193,7 @@ static int contact_at(hs_run *run) {
   int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
   if (!here->standing || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
   for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
-  const int count = keeping(run, here->t, run->x, kept, 0);
+  const int count = keeping(run, here->t, run->x, kept);
   if (!count) return GOES_ON;
   if (!pressing(run, here->t, run->x, kept, count, held, run->beyond)) {
     for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
@@ -242,8 +242,8 @@ static int behind_end(hs_run *run, int j, hs_time *t) {
     *t = earlier(from + after, segment_end(run));
     for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + (*t - from) * run->end[s];
     bind_mode(run);
-    for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept, 0);
-    raised = holds && pressed(run, of, *t, run->z, run->kept, 0);
+    for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept);
+    raised = holds && pressed(run, of, *t, run->z, run->kept);
     bind_contacts(run, run->kept, run->kept);
     if (!holds) return 1;
     raised = raised || surface(run, j, *t, run->after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);

@@ -55,6 +55,14 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
   return span_point(run, best, &crossing->time, &crossing->state);
 }
 
+/* Whether the `if` of an edge that leads back, of a surface that the state was on, holds next along the flow. */
+static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x) {
+  const hs_mode_state *here = &run->here;
+  const hs_edge *edge = &here->table->edge[k];
+  const int returns = edge->target == here->mode && here->dimension && here->dimension == here->table->dimension;
+  return returns && run->active_surfaces[k] && is_possible(run, k, t, x, 0);
+}
+
 /* Find the first point of the step where surface k is crossed and its condition holds: 1, or 0. */
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
@@ -69,7 +77,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     if (settled(run, k, &rise, crossing)) return RAISED;
     const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
     if (holds == RAISED) return RAISED;
-    if (!holds) continue;
+    if (!holds && !holds_next(run, k, crossing->time, crossing->state)) continue;
     if (!rise.certain) doubt(run, k, crossing->time);
     crossing->edge = k;
     crossing->depth = 0.0;

@@ -201,7 +201,7 @@ static int nearly_over(hs_run *run, int k, hs_time *left) {
 static int is_held(hs_run *run, hs_time end, const hs_real *q, int count) {
   const int edges = run->here.table->edges;
   int all = 0, presses = 0;
-  if (keeping(run, end, q, run->kept, run->held) != count) return 0;
+  if (keeping(run, end, q, run->kept) != count) return 0;
   for (int j = 0; j < edges; j++) all += run->held[j];
   if (!pressing(run, end, q, run->held, all, run->kept, run->beyond)) return 0;
   for (int j = 0; j < edges; j++) presses |= run->tail[j] && run->kept[j];
@@ -231,7 +231,7 @@ static int close_tail(hs_run *run, int k) {
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && keeps(run, end, q, j) != 1) return GOES_ON;
   if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
-    if (!is_possible(run, k, end, q, run->held, 0)) return GOES_ON;
+    if (!is_possible(run, k, end, q, run->held)) return GOES_ON;
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
