@@ -78,6 +78,12 @@ static void sparse_solve_complex(int n, const hs_elimination *of, const hs_real 
                                  const hs_real *const right[2], hs_real *restrict a, hs_real *restrict b,
                                  hs_real *restrict one, hs_real *restrict two);
 
+/* blocks.c */
+HS_INLINE hs_blocks blocks_of(const hs_mode *mode);
+HS_INLINE void solve_all(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found);
+HS_INLINE void solve_all_complex(hs_run *run, hs_blocks blocks, hs_real *const *right, hs_real *a, hs_real *b);
+static void link_columns(hs_run *run, const hs_variation *v, hs_real h);
+
 /* newton.c, and what it calls of the implicit method */
 HS_INLINE int iterate(hs_run *run, hs_blocks of, hs_time t, hs_real h);
 HS_INLINE int to_tolerance(hs_run *run, hs_blocks of, hs_time t, hs_real h);
