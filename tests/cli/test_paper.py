@@ -208,6 +208,7 @@ def the_page_says_what_a_run_finds(out, printed):
         assert row["what"] in printed
 
 
+@pytest.mark.slow
 def test_a_quick_run_from_end_to_end(tmp_path, capsys):
     """One test, since one run serves all checks and takes half a minute."""
     out = tmp_path / "figures"

@@ -240,7 +240,7 @@ def test_estimate(command, model):
     assert 0.2 * error < estimate["final"]["x"] <= 2 * error
 
 
-def wait_until_it_computes(pid, seconds=3.0):
+def wait_until_it_computes(pid, seconds=2.0):
     """Wait until a process has had so much of the processor that it is past its imports."""
     file, deadline = Path(f"/proc/{pid}/stat"), time.monotonic() + 60
     while file.exists() and time.monotonic() < deadline:

@@ -56,7 +56,7 @@ LIMIT = 30  # seconds for one run; most take a thousandth of it
 
 def read(path: Path) -> Any:
     """YAML with every scalar as text."""
-    return yaml.load(path.read_text(), Loader=yaml.BaseLoader)
+    return yaml.load(path.read_text(), Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
 SETTINGS: dict[str, dict[str, str]] = read(HERE / "settings.yaml")
