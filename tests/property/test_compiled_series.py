@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
 import pytest
@@ -22,28 +23,33 @@ pytestmark = needs_compiler
 DATA = [0.35, 1.0, 0.2, 0.0]
 
 
-def kernels(flow: str, surface: str) -> tuple[Taylor, Taylor] | None:
-    """The series of a model of one mode, by either kernel; None where it is refused or kinked."""
-    text = f"""
+MODE = """
+  m{0}:
+    flow: {{x: "{1}", v: "1 - x*v/4"}}
+    domain: ["{2} <= v", "abs(x) <= 10", "x*{2} >= t"]"""
+MODEL = """
 hsdsl: 1
 parameters: {{a: 0.35}}
 inputs: {{u: {{times: [0, 10], values: [1, 3], hold: linear}}}}
-modes:
-  m:
-    flow: {{x: "{flow}", v: "1 - x*v/4"}}
-    domain: ["{surface} <= v", "abs(x) <= 10", "x*{surface} >= t"]
-initial: {{mode: m, x: 0, v: 0}}
+modes:{0}
+initial: {{mode: m0, x: 0, v: 0}}
 experiment: {{until: 1}}
 """
+
+
+def kernels(*each: tuple[str, str]) -> list[tuple[Taylor, Taylor]] | None:
+    """The series of a mode for each flow and surface, by either kernel; None where one is refused or kinked."""
+    text = MODEL.format("".join(MODE.format(k, *texts) for k, texts in enumerate(each)))
     try:
         program = Model(elaborate("random.yaml", text=text.encode())).program
     except Exception:  # the language refuses what has no value anywhere, such as 1/0
         return None
     both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
     data = [*DATA, *(1.0 for _ in program.switches)]
-    found = both[0].taylor(0, data), both[1].taylor(0, data)
-    assert (found[0] is None) == (found[1] is None)
-    return None if found[0] is None or found[1] is None else (found[0], found[1])
+    found = [(both[0].taylor(k, data), both[1].taylor(k, data)) for k in range(len(each))]
+    assert all((one is None) == (other is None) for one, other in found)
+    pairs = [(one, other) for one, other in found if one is not None and other is not None]
+    return pairs if len(pairs) == len(each) else None
 
 
 def outcome(taylor: Taylor, order: int, point: tuple[float, ...]) -> object:
@@ -75,8 +81,7 @@ def assert_alike(both: tuple[Taylor, Taylor], points: list[tuple[float, ...]], o
     st.integers(4, 20),
 )
 def test_random_series_agree_at_any_point(flow, surface, points, order):
-    both = kernels(flow, surface)
-    if both is not None:
+    for both in kernels((flow, surface)) or ():
         assert_alike(both, points, order)
 
 
@@ -87,10 +92,17 @@ SMOOTH += ["sin(3*t)*x", "t*x", "(t**2 - 1)*exp(x)", "x/(1 + t)", "1/(t**3 + x)"
 SMOOTH += ["sqrt(t)", "u*x", "sin(u)", "exp(a)*x", "3", "x**2 + sin(x**2)", "atan2(t, x)", "log(1 + t)"]
 
 
+@cache
+def smooth() -> list[tuple[Taylor, Taylor]]:
+    """The series of all of them, compiled together."""
+    found = kernels(*((text, text) for text in SMOOTH))
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize("text", SMOOTH)
 def test_each_operation_agrees_at_special_points(text):
-    both = kernels(text, text)
-    assert both is not None
+    both = smooth()[SMOOTH.index(text)]
     points = [(0.25, x, v) for x, v in product(SPECIAL, SPECIAL)]
     points += [(t, x, 0.75) for t, x in product((0.0, -0.5, 2.0), (0.5, 1.25, -0.25, 3.5))]
     assert assert_alike(both, points, 12) > 0
@@ -99,8 +111,9 @@ def test_each_operation_agrees_at_special_points(text):
 
 def test_constants_without_a_value_leave_no_coefficients():
     point, pole = (0.0, 1.0, 1.0), "(a - 7/20)"
-    in_flow, in_surface = kernels(f"x/{pole}", "v"), kernels("x", f"v/{pole}")
-    assert in_flow is not None and in_surface is not None
+    found = kernels((f"x/{pole}", "v"), ("x", f"v/{pole}"))
+    assert found is not None
+    in_flow, in_surface = found
     for taylor in in_flow:
         assert outcome(taylor, 8, point) is None
     for taylor in in_surface:
