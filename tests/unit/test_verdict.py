@@ -344,3 +344,87 @@ def test_numbers_that_overflow_raise_no_warnings():
         run = model.simulate(method="rk4", step=1e-3, until=0.1)
         model.estimate(run)
         assert run.estimated().verdict.theorem == "left"
+
+
+DIP = """hsdsl: 1
+modes:
+  a:
+    flow: {x: 1}
+    transitions: [{name: hit, when: "x - 7*exp(-((x - 3)/WIDTH)**2) >= 0", if: IF, to: b}]
+  b: {final: true}
+initial: {mode: a, x: 1.5}
+experiment: {until: 4}
+"""
+LEAVING = """hsdsl: 1
+parameters: {k: 3/4, c: 524288, x0: 7/524288, T: log(524288/7)/(3/4) + BY}
+modes:
+  a:
+    flow: {x: k*(x - c), y: 1}
+    transitions: [{name: down, when: x <= c - 1, to: b}, {name: timer, when: y >= T, to: d}]
+  b: {final: true}
+  d: {final: true}
+initial: {mode: a, x: c - x0, y: 0}
+experiment: {until: 25, method: taylor, tolerance: 1e-12}
+"""
+AT_TIME = """hsdsl: 1
+parameters: {T: asin(3/5) + BY}
+modes:
+  a: {flow: {x: v, v: -x}, transitions: [{name: hit, when: x >= 0.6, if: t >= T, to: b}]}
+  b: {final: true}
+initial: {mode: a, x: 0, v: 1}
+experiment: {until: 2, tolerance: 1e-6, method: dopri5}
+"""
+AT_ONCE = """hsdsl: 1
+modes:
+  a: {flow: {x: v, v: -x}, transitions: [{name: A, when: x >= 0.25, to: b, reset: {z: VALUE}}]}
+  b: {flow: {x: 1, z: 0}, transitions: [{name: B, when: x >= 0.25, to: c}]}
+  c: {flow: {z: -1}, transitions: [{name: C, when: z >= 0, to: d}]}
+  d: {final: true}
+initial: {mode: a, x: 0, v: 1}
+experiment: {until: 2, tolerance: 1e-5, method: dopri5}
+"""
+ORDERS = """hsdsl: 1
+parameters: {s: sin(0.7), s2: sin(1.4 + BY)}
+modes:
+  a:
+    flow: {x: v, v: -x, y: w, w: -4*y, z: 0, q: 1}
+    transitions:
+      - {name: A, when: x >= s, to: a, reset: {x: -2, v: 0, z: 1 + FACTOR*(z - 1) + 3e-10}}
+      - {name: B, when: y >= s2, to: a, reset: {y: -2, w: 0, z: z - 3e-10}}
+      - {name: C, when: q >= 0.9, to: b}
+  b: {flow: {z: 2*(z - 1)}, transitions: [{when: z >= 2, to: end}, {when: z <= 0, to: end}]}
+  end: {final: true}
+initial: {mode: a, x: 0, v: 1, y: 0, w: 2, z: 1, q: 0}
+experiment: {until: 3, tolerance: 1e-6, method: dopri5}
+"""
+WITHIN_THE_ERROR = {  # a model, its values that leave a hypothesis open, and some that do not
+    "a surface is left and reached again inside a step": (
+        DIP,
+        {"WIDTH": "3e-4", "IF": "x >= 2"},
+        [{"WIDTH": "3e-4", "IF": "x >= 5"}, {"WIDTH": "1", "IF": "x >= 4"}, {"WIDTH": "1", "IF": "x >= 2"}],
+    ),
+    "round-off of a large state grows": (LEAVING, {"BY": "6e-7"}, [{"BY": "0.01"}, {"BY": "-0.01"}]),
+    "an if by time turns true at the crossing": (AT_TIME, {"BY": "2e-9"}, [{"BY": "-0.02"}, {"BY": "0.02"}]),
+    "the second reset of an instant lands on a surface": (
+        AT_ONCE,
+        {"VALUE": "v - sqrt(15)/4 + 2e-9"},
+        [{"VALUE": "v - 2"}, {"VALUE": "0"}],
+    ),
+    "points are close and not the same": (ORDERS, {"BY": "6e-8", "FACTOR": "3"}, [{"BY": "6e-8", "FACTOR": "1"}]),
+}
+
+
+def filled(text: str, values: dict[str, str]) -> hsdsl.Model:
+    for word, value in values.items():
+        text = text.replace(word, value)
+    return hsdsl.loads(text)
+
+
+@pytest.mark.parametrize("engine", ["c", "python"])
+@pytest.mark.parametrize("case", WITHIN_THE_ERROR)
+def test_what_is_within_the_error_is_unknown(case: str, engine: str) -> None:
+    text, doubtful, plain = WITHIN_THE_ERROR[case]
+    assert filled(text, doubtful).simulate(engine=engine).verdict.theorem == "unknown"
+    for values in plain:
+        verdict = filled(text, values).simulate(engine=engine).verdict
+        assert verdict.theorem == "holds", (values, verdict)

@@ -134,6 +134,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.matrix = numbers(store, (int64_t)(d + 1) * (d + 1));
   v.bernstein = numbers(store, (int64_t)(LEVELS + 1) * (d + 1) * w);
   v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
+  v.beyond_at_start = take(store, m, sizeof(int));
   v.enough = numbers(store, w);
   v.beyond = numbers(store, w);
   v.missed = numbers(store, (int64_t)w * model->modes);

@@ -4,18 +4,22 @@
 #include "screen_series.c"
 
 #define MOST_CHANGES 8     /* of Newton's method */
+#define ROUNDED 0x1p-52   /* of a state that moves, in each step */
 #define CLOSED_IN 0x1p-10 /* of the tie tolerance: a crossing's time is found */
 
-/* Bound what round-off of the flow may do in the run's step, by the flow where that ends, to `noise`; 0 where it has no
-   bound. */
+/* Bound what round-off of the flow and of states that move may do in the run's step, by the flow where that ends, to
+   `noise`; 0 where it has no bound. Where an arc begins, states are rounded too. */
 static int bound_noise(hs_view *v, const hs_companion *c) {
-  const double *const x = recorded_row(&v->s->run, c->row + 1);
+  const double *const start = recorded_row(&v->s->run, c->row), *const x = recorded_row(&v->s->run, c->row + 1);
   const hs_formula *const flow = &v->f->flow;
   v->rounded[0] = rounded(v->s->run.times[c->row + 1], 0.0, 0.0);
   for (int i = 0; i < v->n; i++) v->rounded[1 + i] = rounded(x[i], 0.0, 0.0);
   rounded_operations(v->f, flow->first, flow->last, first_register(v), v->rounded);
   for (int i = 0; i < v->n; i++) {
-    c->noise[i] = c->h * v->rounded[flow->result[i]].off;
+    const hs_rounded f = v->rounded[flow->result[i]];
+    const double share = f.value != 0.0 ? ROUNDED : 0.0;
+    c->noise[i] = c->h * f.off + share * fabs(x[i]);
+    if (c->begins) c->x[i] += copysign(share * start[i], c->x[i] - start[i]);
     if (!hs_finite(c->noise[i])) return 0;
   }
   return 1;
@@ -73,6 +77,7 @@ static int accompany(hs_view *v) {
       double *const measured = s->measured + row * run->width;
       const double *const x = recorded_row(run, row);
       c.row = row - 1, c.h = row > run->arc[a].first ? run->times[row] - run->times[row - 1] : 0.0;
+      c.begins = row == run->arc[a].first + 1;
       if (c.h > 0) {
         if (!bound_noise(v, &c) || !(s->correction ? correct_step(v, &c, measured) : expand_step(v, &c))) return 0;
         copy(c.x, c.y, v->n);

@@ -33,10 +33,13 @@ static int untouched(const hs_view *v, int k) {
   return v->table->affine;
 }
 
-/* Whether a transition follows another at one instant. */
-static int follows_another(const hs_view *v, int64_t j) {
+/* Whether a transition follows one at the same instant that others were tied with. */
+static int follows_choice(const hs_view *v, int64_t j) {
   const hs_transition *const made = v->s->run.transition + j;
-  return j > 0 && made->time - made[-1].resumed <= tie_of(v->s, made->time);
+  const double tie = tie_of(v->s, made->time);
+  for (int64_t k = 1; k <= j && made->time - made[-k].resumed <= tie; k++)
+    if (made[-k].alternatives) return 1;
+  return 0;
 }
 
 /* Whether an arc begins on, or within the error of, a surface. */
@@ -44,7 +47,7 @@ static int lands_close(hs_view *v) {
   const hs_record *run = &v->s->run;
   const hs_arc *arc = &run->arc[v->arc];
   const double t = run->times[arc->first], *x = recorded_row(run, arc->first);
-  if (arc->jump && follows_another(v, arc->jump - 1)) return 0; /* its choice decides */
+  if (arc->jump && follows_choice(v, arc->jump - 1)) return 0; /* its choice decides */
   if (evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope)) return 1;
   for (int k = 0; k < v->table->surfaces; k++) {
     hs_judged found;

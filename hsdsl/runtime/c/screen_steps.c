@@ -13,7 +13,7 @@ static int turns_close(hs_view *v, const int *before, int *open) {
   range_operations(v->f, surfaces->first, surfaces->last, base, v->range);
   for (int k = 0; k < v->table->surfaces; k++) {
     const hs_range value = v->range[surfaces->result[k]];
-    open[k] = before[k] && !(value.high < 0);
+    open[k] = before[k] && !(v->beyond_at_start[k] ? value.low > 0 : value.high < 0);
     if (!open[k]) continue;
     const hs_formula *const rate = &v->f->rate[k];
     range_operations(v->f, rate->first, rate->last, base, v->range);
@@ -65,12 +65,23 @@ static int halves_close(hs_view *v, int64_t row, int level, double start, double
   return 0;
 }
 
+/* Find the surfaces of edges with an `if` that a step begins beyond: these may be left and reached again. */
+static int begins_beyond(hs_view *v, int64_t row) {
+  int any = 0;
+  for (int k = 0; k < v->table->surfaces; k++)
+    any |= v->beyond_at_start[k] = k < v->table->edges && v->table->edge[k].conditional;
+  if (any && evaluate_surfaces(v, v->s->run.times[row], recorded_row(&v->s->run, row))) return 0;
+  for (int k = 0; k < v->table->surfaces && any; k++) v->beyond_at_start[k] &= v->values[k] > 0;
+  return 1;
+}
+
 /* Whether a surface may turn close to zero along a step. */
 static int turns_along(hs_view *v, int64_t row) {
   const hs_record *run = &v->s->run;
   const double *x = recorded_row(run, row), *c = recorded_piece(run, row);
   const int d = v->degree, w = run->width, m = v->table->surfaces;
   if (!m) return 0;
+  if (!begins_beyond(v, row)) return 1;
   for (int i = 0; i < v->n; i++) {
     double total = 0.0, size = 0.0;
     for (int k = 0; k < d; k++) total += c[k * w + i], size += fabs(c[k * w + i]);

@@ -2,7 +2,7 @@
 
 #include "screen_view.h"
 
-#define SAME 1e-9  /* relative to the largest size that a state has in the run: one point */
+#define SAME 0x1p-44 /* round-off, relative to the largest size that a state has in the run: one point */
 #define LONGEST 64 /* transitions at one instant */
 
 /* Where a transition leads, with those that follow at once. */

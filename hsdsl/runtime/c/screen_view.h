@@ -46,6 +46,7 @@ typedef struct {
   double *matrix, *bernstein;
   double *enough, *missed; /* how wrong states were where each mode's nearest miss is */
   int *open, *unseen;
+  int *beyond_at_start; /* whether a step begins beyond each surface of an edge with an `if` */
   int *cut; /* whether a state is, where a step is cut in halves */
   int expanded, coarse; /* whether all states are expanded along the step, and whether parts are of expansions */
   hs_range *range;
@@ -68,7 +69,7 @@ typedef struct {
   double *x, *y, *moved, *noise, *lines;
   double t, h;
   int64_t row; /* where the run's step begins */
-  int order;
+  int order, begins; /* whether an arc begins there */
 } hs_companion;
 
 /* The point at which transitions go, and the time within which other surfaces are reached together with it. */

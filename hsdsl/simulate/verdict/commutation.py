@@ -16,7 +16,7 @@ from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
-SAME = 1e-9  # relative to the largest size that a state has in the run: one point
+SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
 
 Landed = tuple[str, State]

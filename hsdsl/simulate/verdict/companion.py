@@ -11,8 +11,8 @@ left out, carried along by the flow and by jumps, as long as that is small.
   a state's terms together, more are made from there on, up to as many as the run has. So growth that the run does not
   show is seen.
 - Both follow for other methods from a `correction` of the step, as long as that leaves out less than the step.
-- Round-off of the flow is much the same for both, so each step moves the companion further away from the run by the
-  most that it may do.
+- Round-off is much the same for both, so each step moves the companion further away from the run by the most that it
+  may do: that of the flow, and of states that move. Where an arc begins these are rounded, too.
 
 The companion looks for no other surface: enclosures wider than the errors decide along the run's own steps that none
 is reached.

@@ -11,6 +11,7 @@ from hsdsl.execution import Arc, Transition
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.judged import has_condition
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import LOOK_AT_CROSSING
@@ -85,7 +86,7 @@ def _findings(
         )
     if run.errors is None:
         return found
-    error = run.around(place, run.row_before(made))
-    if place.mode.edges[k].conditional and place.conditions(k, error) != {True}:
+    row = run.row_before(made)
+    if has_condition(place, k) and place.conditions(k, run.around(place, row), run.late(place, k, row)) != {True}:
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found

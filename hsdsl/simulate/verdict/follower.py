@@ -22,6 +22,7 @@ from hsdsl.simulate.verdict.correction import Array, corrected
 
 MOST_ROUNDS = 8  # of Newton's method
 CLOSED_IN = 2.0**-10  # of the tie tolerance: a crossing's time is found
+ROUNDED = 2.0**-52  # of a state that moves, in each step
 FEWEST, FURTHER = 3, 2  # the order of the first series, and by how much it grows where that is not enough
 
 
@@ -51,16 +52,21 @@ class Follower:
         for row in range(arc.first, arc.last + 1):
             h = times[row] - times[row - 1] if row > arc.first else 0.0
             if h > 0:
-                self.x, self.t = self._end(mode, row - 1, h), times[row] + shift
+                self.x, self.t = self._end(mode, row - 1, h, row == arc.first + 1), times[row] + shift
             self._compare(row, self.run.values[row], self.x)
         if made:
             self._jump(arc, made)
 
-    def _end(self, mode: int, row: int, h: float) -> State:
-        """Where the run's step from a row takes it."""
+    def _end(self, mode: int, row: int, h: float, begins: bool) -> State:
+        """Where the run's step from a row takes it; where an arc begins, its states are rounded."""
         x, end = np.asarray(self.run.values[row : row + 2, : len(self.x)], dtype=float)
         piece = np.asarray(self.run.coefficients[row][:, : len(self.x)], dtype=float)
         slope, noise = self._enclosed(mode, self.times[row + 1], end)
+        moves = slope != 0
+        noise += np.where(moves, ROUNDED * np.abs(end) / h, 0.0)
+        if begins:
+            away = np.array(self.x) - x
+            self.x = tuple((x + away + np.copysign(np.where(moves, ROUNDED * np.abs(x), 0.0), away)).tolist())
         if self.most is None:
             away = np.array(self.x) - x
             inside, further = self._corrected(mode, x, piece, h, end, np.copysign(h * noise, away))

@@ -21,7 +21,7 @@ def has_condition(place: Place, k: int) -> bool:
 
 def may_hold(run: RunView, place: Place, k: int, row: int) -> bool:
     """Whether the `if` of an edge holds at a place or at a state that the error moves it to."""
-    return place.conditions(k, run.around(place, row)) != {False}
+    return place.conditions(k, run.around(place, row), run.late(place, k, row)) != {False}
 
 
 def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | None:

@@ -52,12 +52,13 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
     if arc.first == 0:
-        if conditional and place.conditions(k, _soon(run, place, arc.first)) == {False}:
+        if conditional and place.conditions(k, _soon(run, place, arc.first), float(run.tie(place.t))) == {False}:
             return
         if abs(value) <= noise and (conditional or abs(rate) <= place.rate_roundoff(k)):
             how = "which has an `if`" if conditional else "to which the flow is tangent"
             yield Finding("start", "unknown", f"the run starts on {where}, {how}")
         return
+    assert run.errors is not None
     shift = run.shift(place, k, arc.first)
     if made is None or _tied(run, made) or abs(value) > SAFE * shift + noise:
         return
@@ -65,7 +66,8 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
         return  # it is crossed at once, on either side of it
     if _keeps(run, made, k, value):
         return
-    if conditional and place.conditions(k, run.around(place, arc.first)) == {False}:
+    late = SAFE * run.errors.late_by(place.t)
+    if conditional and place.conditions(k, run.around(place, arc.first), late) == {False}:
         return
     margin = abs(value) / shift if shift > 0 else 0.0
     yield Finding("landing", "unknown", f"the reset of {made.edge} lands {times(margin)} the error away from {where}")
@@ -79,9 +81,13 @@ def _soon(run: RunView, place: Place, row: int) -> State:
 
 
 def _tied(run: RunView, made: Transition) -> bool:
-    """Whether a transition follows another at one instant: `choices` looks at these."""
-    before = run.transitions[made.index - 1] if made.index else None
-    return before is not None and before.resumed is not None and made.time - before.resumed <= run.tie(made.time)
+    """Whether a transition follows one at the same instant that others were tied with: `choices` looks at these."""
+    for before in reversed(run.transitions[: made.index]):
+        if before.resumed is None or made.time - before.resumed > run.tie(made.time):
+            return False
+        if before.alternatives:
+            return True
+    return False
 
 
 def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:

@@ -7,7 +7,6 @@ remains are its turning points close to zero: these are looked at one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +18,14 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold, passed_over
-from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 from hsdsl.simulate.verdict.tangent import leaves_along
-from hsdsl.simulate.verdict.transparent import Passed, passed_at, transparent, undecided_condition
+from hsdsl.simulate.verdict.transparent import Passed, almost_left, passed_at, reached, spread, transparent
 
 HALVINGS = 20
 MOST_LOOKED_AT = 256  # turning points, one by one
-LOOKS = 9  # at one turning point
 
 
 class Open(NamedTuple):
@@ -94,10 +91,14 @@ def _turning(run: RunView, steps: Parts) -> list[Open]:
     if not count:
         return []
 
+    begun = np.zeros((int(steps.row.max(initial=0)) + 1, count), dtype=bool)
+    begun[steps.row, : len(mode.edges)] = _begun_beyond(run, steps)
+
     def decides(parts: Parts) -> NDArray[np.bool_]:
         kernel, t, x, n = parts.bound(run), parts.times, parts.states(SAFE), len(parts)
         values = kernel.surfaces(t, *x)
-        open_ = np.stack([~(high(r, n) < 0) for r in values], axis=1)
+        below, beyond = (np.stack([end(r, n) for r in values], axis=1) for end in (high, low))
+        open_ = np.where(begun[parts.row], ~(beyond > 0), ~(below < 0))
         for k in range(count):
             if open_[:, k].any():
                 (rate,) = kernel.rates[k](t, *x)
@@ -109,6 +110,18 @@ def _turning(run: RunView, steps: Parts) -> list[Open]:
     order = np.lexsort((parts.start, parts.row))
     found = (each for k in range(count) for each in _joined(parts, order[open_[order, k]], k))
     return sorted(found, key=lambda each: (each.row, each.start))
+
+
+def _begun_beyond(run: RunView, steps: Parts) -> NDArray[np.bool_]:
+    """Whether steps begin beyond the surfaces of edges with an `if`: these may be left and reached again."""
+    edges = run.problem.program.modes[steps.mode].edges
+    found = np.zeros((len(steps), len(edges)), dtype=bool)
+    if any(edge.conditional for edge in edges):
+        with np.errstate(all="ignore"):
+            values = steps.bound(run).surfaces(*steps.ends()[0])
+        for k, edge in enumerate(edges):
+            found[:, k] = edge.conditional & (low(values[k], len(steps)) > 0)
+    return found
 
 
 def _joined(parts: Parts, which: NDArray[np.int64], surface: int) -> list[Open]:
@@ -132,13 +145,14 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
     if run.followed and each.row == arc.first and not each.start and leaves_along(run, arc, k):
         return None
     try:
-        places = [(look(run.arithmetic.zero + s), s) for s in _shares(each)]
-        place, share = max(places, key=lambda each: each[0].value(k))
+        places = [look(run.arithmetic.zero + s) for s in spread(each.start, each.end)]
+        place = max(places, key=lambda place: place.value(k))
         if has_condition(place, k):
-            if look(run.arithmetic.zero).value(k) > 0:
-                return None  # transparent there
-            if place.value(k) > place.roundoff_bound(k):
-                return _visited(run, each, look, share, passed)
+            start = look(run.arithmetic.zero)
+            beyond = start.value(k) > start.roundoff_bound(k) or (start.value(k) > 0 and start.rate(k) > 0)
+            if beyond or place.value(k) > place.roundoff_bound(k):
+                finding = reached(run, k, (arc, each.row), {*spread(0.0, 1.0), *spread(each.start, each.end)}, passed)
+                return finding or (almost_left(run, k, each.row + 1, places) if beyond else None)
             if not may_hold(run, place, k, each.row + 1):
                 return None
         if finding := judged(run, place, k, each.row + 1, "turns back close to"):
@@ -148,19 +162,6 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
     except DOMAIN_ERRORS:
         time = show(run.times[each.row])
         return Finding("no value", "unknown", f"a surface of {arc.mode} has no value close to t = {time}")
-
-
-def _visited(run: RunView, each: Open, look: Callable[[Number], Place], share: float, passed: Passed) -> Finding | None:
-    """Look at where a step goes beyond a surface that it is beyond at a share of it: that decides, not what follows."""
-    place = closed_in(lambda s: look(s * share), lambda place: place.value(each.surface))
-    notes = passed if look(run.arithmetic.zero + 1).value(each.surface) <= 0 else {}  # else `transparent` sees it
-    if place.conditions(each.surface, run.around(place, each.row + 1)) == {True}:
-        return passed_over(place, each.surface)
-    return undecided_condition(run, place, each.surface, each.row + 1, notes)
-
-
-def _shares(each: Open) -> list[float]:
-    return [each.start + (each.end - each.start) * i / (LOOKS - 1) for i in range(LOOKS)]
 
 
 def _nearest(run: RunView, steps: Parts) -> Miss | None:
@@ -186,7 +187,7 @@ def _nearest(run: RunView, steps: Parts) -> Miss | None:
     try:
         place = closed_in(run.between(run.arc_of(row), row), lambda place: -place.rate(k))
         shift, below = run.shift(place, k, row + 1), -place.value(k)
-        if below <= 0 or (has_condition(place, k) and place.conditions(k, run.error(place, row + 1)) == {False}):
+        if below <= 0 or (has_condition(place, k) and not may_hold(run, place, k, row + 1)):
             return None
         return Miss(float(below / shift) if shift > 0 else float("inf"), place.name(k), place.t)
     except DOMAIN_ERRORS:

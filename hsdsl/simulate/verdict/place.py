@@ -66,13 +66,15 @@ class Place:
                 x = tuple(a - value * g / norm for a, g in zip(x, slopes, strict=True))
             yield x
 
-    def conditions(self, k: int, error: State) -> set[bool]:
-        """What the condition of edge k is at the state and around it, anywhere in the box of the error."""
-        found = {bool(self.kernel.conditions[k](self.t, *x)[0]) for x in self.moved_by(error)}
-        if len(found) == 1 and any(error):
+    def conditions(self, k: int, error: State, late: float) -> set[bool]:
+        """What the condition of edge k is there, and anywhere in the box of the error, so much later or earlier."""
+        times = (self.t - late, self.t, self.t + late)
+        found = {bool(self.kernel.conditions[k](t, *x)[0]) for x in self.moved_by(error) for t in times}
+        if len(found) == 1 and (late or any(error)):
+            span = Range(float(times[0]), float(times[2]))
             box = [Range(float(x - e), float(x + e)) for x, e in zip(self.x, error, strict=True)]
             try:
-                found |= {bool(self.enclosing().conditions[k](Range(float(self.t), float(self.t)), *box)[0])}
+                found |= {bool(self.enclosing().conditions[k](span, *box)[0])}
             except (Undecided, *DOMAIN_ERRORS):
                 found = {True, False}
         return found

@@ -238,6 +238,14 @@ class RunView:
         errors = (self.errors.late_by(place.t), *self.error(place, row))
         return sum((abs(g) * e for g, e in zip(gradient, errors, strict=True) if e), self.arithmetic.zero)
 
+    def late(self, place: Place, k: int, row: int) -> float:
+        """How wrong the time may be at which the step to a row reaches surface k, as often as a margin must be."""
+        assert self.errors is not None
+        rate, shift = abs(float(place.rate(k))), SAFE * float(self.shift(place, k, row))
+        step = float(self.times[row] - self.times[row - 1]) if row else 0.0
+        moved = shift / rate if rate * step > shift else step
+        return max(SAFE * self.errors.late_by(place.t), moved)
+
     def roundoff(self, place: Place, k: int, row: int) -> Number:
         """Round-off of surface k at a place, by the largest sizes that the states have had."""
         assert self.errors is not None

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from hsdsl.arithmetic import Number
+from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
-from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.judged import closed_in
+from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.judged import closed_in, may_hold, passed_over
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low
+
+LOOKS = 9  # at one turning point
 
 Passed = dict[str, list[Number]]  # when the surface of an edge was passed while its `if` was false
 
@@ -42,9 +46,50 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
                 yield finding
 
 
+def spread(start: float, end: float) -> list[float]:
+    """Shares of a step at which it is looked at, from one to another."""
+    return [start + (end - start) * i / (LOOKS - 1) for i in range(LOOKS)]
+
+
+def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], passed: Passed) -> Finding | None:
+    """Look at where a step reaches surface k, of an edge with an `if`, from inside: each such place decides.
+
+    ``step`` is its arc and the row where it begins; ``at`` are the shares between which such places are found.
+    """
+    (arc, row), shares, look = step, sorted(at), run.between(*step)
+    start = look(run.arithmetic.zero)
+    values = [start.value(k), *(look(run.arithmetic.zero + s).value(k) for s in shares[1:])]
+    if values[0] <= start.roundoff_bound(k) and not start.rate(k) > 0:
+        values[0] = run.arithmetic.zero
+    seen = values[0] <= 0 < values[-1]  # by `transparent`
+    if run.crossed.get(arc.last) == k and row + 1 == arc.last:
+        del shares[-1]  # `crossings` looks at the end
+    for (a, before), (b, after) in pairwise(zip(shares, values, strict=False)):
+        if not before <= 0 < after:
+            continue
+        place = closed_in(lambda s: look(a + s * (b - a)), lambda place: place.value(k))  # noqa: B023
+        if place.conditions(k, run.around(place, row + 1), run.late(place, k, row + 1)) == {True}:
+            return passed_over(place, k)
+        noted = any(abs(t - place.t) <= run.tie(t) for t in passed.get(place.name(k), ()))
+        if finding := undecided_condition(run, place, k, row + 1, {} if seen or noted else passed):
+            return finding
+    return None
+
+
+def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Finding | None:
+    """Look at where a step to a row turns back close to surface k and beyond it: the error may take it inside."""
+    place = min(places, key=lambda place: place.value(k))
+    shift = run.shift(place, k, row)
+    if not 0 < place.value(k) <= SAFE * shift or not may_hold(run, place, k, row):
+        return None
+    where = f"the surface of {place.name(k)} at t = {show(place.t)}"
+    away = times(place.value(k) / shift)
+    return Finding("miss", "unknown", f"the run turns back close to {where}, beyond it by {away} the error")
+
+
 def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
     """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
-    if place.conditions(k, run.around(place, row)) == {False}:
+    if place.conditions(k, run.around(place, row), run.late(place, k, row)) == {False}:
         if not place.mode.edges[k].of_event:  # an event fires when it turns true on any of its surfaces
             passed.setdefault(place.name(k), []).append(place.t)
         return None
