@@ -397,6 +397,14 @@ modes:
 initial: {mode: a, x: 0, v: 1, y: 0, w: 2, z: 1, q: 0}
 experiment: {until: 3, tolerance: 1e-6, method: dopri5}
 """
+STEEP = """hsdsl: 1
+modes:
+  a: {flow: {x: v, v: -x, z: 0}, transitions: [{name: A, when: x >= 0.6, to: b, reset: {z: VALUE}}]}
+  b: {flow: {z: 1}, transitions: [{name: C, when: z >= 1.7, to: c}]}
+  c: {final: true}
+initial: {mode: a, x: 0, v: 1, z: 0}
+experiment: {until: 1.9, tolerance: 1e-6, method: dopri5}
+"""
 WITHIN_THE_ERROR = {  # a model, its values that leave a hypothesis open, and some that do not
     "a surface is left and reached again inside a step": (
         DIP,
@@ -409,6 +417,16 @@ WITHIN_THE_ERROR = {  # a model, its values that leave a hypothesis open, and so
         AT_ONCE,
         {"VALUE": "v - sqrt(15)/4 + 2e-9"},
         [{"VALUE": "v - 2"}, {"VALUE": "0"}],
+    ),
+    "a smooth reset is as good as a jump": (
+        STEEP,
+        {"VALUE": "1/(1 + exp(-(v - 0.8)*3e11))"},
+        [{"VALUE": "1/(1 + exp(-(v - 0.8)*30))"}, {"VALUE": "v*cos(x)/(2 - sin(v)**2)"}],
+    ),
+    "a smooth reset hides a pulse": (
+        STEEP,
+        {"VALUE": "exp(-((v - 0.8 - 3e-8)*1e10)**2)"},
+        [{"VALUE": "exp(-((v - 0.6)*20)**2)"}],
     ),
     "points are close and not the same": (ORDERS, {"BY": "6e-8", "FACTOR": "3"}, [{"BY": "6e-8", "FACTOR": "1"}]),
 }

@@ -50,8 +50,9 @@ typedef struct {
   const hs_operation *operation;
   hs_formula flow, surfaces;
   const hs_formula *rate;  /* of each surface */
+  const hs_formula *reset; /* of each edge */
   const int32_t *keeps;   /* (edge, states): whether a reset to the mode itself leaves a state as it is; else 0 */
-  const int32_t *jumping; /* (edge): whether its reset has functions that jump */
+  const int32_t *curved;  /* (edge): how many results its reset has, 0 where these are polynomials of time and states */
 } hs_formulas;
 
 /* Coefficients of corrections: see hsdsl/simulate/verdict/correction.py. */

@@ -93,15 +93,36 @@ static int ends_close(hs_view *v, int all) {
   return close;
 }
 
-/* Whether an input or a reset may jump within the error of a transition. */
+/* Whether a reset may jump within the error of a transition: over a wider box it changes little more. */
+static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
+  const hs_formula *const reset = &v->f->reset[made->edge];
+  const double late = SAFE * late_by(v, made->time);
+  const int w = v->s->model->width, results = v->f->curved[made->edge] < w ? v->f->curved[made->edge] : w;
+  double *const narrow = v->y;
+  for (int times = 1; times <= WIDER && results; times += WIDER - 1) {
+    v->range[0] = outwards(made->time - times * late, made->time + times * late, 0x1p-52);
+    for (int i = 0; i < v->n; i++) {
+      const double wide = times * SAFE * v->own[i];
+      v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
+    }
+    range_operations(v->f, reset->first, reset->last, first_register(v), v->range);
+    for (int i = 0; i < results; i++) {
+      const hs_range value = v->range[reset->result[i]];
+      const double width = value.high - value.low, size = fabs(value.high + value.low) / 2;
+      if (!hs_finite(width) || (times > 1 && !(width >= narrow[i] * WIDER / 2))) return 1;
+      narrow[i] = width > hs_max(ROUNDOFF_SHARE * HS_UNIT * size, HS_NOTHING) ? width : 0.0;
+    }
+  }
+  return 0;
+}
+
+/* Whether an input may jump within the error of a transition. */
 static int jumps_close(const hs_view *v, const hs_transition *made) {
   const hs_timeline *const timeline = v->s->timeline;
   const double late = SAFE * late_by(v, made->time);
   const int64_t here = segment_at(timeline, made->time);
   if (timeline->jump[here] && fabs(timeline->start[here] - made->time) <= late) return 1;
-  if (here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late)
-    return 1;
-  return v->s->formulas[made->mode].jumping[made->edge];
+  return here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late;
 }
 
 /* How often the error fits into what keeps a crossing, at the end of the arc. */
@@ -117,6 +138,7 @@ static void look_at_crossing(hs_view *v, int64_t j, int flown) {
   int bad = evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope) ||
             judge_surface(v, made->edge, t, x, &found);
   if (!bad) {
+    if (reset_jumps(v, made, x)) s->crossing[j] |= HS_LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
     int flat = 1;
     for (int i = 0; i < v->row->count; i++) flat &= v->gradient[i] == 0.0;
     if (flat || !(found.rate > rate_noise(v)) || v->table->edge[made->edge].conditional)

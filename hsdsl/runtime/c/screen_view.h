@@ -10,6 +10,7 @@
 #define ROUNDOFF_SHARE 64   /* units of round-off of a state's size: no error is smaller */
 #define TANGENT_UNITS 64
 #define CUTTING 0x1p-48     /* of the largest coefficient: what cutting and changing the basis may add */
+#define WIDER 8             /* a box so many times as wide: what jumps changes little more over it */
 #define LEVELS 10           /* a step is cut in halves */
 #define END_LEVELS 6        /* the part at its end, where a surface is crossed */
 #define MOST_LOOKS 128      /* at parts of one step */

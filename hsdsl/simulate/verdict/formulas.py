@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.program import JUMPS, ModeProgram, Program
+from hsdsl.program import ModeProgram, Program
 from hsdsl.runtime import structures
 
 CONSTANT = re.compile(r"q_(m?)(\d+)_(\d+)")
@@ -159,11 +159,13 @@ class Compiled:
         tape, routines = Tape(len(mode.states), data), _definitions(mode.routines.source)
         surfaces = len(mode.edges) + len(mode.walls)
         names = ["flow", "surfaces", *(f"rate_{k}" for k in range(surfaces))]
+        names += [f"reset_{k}" for k in range(len(mode.edges))]
         formulas = [tape.formula(routines[name]) for name in names]
         place = _placed(tape, 1 + len(mode.states) + len(data))
         steps = [(structures.OPERATORS.index(kind), place(a), place(b)) for kind, a, b in (*tape.fixed, *tape.moving)]
-        flow, values, *rates = (self._formula(tape, place, formula) for formula in formulas)
-        jumping = [any(map(JUMPS.search, edge.reset_texts)) for edge in mode.edges]
+        flow, values, *others = (self._formula(tape, place, formula) for formula in formulas)
+        resets = [results for *_, results in formulas[2 + surfaces :]]
+        curved = [len(results) * any(math.isinf(node.degree) for node in results) for results in resets]
         keeps = [_keeps(mode, index, k) for k in range(len(mode.edges))]
         return structures.Formulas(
             constants=len(tape.constants),
@@ -176,17 +178,18 @@ class Compiled:
             operation=self._memory(np.array(steps, np.int32)),
             flow=flow,
             surfaces=values,
-            rate=self._structures(rates),
+            rate=self._structures(others[:surfaces]),
+            reset=self._structures(others[surfaces:]),
             keeps=self._memory(np.array(keeps, np.int32)),
-            jumping=self._memory(np.array(jumping, np.int32)),
+            curved=self._memory(np.array(curved, np.int32)),
         )
 
     def _memory(self, array: Any) -> int:
         self._kept.append(array)
         return array.ctypes.data
 
-    def _structures(self, rates: list[Any]) -> Any:
-        self._kept.append((structures.Formula * max(1, len(rates)))(*rates))
+    def _structures(self, each: list[Any]) -> Any:
+        self._kept.append((structures.Formula * max(1, len(each)))(*each))
         return ctypes.addressof(self._kept[-1])
 
     def _formula(self, tape: Tape, place: Callable[[Any], int], formula: tuple[int, int, list[Node]]) -> Any:

@@ -6,13 +6,14 @@ moved by the error along the guard land on it too. Where they do not, an error d
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from math import isfinite
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.program import JUMPS
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
@@ -22,6 +23,7 @@ from hsdsl.simulate.verdict.screen import LOOK_AT_RESET
 from hsdsl.simulate.verdict.tangent import leaves_along
 
 UNITS = 64  # of round-off, and less, are no jump
+CURVED = re.compile(r"\w\(|/|\*\*")  # all resets that are no polynomials have one of these
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
@@ -123,7 +125,7 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
         yield Finding("input", "unknown", f"an input jumps within the error of the time of {where}")
     edge = place.mode.edges[k]
-    if made.after is None or not any(map(JUMPS.search, edge.reset_texts)):
+    if made.after is None or not any(map(CURVED.search, edge.reset_texts)):
         return
     error = run.around(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
@@ -132,7 +134,7 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
         max(UNITS * float(run.arithmetic.unit) * abs(float(v)), n)
         for v, n in zip(made.after.values(), noise, strict=True)
     ]
-    if any(a > b and c < a * WIDER / 2 for a, b, c in zip(narrow, least, wide, strict=True)):
+    if any(not isfinite(a) or (a > b and c < a * WIDER / 2) for a, b, c in zip(narrow, least, wide, strict=True)):
         yield Finding("reset", "unknown", f"the reset of {where} jumps within the error")
 
 
