@@ -100,6 +100,6 @@ def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Pa
 def passed_at(name: str, at: list[Number]) -> str:
     more = f" and {len(at) - 1} more times" if len(at) > 1 else ""
     return (
-        f"the surface of {name} was passed at t = {show(at[0])}{more} while its `if` was false: "
+        f"the surface of {name} was passed at t = {show(min(at))}{more} while its `if` was false: "
         "it fires only where it is reached again from inside"
     )
