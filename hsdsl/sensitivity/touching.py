@@ -37,7 +37,7 @@ def _turning(run: RunView, look: Callable[[Number], Place], row: int, k: int) ->
     try:
         place = closed_in(look, lambda place: -place.rate(k))
         shift, below = run.shift(place, k, row), -place.value(k)
-        if has_condition(place, k) and place.conditions(k, run.error(place, row)) == {False}:
+        if has_condition(place, k) and place.conditions(k, run.error(place, row), run.late(place, k, row)) == {False}:
             return
     except DOMAIN_ERRORS:
         return
