@@ -55,6 +55,16 @@ _GENERATED_C = re.compile(
 )
 _HEXADECIMAL = re.compile(r"\b0x[0-9a-f.]+p[-+]\d+")
 _WORD = re.compile(r"[^\W\d]\w*")
+_PLAIN = b"""hsdsl: 1
+modes: {m: {flow: {x: 1}}}
+initial: {mode: m, x: 0}
+experiment: {until: 1}
+"""
+_OF_PARTS = b"""hsdsl: 1
+automata: {A: {modes: {m: {flow: {x: 1}}}}}
+system: {a: {automaton: A, initial: {mode: m, x: 0}}}
+experiment: {until: 1}
+"""
 _FORBIDDEN = ("os.", "subprocess.", "socket.", "shutil.", "ctypes.", "urllib.", "ftplib.", "pty.", "pickle.")
 
 
@@ -71,6 +81,8 @@ class Guard:
         self.seen: list[str] = []
         libraries = str(Path(yaml.__file__).parents[1])
         self._readable = (self.folder, libraries, sys.prefix, sys.base_prefix, str(seeds.TESTS.parent / "hsdsl"))
+        for text in (_PLAIN, _OF_PARTS):  # annotations of documents are evaluated where they are first used
+            elaborate("model.yaml", text=text)
         sys.addaudithook(self._hook)
 
     def _hook(self, event: str, arguments: tuple[Any, ...]) -> None:
