@@ -164,6 +164,8 @@ def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     if not (expr.is_Add or expr.is_Mul or ordinary or (expr.is_Pow and expr.exp.is_Number)):
         return expr.diff(symbol)
     slopes = [(i, slope) for i, part in enumerate(expr.args) if (slope := derivative(part, symbol)) != 0]
+    if not slopes:
+        return sp.S.Zero
     if expr.is_Pow:
         return expr * (slopes[0][1] * expr.exp / expr.base)
     if ordinary:

@@ -140,10 +140,12 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
 
 def _noise(run: RunView, place: Place, k: int) -> list[float]:
     """What the enclosure of each result of a reset is wide at a point; 0 where it jumps within round-off of that."""
-    wide = _spread(run, place, k, [0.0] * len(place.x), 0.0)
-    moved = place.moved_by(tuple(UNITS * run.arithmetic.unit * abs(x) for x in place.x))
+    wide, units = _spread(run, place, k, [0.0] * len(place.x), 0.0), UNITS * run.arithmetic.unit
+    sizes = place.kernel.spreads[k](place.t, *place.x, *map(abs, place.x))
+    moved = place.moved_by(tuple(units * abs(x) for x in place.x))
     results = zip(*(place.kernel.resets[k](place.t, *x) for x in moved), strict=True)
-    return [2 * w if max(r) == min(r) else 0.0 for w, r in zip(wide, results, strict=True)]
+    apart = [max(r) - min(r) <= 4 * units * abs(size) for r, size in zip(results, sizes, strict=True)]
+    return [2 * w if little else 0.0 for w, little in zip(wide, apart, strict=True)]
 
 
 def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
