@@ -89,6 +89,25 @@ def random_scene(rng, dimensions=(1, 2), modes=3, edges=4, conditions=0.3, walle
     return Scene(sizes, tuple(walls), tuple(made))
 
 
+REACH = 4  # half width of glued boxes
+STRETCHES = {"contracting": (0.3, 0.9), "isometric": (1, 1), "expanding": (1.1, 1.9)}
+
+
+def glued_boxes(rng, modes: int, stretch: str) -> Scene:
+    """Boxes in the plane, a segment on the right side of each glued onto a line x = const of some box."""
+    one, zero = Fraction(1), Fraction(0)
+    sides = tuple(((x, y), Fraction(REACH)) for x, y in ((-one, zero), (zero, one), (zero, -one)))
+    made = []
+    for source in range(modes):
+        low, high = sorted(rational(rng, -2, 2) for _ in range(2))
+        factor = rational(rng, *STRETCHES[stretch]) * int(rng.choice((-1, 1)))
+        target = int(rng.integers(modes)) if source else int(modes > 1)
+        given = (((zero, one), high), ((zero, -one), -low))
+        matrix, offset = ((zero, zero), (zero, factor)), (rational(rng, -3, 3), zero)
+        made.append(Edge(source, target, (one, zero), Fraction(REACH), given, matrix, offset))
+    return Scene((2,) * modes, (sides,) * modes, tuple(made))
+
+
 def random_point(rng, scene):
     """A mode and a point of its domain (the middle 0 always is one)."""
     mode = int(rng.integers(len(scene.sizes)))

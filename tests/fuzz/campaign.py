@@ -26,6 +26,7 @@ from collections import Counter
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -34,7 +35,9 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).res
 sys.path = [entry for entry in sys.path if Path(entry or ".").resolve() != Path(__file__).resolve().parent]
 
 from fuzz import generators, targets  # noqa: E402
+from hsdsl.processes import Lost, in_processes  # noqa: E402
 
+Block = tuple["Counter[str]", list[dict[str, Any]], "Times", int]  # how far inputs got, faults, times, peak of memory
 KINDS = {"bytes": generators.raw, "expressions": generators.expression, "documents": generators.document}
 SECONDS, MEMORY = 5.0, 1 << 30
 BLOCK = 200
@@ -67,29 +70,32 @@ def of_index(kind: str, seed: int, index: int) -> tuple[str | bytes, Random]:
     return KINDS[kind](rng), rng
 
 
-def work(kind: str, seed: int, share: float, jobs: Any, answers: Any, now: Any) -> None:
-    """Take blocks of indices until there are none."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with tempfile.TemporaryDirectory() as folder:
-        inside = targets.prepared(Path(folder))
-        os.chdir(inside)
-        guard = targets.Guard(inside)
-        targets.feed_document(b"", Random(0), inside, 1.0)
-        base = _status("VmSize")
-        resource.setrlimit(resource.RLIMIT_AS, (base + MEMORY, base + MEMORY))
-        while (begin := jobs.get()) is not None:
-            found: list[dict[str, Any]] = []
-            ways: Counter[str] = Counter()
-            times = Times()
-            for index in range(begin, begin + BLOCK):
-                now[0], now[1] = index, os.times().user
-                with times.of_one():
-                    way, fault = one(kind, seed, index, share, guard, inside)
-                ways[way] += 1
-                if fault:
-                    found.append({"kind": kind, "seed": seed, "index": index, **fault})
-            now[0] = -1
-            answers.put((ways, found, times, _status("VmHWM")))
+def work(options: argparse.Namespace, folder: Path, at: Any, block: int) -> Block:
+    """Feed a block of inputs; ``at`` has the one that each block is at."""
+    guard, inside = _workplace(folder / str(os.getpid()))
+    found: list[dict[str, Any]] = []
+    ways: Counter[str] = Counter()
+    times = Times()
+    for index in range(options.start + block * BLOCK, options.start + (block + 1) * BLOCK):
+        at[block] = index
+        with times.of_one():
+            way, fault = one(options.kind, options.seed, index, options.share, guard, inside)
+        ways[way] += 1
+        if fault:
+            found.append({"kind": options.kind, "seed": options.seed, "index": index, **fault})
+    return ways, found, times, _status("VmHWM")
+
+
+@cache
+def _workplace(folder: Path) -> tuple[Any, Path]:
+    """The guard and the folder of a process, which may take so much memory from here on."""
+    inside = targets.prepared(folder)
+    os.chdir(inside)
+    guard = targets.Guard(inside)
+    targets.feed_document(b"", Random(0), inside, 1.0)
+    base = _status("VmSize")
+    resource.setrlimit(resource.RLIMIT_AS, (base + MEMORY, base + MEMORY))
+    return guard, inside
 
 
 @dataclass
@@ -138,8 +144,7 @@ def one(kind: str, seed: int, index: int, share: float, guard: Any, folder: Path
     if fault is None and took > SLOW:
         fault = {"what": "slow", "trace": [way]}
     if fault is not None:
-        text = data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
-        fault |= {"seconds": round(took, 2), "wall": round(time.monotonic() - clock, 2), "input": text[:3000]}
+        fault |= {"seconds": round(took, 2), "wall": round(time.monotonic() - clock, 2), "input": _text(data)[:3000]}
     return way, fault
 
 
@@ -155,91 +160,47 @@ def _status(key: str) -> int:
     return 0
 
 
-class Crew:
-    """Worker processes, replaced when they die or hang where no signal reaches them."""
-
-    def __init__(self, options: argparse.Namespace) -> None:
-        self.options = options
-        self.context = multiprocessing.get_context("spawn")
-        self.jobs = self.context.SimpleQueue()
-        self.answers = self.context.Queue()
-        self.workers = [self.hired() for _ in range(options.workers)]
-
-    def hired(self) -> tuple[Any, Any]:
-        """A new worker, and what it is at."""
-        now = self.context.Array("d", [-1.0, 0.0], lock=False)
-        arguments = (self.options.kind, self.options.seed, self.options.share, self.jobs, self.answers, now)
-        worker = self.context.Process(target=work, args=arguments, daemon=True)
-        worker.start()
-        return worker, now
-
-    def inspect(self) -> list[dict[str, Any]]:
-        """What became of workers that no longer answer; each is replaced."""
-        found: list[dict[str, Any]] = []
-        for number, (worker, now) in enumerate(self.workers):
-            stuck = worker.is_alive() and now[0] >= 0 and _user_time(worker.pid) - now[1] > 3 * SECONDS
-            if not stuck and (worker.is_alive() or now[0] < 0):
-                continue
-            if stuck:
-                worker.kill()
-            data, _ = of_index(self.options.kind, self.options.seed, int(now[0]))
-            text = data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
-            what = "hang in C" if stuck else f"died with {worker.exitcode}"
-            found.append({"kind": self.options.kind, "seed": self.options.seed, "index": int(now[0]), "what": what,
-                          "trace": [what], "input": text[:3000]})  # fmt: skip
-            self.workers[number] = self.hired()
-        return found
-
-
-def _user_time(pid: int) -> float:
-    """The processor time of a process without that of the system, which a machine short of memory charges to any."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except OSError:
-        return 0.0
-    return int(fields[11]) / os.sysconf("SC_CLK_TCK")
-
-
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Feed until the inputs or the seconds are spent."""
+    """Feed until the inputs or the seconds are spent; a process that hangs where no signal reaches it is ended."""
     began = time.monotonic()
-    crew = Crew(options)
     ways: Counter[str] = Counter()
     times = Times()
     faults: list[dict[str, Any]] = []
-    given, peak, next_index = 0, 0, options.start
-    waiting = 0
-    while True:
-        spent = given >= options.inputs or time.monotonic() - began > options.seconds
-        while not spent and waiting < 2 * options.workers:
-            crew.jobs.put(next_index)
-            next_index, given, waiting = next_index + BLOCK, given + BLOCK, waiting + 1
-            spent = given >= options.inputs
-        if spent and not waiting:
-            break
-        try:
-            counted, found, took, high = crew.answers.get(timeout=2)
-        except Exception:
-            lost = crew.inspect()
-            faults += lost
-            waiting -= len(lost)  # the rest of a block is lost with its worker
-            continue
-        ways.update(counted)
-        times.add(took)
-        faults += found
-        peak, waiting = max(peak, high), waiting - 1
-        for fault in found:
-            if fault["what"] != "slow":
-                print(_line(fault), file=sys.stderr, flush=True)
-        if given % (50 * BLOCK) == 0:
-            _say(options, ways, faults, began)
-    for _ in crew.workers:
-        crew.jobs.put(None)
+    peak, blocks = 0, range(-(-options.inputs // BLOCK))
+    at = multiprocessing.RawArray("q", len(blocks))
+    with tempfile.TemporaryDirectory() as folder:
+        feed = partial(work, options, Path(folder), at)
+        for done, (block, answer) in enumerate(in_processes(feed, blocks, options.workers, BLOCK * SLOW), start=1):
+            if isinstance(answer, Lost):  # with the rest of its block
+                answer = Counter(), [_lost(options, at[block], answer.word)], Times(), 0
+            counted, found, took, high = answer
+            ways.update(counted)
+            times.add(took)
+            faults += found
+            peak = max(peak, high)
+            for fault in found:
+                if fault["what"] != "slow":
+                    print(_line(fault), file=sys.stderr, flush=True)
+            if done % 50 == 0:
+                _say(options, ways, faults, began)
+            if time.monotonic() - began > options.seconds:
+                break
     return {
         "kind": options.kind, "seed": options.seed, "inputs": sum(ways.values()), "first": options.start,
         "seconds": round(time.monotonic() - began), "ways": dict(ways), **times.plain(), "peak_bytes": peak,
         "faults": faults,
     }  # fmt: skip
+
+
+def _lost(options: argparse.Namespace, index: int, word: str) -> dict[str, Any]:
+    """The fault of an input whose process gave no answer."""
+    data, _ = of_index(options.kind, options.seed, index)
+    common = {"kind": options.kind, "seed": options.seed, "index": index}
+    return {**common, "what": word, "trace": [word], "input": _text(data)[:3000]}
+
+
+def _text(data: str | bytes) -> str:
+    return data if isinstance(data, str) else data.decode("utf-8", "backslashreplace")
 
 
 def _say(options: argparse.Namespace, ways: Counter[str], faults: list[dict[str, Any]], began: float) -> None:
@@ -284,7 +245,7 @@ def parsed(arguments: list[str] | None = None) -> argparse.Namespace:
 def main() -> int:
     """Run a campaign, or one input of it again."""
     options = parsed()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the workers end with it
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the processes end with it
     if options.replay is not None:
         return replay(options)
     result = run(options)
@@ -301,7 +262,7 @@ def main() -> int:
 def replay(options: argparse.Namespace) -> int:
     """One input again, here."""
     data, rng = of_index(options.kind, options.seed, options.replay)
-    print(data if isinstance(data, str) else data.decode("utf-8", "backslashreplace"))
+    print(_text(data))
     with tempfile.TemporaryDirectory() as folder:
         inside = targets.prepared(Path(folder))
         began = time.process_time()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzz import campaign, seeds, strategies, targets
+from fuzz import campaign, seeds, targets
 
 CRASHES = sorted((Path(__file__).parent / "crashes").iterdir())
 LIMITS = dict(deadline=None, suppress_health_check=list(HealthCheck))
@@ -48,28 +48,10 @@ def test_a_longer_campaign(kind):
 
 
 @settings(max_examples=150, **LIMITS)
-@given(strategies.EXPRESSIONS)
-def test_any_expression(guard, text):
-    fed(guard, "expressions", text)
-
-
-@settings(max_examples=150, **LIMITS)
-@given(strategies.BYTES)
-def test_any_bytes(guard, data):
-    fed(guard, "bytes", data)
-
-
-@settings(max_examples=100, **LIMITS)
-@given(strategies.DOCUMENTS)
-def test_any_document(guard, data):
-    fed(guard, "documents", data, 0.3)
-
-
-@pytest.mark.campaign
-@settings(max_examples=500, **LIMITS)
-@given(st.one_of(strategies.DOCUMENTS, strategies.BYTES))
-def test_many_documents(guard, data):
-    fed(guard, "documents", data, 0.1)
+@pytest.mark.parametrize("kind", campaign.KINDS)
+@given(rng=st.randoms(use_true_random=False))
+def test_any_input(guard, kind, rng):
+    fed(guard, kind, campaign.KINDS[kind](rng), 0.3)
 
 
 PLACES = {

@@ -60,16 +60,23 @@ experiment: {{until: 1}}
 """
 
 
-def kernels(*each: tuple[str, str, str]) -> list[tuple[ModeKernel, ModeKernel]]:
-    """A mode for each flow, guard and condition, by either kernel; none where one is refused."""
-    text = MODEL.format("".join(MODE.format(k, *texts) for k, texts in enumerate(each)))
+def both_kernels(mode: str, *each: tuple[str, ...]) -> tuple[PythonKernel, CompiledKernel, list[float]] | None:
+    """Both kernels of a model with a mode for each texts, and its data; None where it is refused."""
+    text = MODEL.format("".join(mode.format(k, *texts) for k, texts in enumerate(each)))
     try:
         program = Model(elaborate("random.yaml", text=text.encode())).program
     except Exception:  # the language refuses what has no value anywhere, such as 1/0
-        return []
+        return None
     data = [0.35, 1.0, 0.2, 0.0, *(1.0 for _ in program.switches)]
-    both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
-    return [(both[0].bind(k, data), both[1].bind(k, data)) for k in range(len(each))]
+    return PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program)), data
+
+
+def kernels(*each: tuple[str, str, str]) -> list[tuple[ModeKernel, ModeKernel]]:
+    """A mode for each flow, guard and condition, by either kernel; none where one is refused."""
+    if (made := both_kernels(MODE, *each)) is None:
+        return []
+    python, compiled, data = made
+    return [(python.bind(k, data), compiled.bind(k, data)) for k in range(len(each))]
 
 
 def routines(mode: ModeKernel) -> list:

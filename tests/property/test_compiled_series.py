@@ -6,46 +6,28 @@ from functools import cache
 from itertools import product
 
 import pytest
-from compiled_kernel import CompiledKernel
 from engines import bits, needs_compiler
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from property.test_compiled_kernel import EXPRESSIONS, NUMBERS, ONE, SPECIAL, TWO
+from property.test_compiled_kernel import EXPRESSIONS, NUMBERS, ONE, SPECIAL, TWO, both_kernels
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64
-from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
+from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.kernel import Taylor
-from hsdsl.model import Model
-from hsdsl.runtime.kernel import CompiledModel
 
 pytestmark = needs_compiler
-DATA = [0.35, 1.0, 0.2, 0.0]
 
 
 MODE = """
   m{0}:
     flow: {{x: "{1}", v: "1 - x*v/4"}}
     domain: ["{2} <= v", "abs(x) <= 10", "x*{2} >= t"]"""
-MODEL = """
-hsdsl: 1
-parameters: {{a: 0.35}}
-inputs: {{u: {{times: [0, 10], values: [1, 3], hold: linear}}}}
-modes:{0}
-initial: {{mode: m0, x: 0, v: 0}}
-experiment: {{until: 1}}
-"""
 
 
 def kernels(*each: tuple[str, str]) -> list[tuple[Taylor, Taylor]] | None:
     """The series of a mode for each flow and surface, by either kernel; None where one is refused or kinked."""
-    text = MODEL.format("".join(MODE.format(k, *texts) for k, texts in enumerate(each)))
-    try:
-        program = Model(elaborate("random.yaml", text=text.encode())).program
-    except Exception:  # the language refuses what has no value anywhere, such as 1/0
+    if (made := both_kernels(MODE, *each)) is None:
         return None
-    both = PythonKernel(program, FLOAT64), CompiledKernel(program, CompiledModel(program))
-    data = [*DATA, *(1.0 for _ in program.switches)]
+    *both, data = made
     found = [(both[0].taylor(k, data), both[1].taylor(k, data)) for k in range(len(each))]
     assert all((one is None) == (other is None) for one, other in found)
     pairs = [(one, other) for one, other in found if one is not None and other is not None]
