@@ -9,6 +9,7 @@ import re
 from collections import abc
 from collections.abc import Iterator
 
+from hsdsl.lint.dependencies import closure
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 from hsdsl.schema import AutomatonDocument, SystemDocument
@@ -25,10 +26,10 @@ def findings_of_parts(subject: Subject, codes: abc.Sequence[str]) -> Iterator[tu
     document = subject.document
     assert isinstance(document, SystemDocument)
     used = {word for text in _texts(subject.root) for word in _WORD.findall(text)}
-    found = [*_of_file(document, used)]
+    found = [*_unused(document, used, "")]
     for name, kind in document.automata.items():
         if isinstance(kind, AutomatonDocument):
-            found += [*_of_automaton(str(name), kind, used), *_unreachable(document, name, kind)]
+            found += [*_unused(kind, used, f" of '{name}'"), *_unreachable(document, name, kind)]
     yield from ((code, finding) for code, finding in found if code in codes)
     if any(code not in CODES for code in codes):
         yield "HS492", Finding(subject.root.place.span, _UNKNOWN)
@@ -51,27 +52,18 @@ def _texts(node: Node) -> Iterator[str]:
             yield from _texts(inner)
 
 
-def _of_file(document: SystemDocument, used: set[str]) -> Iterator[tuple[str, Finding]]:
+def _unused(document: SystemDocument | AutomatonDocument, used: set[str], where: str) -> Iterator[tuple[str, Finding]]:
+    """Names of a file or of an automaton that nothing uses."""
+    inner = document.modes.values() if isinstance(document, AutomatonDocument) else ()
+    lets = [*document.let, *(key for mode in inner for key in mode.let)]
     for code, kind, names in (
         ("HS401", "parameter", document.parameters),
         ("HS402", "input", document.inputs),
-        ("HS403", "`let` name", document.let),
-    ):
-        for name in names:
-            if name not in used:
-                yield code, Finding(name.place.span, f"nothing uses the {kind} '{name}'", _UNUSED)
-
-
-def _of_automaton(automaton: str, kind: AutomatonDocument, used: set[str]) -> Iterator[tuple[str, Finding]]:
-    lets = [*kind.let, *(key for mode in kind.modes.values() for key in mode.let)]
-    for code, what, names in (
-        ("HS401", "parameter", list(kind.parameters)),
-        ("HS402", "input", list(kind.inputs)),
         ("HS403", "`let` name", lets),
     ):
         for name in dict.fromkeys(names):
             if name not in used:
-                yield code, Finding(name.place.span, f"nothing uses the {what} '{name}' of '{automaton}'", _UNUSED)
+                yield code, Finding(name.place.span, f"nothing uses the {kind} '{name}'{where}", _UNUSED)
 
 
 def _unreachable(document: SystemDocument, name: Key, kind: AutomatonDocument) -> Iterator[tuple[str, Finding]]:
@@ -81,15 +73,9 @@ def _unreachable(document: SystemDocument, name: Key, kind: AutomatonDocument) -
         yield "HS406", Finding(name.place.span, f"no instance is of the automaton '{name}'", _UNUSED)
         return
     starts = {one.initial.mode.value for one in instances if one.initial and one.initial.mode}
-    entered = {str(mode) for mode in kind.modes if str(mode) in starts or len(kind.modes) == 1}
-    waiting = list(entered)
-    while waiting:
-        mode = waiting.pop()
-        for transition in next(m for key, m in kind.modes.items() if key == mode).transitions:
-            target = transition.target or mode
-            if target not in entered:
-                entered.add(target)
-                waiting.append(target)
+    first = {str(mode) for mode in kind.modes if str(mode) in starts or len(kind.modes) == 1}
+    leads = {str(key): [made.target or str(key) for made in mode.transitions] for key, mode in kind.modes.items()}
+    entered = closure(first, leads.__getitem__)
     for key in kind.modes:
         if key not in entered:
             message = f"no instance of '{name}' can be in the mode '{key}'"

@@ -10,8 +10,8 @@ from hsdsl.backends.c.printer import constant, literal
 from hsdsl.export.c.method import interpolation_text, method_text
 from hsdsl.export.c.names import names_text
 from hsdsl.export.c.precision import PRECISIONS, in_both, in_single
+from hsdsl.export.c.starts import derivations
 from hsdsl.export.c.text import array, comment
-from hsdsl.export.c.tuning import derivations
 from hsdsl.export.source import Source
 from hsdsl.program import Program
 from hsdsl.runtime.methods import method_table

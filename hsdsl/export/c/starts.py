@@ -1,12 +1,20 @@
-"""Initial values as a C function ``problem_start``: of parameters, of the states that are given, and of each other."""
+"""Parameters and initial values that follow others, as C functions ``problem_derive`` and ``problem_start``."""
 
 from __future__ import annotations
 
 from hsdsl.backends.c import constant_bodies, initial_bodies
 from hsdsl.export.c.text import array, function
-from hsdsl.parts import numbered
+from hsdsl.export.parameters import derived, given, structural
 from hsdsl.simulate import Problem
 
+_DERIVE = """
+int problem_derive(hs_real *p) {{
+  int bad = 0;
+  (void)p;
+{calls}
+  return bad;
+}}
+"""
 _START = """
 /* See hsdsl/model/values.py: initial_columns. */
 int problem_start(const hs_real *p, const char *given, hs_real *x) {{
@@ -34,7 +42,21 @@ int problem_start(const hs_real *p, const char *given, hs_real *x) {{
 """
 
 
-def starts(problem: Problem) -> str:
+def derivations(problem: Problem) -> str:
+    """The definitions of ``problem_derive`` and ``problem_start``, and of what kind each parameter is."""
+    program = problem.program
+    bodies, own, fixed = constant_bodies(program), derived(problem), structural(problem)
+    flags = array("const int", "problem_derived", (str(int(name in own)) for name in program.parameters))
+    flags += array("const int", "problem_structural", (str(int(name in fixed)) for name in program.parameters))
+    functions, calls = list[str](), list[str]()
+    for i, name in enumerate(program.parameters):
+        if name in own:
+            functions.append(function(f"parameter_{i}", "const hs_real *p", bodies[f"parameter_{i}"]))
+            calls.append(f"  bad |= parameter_{i}(p, p + {i});")
+    return flags + "".join(functions) + _DERIVE.format(calls="\n".join(calls)) + _starts(problem)
+
+
+def _starts(problem: Problem) -> str:
     """The definitions of ``problem_given`` and ``problem_start``."""
     program = problem.program
     known, chosen = program.initial_states, given(problem)
@@ -53,11 +75,3 @@ def starts(problem: Problem) -> str:
         starts=len(problem.states),
         followers=len(program.initial_order),
     )
-
-
-def given(problem: Problem) -> set[str]:
-    """The states whose initial values the call gives: by name, or as numbers of the modes of parts."""
-    overrides = problem.settings.overrides
-    parts = problem.program.parts
-    numbers = {name for name in numbered(parts) if not {"initial.mode", f"initial.{name}.mode"}.isdisjoint(overrides)}
-    return numbers | {name for name in problem.states if f"initial.{name}" in overrides}

@@ -15,7 +15,7 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.text import compile_routines
 from hsdsl.elaborate.inputs import switch_name
 from hsdsl.execution import Execution
-from hsdsl.export.c.tuning import derived, structural
+from hsdsl.export.parameters import derived, structural
 from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
 from hsdsl.parts import numbered

@@ -9,11 +9,13 @@ from itertools import combinations
 from hsdsl.backends.c.source import width
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
 from hsdsl.export.jax.language import function, literal
+from hsdsl.export.parameters import derived, followed
 from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.numbers import table_numbers
 from hsdsl.program import HELD, Program
+from hsdsl.simulate import Problem
 
 
 def values_text(source: Source) -> list[str]:
@@ -22,34 +24,29 @@ def values_text(source: Source) -> list[str]:
     A parameter that depends on others follows them, unless ``--set`` gave it a value of its own; so do initial values.
     """
     problem, program = source.problem, source.problem.program
-    count = len(program.parameters)
+    count, own = len(program.parameters), derived(problem)
     data = {f"p{i}": f"p[{i}]" for i in range(count)}
-    routines, constant = definitions(program.constants), problem.kernel.constant
-    given = problem.timeline.segments[0].data[:count]
+    routines = definitions(program.constants)
     texts: list[str] = []
     lines = ["def parameter_values(given):", "    p = []"]
-    for i, value in enumerate(given):
-        name, routine = f"parameter_{i}", routines[f"parameter_{i}"]
+    for i, (name, value) in enumerate(zip(program.parameters, problem.timeline.segments[0].data, strict=False)):
         number = literal(float(value))
-        if parameters_in(routine) and constant(name, given)[0] == value:
-            texts.append(function(name, routine, data, "p"))
-            number = f"{name}(p)[0]"
+        if name in own:
+            texts.append(function(f"parameter_{i}", routines[f"parameter_{i}"], data, "p"))
+            number = f"parameter_{i}(p)[0]"
         lines.append(f"    p.append(given.get({i}, {number}))")
     texts.append("\n".join([*lines, f"    return padded(p, {count})", ""]))
-    return [*texts, _start(source, data, given)]
+    return [*texts, _start(problem, data)]
 
 
-def _start(source: Source, data: dict[str, str], given: tuple[float, ...]) -> str:
-    problem, program = source.problem, source.problem.program
+def _start(problem: Problem, data: dict[str, str]) -> str:
     numbers, lines = [literal(float(value)) for value in problem.x], list[str]()
-    routine, own = definitions(program.constants)["initial"], program.initial_states
-    if problem.mode == program.initial_mode and parameters_in(routine):
-        known = dict(zip(own, problem.kernel.constant("initial", given), strict=True))
-        follow = [known.get(name) == value for name, value in zip(problem.states, problem.x, strict=True)]
-        lines = [f"    {line}" for line in function("values", routine, data, "p").splitlines()] if any(follow) else []
-        lines += ["    found = values(p)"] if any(follow) else []
-        triples = zip(problem.states, follow, numbers, strict=True)
-        numbers = [f"found[{own.index(name)}]" if follows else number for name, follows, number in triples]
+    routine, places = definitions(problem.program.constants)["initial"], followed(problem)
+    if parameters_in(routine) and any(place is not None for place in places):
+        lines = [f"    {line}" for line in function("values", routine, data, "p").splitlines()]
+        lines.append("    found = values(p)")
+        pairs = zip(numbers, places, strict=True)
+        numbers = [number if place is None else f"found[{place}]" for number, place in pairs]
     return "\n".join(["def initial_state(p):", *lines, f"    return padded([{', '.join(numbers)}], SIZES[0])", ""])
 
 

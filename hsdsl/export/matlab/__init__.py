@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 from pathlib import Path
 
 from hsdsl.errors import UsageError
-from hsdsl.export.c.tuning import derived, structural
 from hsdsl.export.matlab.language import body, helpers, literal
 from hsdsl.export.matlab.method import driven_by
 from hsdsl.export.matlab.model import ModelText, definitions, parameter_fields
 from hsdsl.export.matlab.text import comment, string
+from hsdsl.export.parameters import derived, followed, structural
 from hsdsl.export.source import Source
 from hsdsl.names import visible
 
@@ -46,8 +47,10 @@ def _part(path: str, source: Source) -> str:
     method = driven_by(settings.method).name
     instead = "" if method == settings.method.name else f" in place of {settings.method.name}"
     heading = comment(source.heading) if path.endswith(".m") else "".join(f"    {line}\n" for line in source.heading)
-    for key, value in {"NAME": source.name, "HEADING\n": heading, "METHOD": method + instead}.items():
-        text = text.replace(f"@{key}", value) if key != "HEADING\n" else text.replace("@HEADING\n", value)
+    begin = (PARTS / "begin.m").read_text(encoding="utf-8")
+    texts = {"BEGIN\n": begin, "HEADING\n": heading, "NAME": source.name, "METHOD": method + instead}
+    for key, value in texts.items():
+        text = text.replace(f"@{key}", value)
     return text
 
 
@@ -57,14 +60,13 @@ def _parameters(source: Source) -> str:
     program, own, fixed = problem.program, derived(problem), structural(problem)
     fields = parameter_fields(program)
     bodies = definitions(program.constants)
-    names = {f"given[{i}]": f"p.{field}" for i, field in enumerate(fields.values())}
     about = {p.name: p for p in source.system.parameters}
     lines: list[str] = []
     functions: list[str] = []
     for i, (name, field) in enumerate(fields.items()):
         value = literal(problem.timeline.segments[0].data[i])
         if name in own:
-            text = _given(bodies[f"parameter_{i}"], names, f"derived_{field}")
+            text = _given(bodies[f"parameter_{i}"], fields.values(), f"derived_{field}")
             functions.append(text)
             value = f"derived_{field}(p)"
         notes = [visible(part) for part in (about[name].unit, about[name].about) if part]
@@ -88,17 +90,15 @@ def _parameters(source: Source) -> str:
 def _initial(source: Source) -> str:
     """The function of the initial state: the mode's number, and the states."""
     problem = source.problem
-    program, overrides = problem.program, problem.settings.overrides
-    names = {f"given[{i}]": f"p.{field}" for i, field in enumerate(parameter_fields(program).values())}
-    inner = _given(definitions(program.constants)["initial"], names, "given_values")
+    program = problem.program
+    inner = _given(definitions(program.constants)["initial"], parameter_fields(program).values(), "given_values")
     lines = [f"function x0 = {source.name}_initial(p)\n"]
     lines.append(comment([f"x0 = {source.name}_initial(p)  Where a run starts: [mode; states].", *source.heading]))
     lines.append("  values = given_values(p);\n" if program.initial_states else "")
     width = max(len(mode.states) for mode in program.modes)
     lines.append(f"  x0 = zeros({1 + max(width, len(problem.states))}, 1);\n  x0(1) = {problem.mode + 1};\n")
-    for i, (name, number) in enumerate(zip(problem.states, problem.x, strict=True)):
-        kept = f"initial.{name}" not in overrides and name in program.initial_states
-        value = f"values({program.initial_states.index(name) + 1})" if kept else literal(number)
+    for i, (name, number, place) in enumerate(zip(problem.states, problem.x, followed(problem), strict=True)):
+        value = literal(number) if place is None else f"values({place + 1})"
         lines.append(f"  x0({i + 2}) = {value};  % {visible(name)}\n")
     text = "".join(lines) + "end\n" + (f"\n{inner}" if program.initial_states else "")
     return text + _called(text)
@@ -109,14 +109,7 @@ def _called(text: str) -> str:
     return f"\n{calls}" if calls else ""
 
 
-def _given(definition: object, names: dict[str, str], name: str) -> str:
-    """A routine of parameters alone, which are its arguments ``given[i]``."""
-    assert isinstance(definition, ast.FunctionDef)
-
-    class Named(ast.NodeTransformer):
-        def visit_Subscript(self, node: ast.Subscript) -> ast.Name:
-            return ast.Name(f"p{ast.unparse(node.slice)}", ast.Load())
-
-    Named().visit(definition)
-    numbered = {f"p{key[6:-1]}": value for key, value in names.items()}
-    return f"function out = {name}(p)\n{body(definition, numbered)}\nend\n"
+def _given(definition: ast.FunctionDef, fields: Iterable[str], name: str) -> str:
+    """A routine of parameters alone."""
+    names = {f"p{i}": f"p.{field}" for i, field in enumerate(fields)}
+    return f"function out = {name}(p)\n{body(definition, names)}\nend\n"

@@ -11,8 +11,9 @@ from pathlib import Path
 from hsdsl.backends.c.source import width
 from hsdsl.export.explicit import explicit
 from hsdsl.export.identifiers import identifiers
+from hsdsl.export.parameters import structural
 from hsdsl.export.rust.language import array, literal, string
-from hsdsl.export.rust.model import fixed_parameters, model_text
+from hsdsl.export.rust.model import model_text
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.runtime.compiler import NoCompiler
@@ -100,8 +101,9 @@ def _readme(source: Source, table: ButcherTableau) -> str:
     settings = source.problem.settings
     heading = "".join(f"    {line}\n" for line in source.heading)
     size = f"step {settings.step}" if settings.tolerance is None else f"tolerance {settings.tolerance}"
-    fixed = fixed_parameters(source.problem.program)
-    kept = f"Fixed, since times of inputs depend on them:\n\n    {', '.join(fixed)}\n\n" if fixed else ""
+    decide = structural(source.problem)
+    fixed = ", ".join(name for name in source.problem.program.parameters if name in decide)
+    kept = f"Fixed, since times of inputs depend on them:\n\n    {fixed}\n\n" if fixed else ""
     return (
         f"A hybrid system in Rust\n=======================\n\n{heading}\n"
         f"It runs the scheme relaxed with {table.name}, {size}, relaxation {settings.relaxation}.\n\n"

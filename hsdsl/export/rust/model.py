@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hsdsl.backends.c.source import width
+from hsdsl.export.parameters import derived, followed
 from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
 from hsdsl.export.rust.language import array, function, literal, numbers, string
 from hsdsl.export.source import Source
@@ -117,39 +118,25 @@ def _segments(source: Source) -> str:
     return f"pub static SEGMENTS: [Segment; {len(segments)}] = [\n{rows}];\n"
 
 
-def fixed_parameters(program: Program) -> list[str]:
-    """Parameters that the segments of inputs depend on: the segments are those of the export."""
-    routines = definitions(program.constants)
-    sampled = [routines[f"input_{i}"] for i, given in enumerate(program.inputs) if given.times is None]
-    found = parameters_in(*definitions(program.switching).values(), *sampled)
-    for i in range(len(program.parameters) - 1, -1, -1):
-        if i in found:
-            found |= parameters_in(routines[f"parameter_{i}"])
-    return [program.parameters[i] for i in sorted(found)]
-
-
 def _values(source: Source) -> str:
     """Functions for parameters, those that follow others, and the initial state."""
     problem, program = source.problem, source.problem.program
-    count = len(program.parameters)
-    routines, constant = definitions(program.constants), problem.kernel.constant
+    count, own = len(program.parameters), derived(problem)
+    routines = definitions(program.constants)
     data = {f"p{i}": f"p[{i}]" for i in range(count)}
     given = problem.timeline.segments[0].data[:count]
     texts, follow = list[str](), list[str]()
-    for i, value in enumerate(given):
+    for i in (i for i, name in enumerate(program.parameters) if name in own):
         name = f"parameter_{i}"
-        if parameters_in(routines[name]) and constant(name, given)[0] == value:
-            texts.append(function(name, routines[name], data))
-            follow.append(f"    let mut value = [0.0];\n    {name}(p, 0.0, &[], &mut value);\n    p[{i}] = value[0];\n")
-    x = [literal(float(value)) for value in problem.x]
-    start = ""
-    if problem.mode == program.initial_mode and parameters_in(routines["initial"]):
+        texts.append(function(name, routines[name], data))
+        follow.append(f"    let mut value = [0.0];\n    {name}(p, 0.0, &[], &mut value);\n    p[{i}] = value[0];\n")
+    x, start = [literal(float(value)) for value in problem.x], ""
+    if parameters_in(routines["initial"]):
         texts.append(function("initial_values", routines["initial"], data))
-        own = program.initial_states
-        start = f"    let mut found = [0.0; {len(own)}];\n    initial_values(p, 0.0, &[], &mut found);\n"
-        known = dict(zip(own, constant("initial", given), strict=True))
-        pairs = zip(problem.states, problem.x, x, strict=True)
-        x = [f"found[{own.index(name)}]" if known.get(name) == value else text for name, value, text in pairs]
+        size = len(program.initial_states)
+        start = f"    let mut found = [0.0; {size}];\n    initial_values(p, 0.0, &[], &mut found);\n"
+        pairs = zip(x, followed(problem), strict=True)
+        x = [number if place is None else f"found[{place}]" for number, place in pairs]
     x += ["0.0"] * (width(program) - len(x))
     return (
         "".join(texts)

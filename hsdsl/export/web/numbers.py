@@ -12,7 +12,7 @@ from hsdsl.backends.c import constant_bodies, switching_bodies
 from hsdsl.backends.c.printer import literal
 from hsdsl.defaults import DEFAULTS
 from hsdsl.export.c.text import array, function
-from hsdsl.export.c.tuning import derived, used_by, with_sources
+from hsdsl.export.parameters import derived, used_by, with_sources
 from hsdsl.program import Program
 from hsdsl.simulate import Problem
 from hsdsl.simulate.control import LARGEST_SHARE

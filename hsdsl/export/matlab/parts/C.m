@@ -2,16 +2,7 @@ function inside = @NAME_C(x, t, j, p)
 % inside = @NAME_C(x, t, j, p)  Flow set: 1 where x = [mode; states] is in the domain of its mode, else 0.
 % The surfaces of edges with a condition do not bound a domain; walls and those of other edges do.
 @HEADING
-  persistent m
-  if isempty(m)
-    m = @NAME_model();
-  end
-  if nargin < 2
-    t = 0;
-  end
-  if nargin < 4
-    p = @NAME_parameters();
-  end
+@BEGIN
   q = x(1);
   y = reshape(x(2:m.dim(q) + 1), [], 1);
   inside = double(~m.final(q));

@@ -1,16 +1,7 @@
 function dx = @NAME_f(x, t, j, p)
 % dx = @NAME_f(x, t, j, p)  Flow map: the derivative of x = [mode; states].
 @HEADING
-  persistent m
-  if isempty(m)
-    m = @NAME_model();
-  end
-  if nargin < 2
-    t = 0;
-  end
-  if nargin < 4
-    p = @NAME_parameters();
-  end
+@BEGIN
   q = x(1);
   n = m.dim(q);
   d = m.data(max(1, find(m.starts <= t, 1, 'last')), :);

@@ -2,16 +2,7 @@ function xplus = @NAME_g(x, t, j, p)
 % xplus = @NAME_g(x, t, j, p)  Jump map: [mode; states] after the edge that x = [mode; states] enables.
 % Of several that of the highest priority is made, then the first in the file.
 @HEADING
-  persistent m
-  if isempty(m)
-    m = @NAME_model();
-  end
-  if nargin < 2
-    t = 0;
-  end
-  if nargin < 4
-    p = @NAME_parameters();
-  end
+@BEGIN
   xplus = x;
   k = m.enabled(m, x, t, p);
   if k == 0
