@@ -51,7 +51,10 @@ class BlockFactors(_Blocks):
 
     def solve(self, right: Vector) -> Vector:
         """Solve for a right-hand side."""
-        own = self.factors.solve(right[: self.of.own])
+        return self.solve_columns(self.factors.solve(right[: self.of.own]), right)
+
+    def solve_columns(self, own: Vector, right: Vector) -> Vector:
+        """Solve for the columns, where the solution for the states is known."""
         rest, found = self._linked(right, own), [*own, *(r * 0 for r in right[self.of.own :])]
         for places, rows in self._ranges():
             column = self.factors.solve(self._spread([rest[i] for i in places], rows))

@@ -41,7 +41,7 @@ LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice
 class Control:
     """The step to try next, ``h``; ``tolerance`` is None for a fixed step.
 
-    ``largest`` and ``least`` bound steps that nothing else bounds.
+    ``largest`` and ``least`` bound steps that nothing else bounds; ``first`` is the one that a run tries first.
 
     ``before`` has the step last accepted and the root of its error ratio, for an ``implicit`` method. ``failed_at`` is
     where the last step began that was too wrong; ``closer`` says that a look at the flow's round-off let one pass.
@@ -60,6 +60,7 @@ class Control:
     rejected: int = 0
     stretch: Number = 0
     least: Number = 0
+    first: Number = 0
     failed_at: Number | None = None
     closer: bool = False
     reach: dict[str, Number] = field(default_factory=dict[str, Number])
@@ -164,5 +165,6 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     implicit = settings.method is not None and settings.method.implicit
     control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
     control.first_steps = iter(settings.first_steps) if settings.first_steps else None
+    control.first = control.h
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
     return control

@@ -67,7 +67,9 @@ class Run(Problem):
         jacobian = self.kernel.jacobian(mode, here.segment.data)
         smooth, scales = not here.mode.jumps, here.arc.scales
         own = here.mode.jacobian.elimination, here.mode.measured, here.mode.jacobian.variation
-        return method.stepper(jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own)
+        return method.stepper(
+            jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own, self.control.first
+        )
 
     def place(
         self,

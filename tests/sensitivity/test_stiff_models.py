@@ -179,6 +179,15 @@ def test_an_end_in_a_fast_decay() -> None:
 
 
 @needs_compiler
+@pytest.mark.parametrize(("names", "most"), [("fast", 1.3), ("slow", 1.3), ("high", 1.3), ("fast,slow", 1.4)])
+def test_steps_of_derivatives_that_decay(names: str, most: float) -> None:
+    """A derivative of the fast state jumps by all of its size: steps are as long as its curve allows."""
+    plain = SWITCH.simulate(method="radau", tolerance=1e-9)
+    found = SWITCH.sensitivity(names, tolerance=1e-9).execution
+    assert len(found.times) <= most * len(plain.times)
+
+
+@needs_compiler
 def test_engines_agree_on_measured_slopes() -> None:
     """To the last bit."""
     python, compiled = (

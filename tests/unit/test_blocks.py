@@ -57,6 +57,22 @@ def test_blocks_solve_the_whole_system(seed: int, is_sparse: bool) -> None:
         assert np.allclose(mine, exact, rtol=1e-9, atol=1e-9 * abs(exact).max())
 
 
+@pytest.mark.parametrize("soon", [0.0, 1.0, 1e9])
+def test_estimate_of_derivatives(soon: float) -> None:
+    """Of S' = -2 S + x, where x stays zero: the first defect counts by the share that lasts, the second in full."""
+    of, rate, h = variation((0, 2, 3), 2, 1, ((0,),), (0,)), 2.0, 0.1
+    steps = Steps(lambda t, x, s: (-rate, 0.0, 1.0, -rate), 1e-6, FLOAT64, [1.0, 1.0], varied=of, soon=soon)
+    end, stages = steps.step(lambda t, x, s: (-rate * x, x - rate * s), 0.0, h, (0.0, 1.0), (0.0, -rate))
+    assert np.isclose(end[1], np.exp(-rate * h), rtol=1e-6)
+    known, z = steps._known, [stage[1] for stage in stages[:3]]
+    inside = -rate * (1 + sum(w * a for w, a in zip(known.values, z, strict=True)))
+    first = -rate * h + sum(w * a for w, a in zip(known.estimate, z, strict=True))
+    second = inside * h - sum(w * a for w, a in zip(known.slope, z, strict=True))
+    counted = max(abs(first) / (1 + rate * soon), abs(second))
+    assert np.isclose(abs(stages[3][1]), counted / (known.gamma + rate * h), rtol=1e-12)
+    assert stages[3][0] == 0
+
+
 def test_what_nothing_moves_stays_zero() -> None:
     """Of a column whose right-hand side moves only the last state, though its row has by far the largest numbers."""
     jacobian = whole(np.random.default_rng(3))

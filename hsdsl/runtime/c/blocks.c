@@ -62,20 +62,23 @@ HS_INLINE void place_column(const hs_blocks of, int k, const hs_real *column, hs
   for (int i = 0; i < count; i++) all[begin + i] = column[v->rows[begin - own + i]];
 }
 
-/* Solve with the factors of the real matrix; the right-hand sides of columns are changed. */
-HS_INLINE void solve_all(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found) {
+/* Solve for the columns, where `found` has the solution for the own states; right-hand sides of columns are changed. */
+HS_INLINE void solve_columns(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found) {
   hs_radau *const radau = &run->radau;
   const hs_variation *const v = columns_of(run->here.table) ? blocks.v : 0;
-  const hs_elimination *const of = blocks.of;
-  const int own = blocks.own;
-  solve_own(radau, own, of, right, found);
   if (!v) return;
   add_linked(radau, v, found, right);
   for (int k = 0; k < v->count; k++) {
     hs_real *const room = room_of_column(blocks, k, found, radau->spread[1]);
-    solve_own(radau, own, of, spread_column(blocks, k, right, radau->spread[0]), room);
+    solve_own(radau, blocks.own, blocks.of, spread_column(blocks, k, right, radau->spread[0]), room);
     place_column(blocks, k, room, found);
   }
+}
+
+/* Solve with the factors of the real matrix. */
+HS_INLINE void solve_all(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found) {
+  solve_own(&run->radau, blocks.own, blocks.of, right, found);
+  solve_columns(run, blocks, right, found);
 }
 
 HS_INLINE void solve_all_complex(hs_run *run, hs_blocks blocks, hs_real *const *right, hs_real *a, hs_real *b) {

@@ -80,6 +80,8 @@ static void sparse_solve_complex(int n, const hs_elimination *of, const hs_real 
 
 /* blocks.c */
 HS_INLINE hs_blocks blocks_of(const hs_mode *mode);
+HS_INLINE void solve_own(hs_radau *radau, int own, const hs_elimination *of, const hs_real *right, hs_real *found);
+HS_INLINE void solve_columns(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found);
 HS_INLINE void solve_all(hs_run *run, hs_blocks blocks, hs_real *right, hs_real *found);
 HS_INLINE void solve_all_complex(hs_run *run, hs_blocks blocks, hs_real *const *right, hs_real *a, hs_real *b);
 static void link_columns(hs_run *run, const hs_variation *v, hs_real h);

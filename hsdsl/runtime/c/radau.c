@@ -91,6 +91,15 @@ static void radau_scales(hs_run *run, hs_time t, hs_real h, int closer) {
   }
 }
 
+/* Which share of an error of a derivative of a state lasts over the step that a run tries first. */
+static void see_what_lasts(hs_run *run, const hs_variation *v) {
+  hs_radau *const radau = &run->radau;
+  for (int s = v->own; s < v->columns[v->count]; s++) {
+    const hs_real own = v->itself[s] < 0 ? (hs_real)0.0 : radau->rows[v->itself[s]];
+    radau->lasting[s] = 1 / (1 + run->task->settings.step * fabs(own));
+  }
+}
+
 HS_INLINE int derive(hs_run *run, hs_time t) {
   hs_radau *const radau = &run->radau;
   const hs_sparse *const rows = &run->here.table->jacobian;
@@ -98,6 +107,7 @@ HS_INLINE int derive(hs_run *run, hs_time t) {
   if (!run->here.table->elimination && !columns_of(run->here.table))
     hs_spread_out(rows, run->here.dimension * run->here.dimension, radau->fresh);
   swap(&radau->rows, &radau->fresh);
+  if (columns_of(run->here.table)) see_what_lasts(run, columns_of(run->here.table));
   radau->derived = 1;
   radau->derived_at = t;
   radau->factored = 0;
@@ -217,7 +227,12 @@ static int settle_n(hs_run *run, hs_time t, hs_real h, int exactly, int closer) 
   return settle_in(run, blocks_of(run->here.table), t, h, exactly, closer);
 }
 
-/* The same where columns have the derivatives of two or three states. */
+/* The same where columns have the derivatives of two or three states; one column of two apart. */
+static int settle_column_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
+  const hs_blocks of = {4, 2, columns_of(run->here.table), 0, 1};
+  return settle_in(run, of, t, h, exactly, closer);
+}
+
 static int settle_columns_2(hs_run *run, hs_time t, hs_real h, int exactly, int closer) {
   const hs_variation *const v = columns_of(run->here.table);
   const hs_blocks of = {2 * (1 + v->count), 2, v, 0, 1};
@@ -239,6 +254,7 @@ HS_INLINE int has_columns(const hs_run *run) {
 HS_INLINE int settle(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactly, int closer) {
   if (!columns_of(run->here.table) && of.n == 2) return settle_2(run, t, h, exactly, closer);
   if (!columns_of(run->here.table) && of.n == 3) return settle_3(run, t, h, exactly, closer);
+  if (has_columns(run) && of.own == 2 && of.n == 4) return settle_column_2(run, t, h, exactly, closer);
   if (has_columns(run) && of.own == 2) return settle_columns_2(run, t, h, exactly, closer);
   if (has_columns(run) && of.own == 3) return settle_columns_3(run, t, h, exactly, closer);
   return settle_n(run, t, h, exactly, closer);
@@ -258,7 +274,10 @@ HS_INLINE int solved(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactl
   return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, of, t, h, exactly, 1) : status;
 }
 
-/* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error. */
+HS_INLINE hs_real larger(hs_real a, hs_real b) { return fabs(a) >= fabs(b) ? a : b; }
+
+/* The error of the step's end and of the curve inside it, for each state the larger of the two, to radau->error.
+   See Steps._estimate. */
 HS_INLINE int estimate(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
   const int n = of.n;
   hs_radau *const radau = &run->radau;
@@ -276,9 +295,11 @@ HS_INLINE int estimate(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
     first[s] = h * slope[s] + summed3(known->estimate, u[s], v[s], w[s]);
     second[s] = h * inside[s] - summed3(known->slope, u[s], v[s], w[s]);
   }
-  solve_all(run, of, radau->right[0], embedded);
-  solve_all(run, of, radau->right[1], along);
-  for (int s = 0; s < n; s++) error[s] = fabs(embedded[s]) >= fabs(along[s]) ? embedded[s] : along[s];
+  solve_own(radau, of.own, of.of, first, embedded);
+  solve_own(radau, of.own, of.of, second, along);
+  for (int s = 0; s < of.own; s++) error[s] = larger(embedded[s], along[s]);
+  for (int s = of.own; s < n; s++) first[s] = larger(first[s] * radau->lasting[s], second[s]);
+  solve_columns(run, of, first, error);
   return 0;
 }
 
@@ -312,6 +333,8 @@ static int radau_step(hs_run *run, hs_time t, hs_real h) {
   if (!columns_of(run->here.table) && of.n == 3) return radau_step_in(run, three, t, h);
   if (has_columns(run) && (of.own == 2 || of.own == 3)) {
     const hs_blocks pairs = {2 * (1 + of.v->count), 2, of.v, 0, 1}, triples = {3 * (1 + of.v->count), 3, of.v, 0, 1};
+    const hs_blocks pair = {4, 2, of.v, 0, 1};
+    if (of.n == 4) return radau_step_in(run, pair, t, h);
     return of.own == 2 ? radau_step_in(run, pairs, t, h) : radau_step_in(run, triples, t, h);
   }
   return radau_step_in(run, of, t, h);
@@ -355,7 +378,11 @@ static int radau_landing(hs_run *run, hs_time t, hs_real h) {
 
 /* The polynomial through the increments. */
 static void radau_piece(const hs_run *run, hs_polynomial *piece) {
+  const int n = blocks_of(run->here.table).n;
   piece->degree = 3;
-  for (int m = 0; m < 3; m++)
-    weighted3(run->here.dimension, run->method->collocation->power[m], run->radau.z, piece->c + m * run->width);
+  for (int m = 0; m < 3; m++) {
+    hs_real *const c = piece->c + m * run->width;
+    weighted3(n, run->method->collocation->power[m], run->radau.z, c);
+    for (int s = n; s < run->here.dimension; s++) c[s] = 0.0;
+  }
 }

@@ -117,6 +117,7 @@ typedef struct {
   int *order, *turned;             /* the order of their rows */
   hs_real *scratch[2];             /* of sparse systems */
   hs_real *linked, *spread[4];     /* of variations: see blocks.c */
+  hs_real *lasting;                /* of variations: which share of an error of a derivative lasts */
   hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
   hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
   hs_real *slopes[3], *right[3];

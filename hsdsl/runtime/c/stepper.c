@@ -69,6 +69,7 @@ static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_st
   radau->scratch[1] = numbers(store, w);
   radau->linked = numbers(store, varied);
   for (int i = 0; i < 4; i++) radau->spread[i] = numbers(store, varied ? w : 0);
+  radau->lasting = numbers(store, varied ? w : 0);
   radau->order = take(store, w, sizeof(int));
   radau->turned = take(store, w, sizeof(int));
 }
