@@ -72,6 +72,7 @@ def begin(files: ModelFiles) -> None:
         os.close(answer)
     else:
         if process == 0:
+            os.close(answer)  # else a large answer is waited with for ever where the reader has ended
             _work(files, to_answer)
         _begun.append(_Other(files, process, answer))
     os.close(to_answer)
@@ -133,7 +134,7 @@ def _work(files: ModelFiles, to_answer: int) -> NoReturn:
 def _lowered(files: ModelFiles) -> Answer:
     import gc
 
-    gc.disable()  # while nothing is imported that could be garbage
+    gc.disable()  # imports leave no garbage; to look for it costs time
     from hsdsl.completion import with_sliding
     from hsdsl.elaborate import elaborate_files
     from hsdsl.lower import lower

@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -30,10 +30,7 @@ from hsdsl.program import Program
 KIND = "programs"
 _PACKAGE = Path(__file__).parent
 # what a program depends on, besides the modules of the package itself
-_READERS = (
-    *("files", "source", "schema", "expression", "elaborate", "elaborate/parts", "completion", "lower", "model"),
-    "sensitivity",
-)
+_READERS = ("files", "source", "schema", "expression", "elaborate", "completion", "lower", "model", "sensitivity")
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
 Row = list[Any]
@@ -51,13 +48,15 @@ def key_of(files: ModelFiles, part: Part = ()) -> str:
 def _fingerprint() -> str:
     """Size and time of this package's files, which differ between versions; hashing them takes longer than loading."""
 
-    def described() -> Iterator[str]:
-        for folder in (_PACKAGE, *(_PACKAGE / name for name in _READERS)):
-            with os.scandir(folder) as entries:
-                for entry in (entry for entry in entries if entry.name.endswith(".py")):
+    def described(folder: Path | str, within: Sequence[str] | None = None) -> Iterator[str]:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.name.endswith(".py"):
                     yield f"{entry.path} {entry.stat().st_size} {entry.stat().st_mtime_ns}"
+                elif entry.name != "__pycache__" and entry.is_dir() and (within is None or entry.name in within):
+                    yield from described(entry.path)
 
-    return "\n".join(sorted(described()))
+    return "\n".join(sorted(described(_PACKAGE, _READERS)))
 
 
 def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | None:

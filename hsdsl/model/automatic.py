@@ -80,7 +80,7 @@ def _adaptive(
         return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
     kinked = next((each.name for each in program.flows if each.tape is None), None)
     if kinked is not None:
-        return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max or floor of a state"
+        return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max, floor or select of a state"
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 

@@ -140,8 +140,8 @@ def check_method(method: Method | None, program: Program, arithmetic: Arithmetic
     kinked = next((mode.name for mode in program.flows if mode.tape is None), None)
     if method is not None and method.is_series and kinked is not None:
         raise UsageError(
-            f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max or floor "
-            "of a state",
+            f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max, "
+            "floor or select of a state",
             f"use method '{AUTO}'",
         )
 

@@ -82,7 +82,7 @@ def _begin(command: Sequence[str], folder: Path) -> _Begun:
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
-        env={**os.environ, "TMPDIR": str(folder)},
+        env={**os.environ, "TMPDIR": str(folder), "LC_ALL": "C"},  # what they say is read: `error` in English
         start_new_session=True,
     )
     _running[process] = folder

@@ -221,12 +221,13 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
         run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
     after, scale = outcome
     since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
+    flowed = run.has_flowed(t)
     run.record(here, crossing, resumed, after, event.alternatives)
     waited = t if resumed > t else None
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since, reset_at=waited)
     if isinstance(entered, Stop):
         return entered
-    if run.returns(here, crossing, entered):
+    if run.cascade.returns(flowed, entered.index, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
     return close_tail(run, entered, crossing.edge)
 

@@ -167,11 +167,12 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     resumed = min(resumed, until)
     run.wait(here, [(t, depth * 0), (event.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
+    flowed = run.has_flowed(t)
     run.record(here, crossing, resumed, after, event.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
-    if not isinstance(entered, Stop) and run.returns(here, crossing, entered) and moves_on(here, crossing, entered):
-        return slides(edge.name, here.mode, entered.mode, entered.t)
-    return entered
+    if isinstance(entered, Stop) or not run.cascade.returns(flowed, entered.index, entered.x):
+        return entered
+    return slides(edge.name, here.mode, entered.mode, entered.t) if moves_on(here, crossing, entered) else entered
 
 
 def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:

@@ -106,9 +106,10 @@ class Run(Problem):
         further = end > here.segment.end or end == self.settings.until
         self.recorder.strip(here.arc, rows, q, outputs if further else here.arc.outputs)
 
-    def returns(self, here: ModeState, made: Crossing, entered: ModeState) -> bool:
-        """Whether a transition from an arc without any flow led back to where its cascade has been."""
-        return self.cascade.returns(made.time > here.arc.times[0], entered.index, entered.x)
+    def has_flowed(self, t: Number) -> bool:
+        """Whether the run has flowed between its last transition and a time."""
+        made = self.recorder.transitions
+        return not made or made[-1].resumed is None or t > made[-1].resumed
 
     def limit_reached(self, t: Number) -> Stop | None:
         """Stop where one more transition would exceed what the run may make."""

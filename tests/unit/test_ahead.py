@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import sys
 from pathlib import Path
@@ -55,6 +56,17 @@ def test_without_an_answer_there_is_none():
     (other,) = ahead._begun
     os.kill(other.process, signal.SIGKILL)
     assert ahead.taken(files) is None
+
+
+def test_a_large_answer_that_nobody_reads_keeps_no_process(monkeypatch):
+    monkeypatch.setattr(ahead, "_lowered", lambda files: bytes(1 << 22))  # more than any pipe holds
+    ahead.begin(ModelFiles.read(MODELS / "thermostat.yaml"))
+    other = ahead._begun.pop()
+    os.close(other.answer)
+    ended, _, _ = select.select([os.pidfd_open(other.process)], [], [], 60)
+    os.kill(other.process, signal.SIGKILL)
+    os.waitpid(other.process, 0)
+    assert ended
 
 
 def test_another_model_is_not_taken_for_it_and_nothing_is_left():

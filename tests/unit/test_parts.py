@@ -704,3 +704,25 @@ def test_equations_of_the_file_reach_through_parts(way):
     assert [t.time for t in found.transitions] == pytest.approx([t.time for t in expected.transitions], abs=1e-8)
     assert list(found.final.state.values()) == pytest.approx(list(expected.final.state.values()), abs=1e-8)
     assert found.final.outputs["p"] == pytest.approx(expected.final.outputs["p"], abs=1e-8)
+
+
+TURNING = """
+hsdsl: 1
+automata:
+  counter:
+    modes:
+      up: {flow: {x: 1}, transitions: [{name: hit, when: x >= 2/3, to: down, reset: {x: x - 1/3}}]}
+      down: {flow: {x: -1}, transitions: [{name: hit, when: x <= 0, to: up, reset: {x: x + 1/5}}]}
+system:
+  a: {automaton: counter, initial: {mode: up, x: 1/10}}
+  b: {automaton: counter, initial: {mode: up, x: 1/10}}
+experiment: {until: 4}
+"""
+
+
+@pytest.mark.parametrize("engine", ["c", "python"])
+def test_tied_parts_commute_also_where_modes_name_transitions_alike(engine):
+    run = hsdsl.loads(TURNING).simulate(engine=engine)
+    assert len(run.transitions) > 8
+    assert run.verdict.theorem == "holds"
+    assert any("every order leads to the same point" in reason for reason in run.verdict.reasons)

@@ -81,7 +81,7 @@ CASES = [
     ("nearly together", PAIR, COMMUTING | {"double": "2*z", "start": "1e-11"}, "unknown", "and it matters"),
     ("nearly together, commuting", PAIR, COMMUTING | {"start": "1e-11"}, "holds", "2 transitions"),
     ("one after the other", PAIR, COMMUTING | {"double": "2*z", "start": "0.1"}, "holds", "2 transitions"),
-    ("a flow that jumps", SIGN, {"flow": "sign(x - 2)"}, "unknown", "sign or floor"),
+    ("a flow that jumps", SIGN, {"flow": "sign(x - 2)"}, "unknown", "sign, floor or select"),
     ("a flow with a kink", SIGN, {"flow": "abs(x - 0.5)"}, "holds", "no transition"),
     ("before a Zeno point", BALL, {"until": "2.4"}, "holds", "transitions"),
     ("past a Zeno point", BALL, {"until": "4"}, "left", "Zeno"),

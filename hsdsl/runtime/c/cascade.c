@@ -4,6 +4,9 @@
 
 #define PARALLEL 1e-6
 
+/* Whether the run has flowed between its last transition and a time. */
+static int has_flowed(const hs_run *run, hs_time t) { return !run->jump || t > made_before(run, 0)->resumed; }
+
 /* Count a transition that led to run->x of the present mode, after some flow or none; say whether one of the same
    cascade has led there before (Brent's algorithm). */
 static int returns(hs_run *run, int flowed) {

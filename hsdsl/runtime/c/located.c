@@ -301,7 +301,6 @@ static int jump(hs_run *run) {
   const hs_time t = crossing->time, until = run->until;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
-  const hs_time arc_start = run->here.entered_at;
   const int mode = run->here.mode;
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
@@ -324,12 +323,13 @@ static int jump(hs_run *run) {
     strip(run, 2, rows, crossing->state);
   }
   const hs_real since = run->alternatives_count || same_instant(run, t) ? tie(run, t) : 0.0;
+  const int flowed = has_flowed(run, t);
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
-  return returns(run, t > arc_start) ? slides(run, mode, k) : close_tail(run, k);
+  return returns(run, flowed) ? slides(run, mode, k) : close_tail(run, k);
 }
 
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */

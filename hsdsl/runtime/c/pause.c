@@ -43,7 +43,7 @@ static void save(hs_run *run, hs_pause *pause, int outcome) {
   pause->ended = outcome != PAUSED;
   pause->mode = here->mode, pause->dimension = here->dimension;
   pause->standing = here->standing, pause->emerging = here->emerging;
-  pause->time = here->t, pause->entered_at = here->entered_at;
+  pause->time = here->t;
   pause->control = run->control;
   pause->placed = run->placed, pause->jump = run->jump, pause->row = run->row;
   pause->noted_crowded = run->noted_crowded;
@@ -61,7 +61,7 @@ static void restore(hs_run *run, hs_pause *pause) {
   here->table = &run->model->mode[pause->mode];
   here->p = pause->data;
   here->standing = pause->standing, here->emerging = pause->emerging;
-  here->t = pause->time, here->entered_at = pause->entered_at;
+  here->t = pause->time;
   run->control = pause->control;
   run->placed = pause->placed, run->jump = pause->jump, run->row = pause->row;
   run->noted_crowded = pause->noted_crowded;

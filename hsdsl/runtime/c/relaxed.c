@@ -203,13 +203,14 @@ static int through_strip(hs_run *run) {
   resumed = earlier(resumed, until);
   hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {resumed, run->epsilon}};
   strip(run, 3, rows, crossing->state);
+  const int flowed = has_flowed(run, t);
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);
   copy(run->scale, run->both, edge->target_dimension);
   const hs_mode_state before = run->here;
   const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
-  if (entered != GOES_ON || !returns(run, t > before.entered_at)) return entered;
+  if (entered != GOES_ON || !returns(run, flowed)) return entered;
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 

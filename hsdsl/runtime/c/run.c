@@ -46,7 +46,7 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
     here.outputs_p = before->p;
   }
   here.standing = here.emerging = 0;
-  here.t = here.entered_at = t;
+  here.t = t;
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
   if (run->task->settings.arcs) bound_first_step(run, mode);

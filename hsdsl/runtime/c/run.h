@@ -69,7 +69,7 @@ typedef struct {
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const hs_real *outputs_p;
   int standing, emerging;  /* numbers of surfaces in active_surfaces and in run->emerging */
-  hs_time t, entered_at;
+  hs_time t;
 } hs_mode_state;
 
 /* One step as tried, from (t, x) to (t1, z). */
@@ -265,7 +265,7 @@ typedef struct {
   int ended, mode, dimension, standing, emerging, noted_crowded, cascade_mode;
   long cascade_length, cascade_room;
   int64_t placed, jump, row;
-  hs_time time, entered_at;
+  hs_time time;
   hs_control control;
   hs_made made[FREE];
   hs_real *numbers, *data;

@@ -79,7 +79,8 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if left:
         return Verdict("left", _once(left, unknown))
     screen = run.screen
-    if screen is not None and not screen.doubts() and (run.accompanied or not run.execution.enters_beyond):
+    entered_inside = run.accompanied or not run.execution.enters_beyond
+    if not unknown and screen is not None and not screen.doubts() and entered_inside:
         return Verdict("holds", margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
     from hsdsl.simulate.verdict.looks import looked_at  # of a run that the screen leaves open
 
@@ -126,6 +127,8 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
 def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
     if stop.reason in INCOMPLETE:
         yield f"the run did not get to its end: {stop.message}"
+    elif run.errors is None and run.problem.settings.tolerance is not None:
+        yield "the finer run was interrupted, so no margin can be held against the error"
     elif run.errors is None:
         yield "a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"
     if run.execution.enters_beyond:

@@ -32,11 +32,11 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         if not made.alternatives:
             continue
         place, k = run.before(made)
-        names = run.edges(made.source)
-        rivals = [name for name in made.alternatives if not outranked(run, place, k, names.index(name), made)]
+        rivals = {name: run.edge_at(place, name) for name in made.alternatives}
+        rivals = {name: other for name, other in rivals.items() if not outranked(run, place, k, other, made)}
         if not rivals:
             continue
-        if commute(run, place, [k, *map(names.index, rivals)]):
+        if commute(run, place, [k, *rivals.values()]):
             commuting.append(made.time)
             continue
         others = " or ".join(rivals)

@@ -32,14 +32,10 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
         return
     if crossed is None:
         place = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
-    tied = run.transitions[arc.jump].alternatives if crossed is not None else ()  # `choices` looks at these
+    alternatives = run.transitions[arc.jump].alternatives if crossed is not None else ()
+    tied = {run.edge_at(place, name) for name in alternatives}  # `choices` looks at these
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
-        if (
-            k == crossed
-            or (k < len(place.mode.edges) and place.mode.edges[k].name in tied)
-            or place.value(k) > place.roundoff_bound(k)
-            or not place.rate(k) > 0
-        ):
+        if k == crossed or k in tied or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
         if crossed is not None and crossed != k and place.outranks(crossed, k, run.around(place, arc.last)):
             continue

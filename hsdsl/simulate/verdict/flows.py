@@ -45,7 +45,7 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
 
 def _jumping(modes: Sequence[ModeProgram]) -> Finding:
     names = ", ".join(mode.name for mode in modes)
-    where = f"the flow of mode {names} jumps where sign or floor does, or atan2 on its cut"
+    where = f"the flow of mode {names} jumps where sign, floor or select does, or atan2 on its cut"
     sentence = f"{where}, and the theorem is about continuous ones"
     return Finding("jump", "unknown", sentence)
 

@@ -126,7 +126,7 @@ def let_go(model, config, p, lane, event):
         halvings=jnp.zeros_like(lane.halvings), terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
     free = out_of_contact(model, here, jnp.asarray(True))
-    free = free._replace(scale=event.sizes, entered_t=frozen(here.t), entered_x=frozen(here.x))
+    free = free._replace(scale=event.sizes, entered_x=frozen(here.x))
     lane = chosen(ends, chosen(frees, free, here), lane)
     return lane, event._replace(mask=event.mask & ~ends)
 
@@ -200,7 +200,6 @@ def close_tail(model, config, p, lane, record, mask):
     lane = stopped(lane, none, ZENO)
     active = (jnp.abs(r) <= noise) | (jnp.arange(model.M) == k)
     rest = noticed(model, lane, limit)._replace(
-        t=keeping(end, lane.t), x=q, active=active, emerging=jnp.zeros_like(lane.emerging), entered_t=end,
-        entered_x=limit,
+        t=keeping(end, lane.t), x=q, active=active, emerging=jnp.zeros_like(lane.emerging), entered_x=limit,
     )  # fmt: skip
     return chosen(goes, rest, lane), record

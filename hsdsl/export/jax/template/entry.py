@@ -41,8 +41,7 @@ def boundary(model, p, lane, here):
         reset_at=jnp.asarray(NAN), made=jnp.asarray(False), visited=lane.visited._replace(room=jnp.int32(0)),
     )  # fmt: skip
     kink = lane._replace(
-        phase=jnp.int32(STEP), segment=lane.segment + 1, entered_t=still.t, entered_x=still.x,
-        terms=jnp.zeros_like(lane.terms),
+        phase=jnp.int32(STEP), segment=lane.segment + 1, entered_x=still.x, terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
     ends = mask & bound.last
     out = out_of_contact(model, lane, ends) if model.holds else lane
@@ -77,8 +76,8 @@ def enter(model, config, p, lane):
     """Place a run in its mode; a guard fires at once, or the run flows. Returns which flow."""
     mask = lane.phase == ENTER
     placed = noticed(model, lane, frozen(lane.x))._replace(
-        segment=model.segment(frozen(p), frozen(lane.t)).astype(jnp.int32), entered_t=frozen(lane.t),
-        entered_x=frozen(lane.x), terms=jnp.zeros_like(lane.terms), held=jnp.full_like(lane.held, -1),
+        segment=model.segment(frozen(p), frozen(lane.t)).astype(jnp.int32), entered_x=frozen(lane.x),
+        terms=jnp.zeros_like(lane.terms), held=jnp.full_like(lane.held, -1),
         trial=lane.h, clear=jnp.asarray(False),
     )  # fmt: skip
     bound, still = Bound(model, frozen(p), placed.segment), frozen(placed)

@@ -35,7 +35,7 @@ class Lane(NamedTuple):
     state of the model has had. ``active`` and ``emerging`` are as in the reference loop. ``h`` is the step to try next,
     ``trial`` the one under way, halved ``halvings`` times. ``terms`` has the sizes of the terms of the last step.
     ``held`` is the edge whose guard holds the state, or -1.
-    ``edge`` is that of the last transition, and ``slope`` the flow before it.
+    ``edge`` is that of the last transition, after which it ``resumed``, and ``slope`` the flow before it.
     """
 
     phase: Any
@@ -51,7 +51,7 @@ class Lane(NamedTuple):
     inside: Any
     since: Any
     reset_at: Any
-    entered_t: Any
+    resumed: Any
     entered_x: Any
     terms: Any
     h: Any

@@ -180,10 +180,11 @@ def entered_next(model, config, bound, lane, event, edge, x, after, scale, resum
     slope = frozen(bound.flow(lane.mode, event.t, x)) if relaxed else lane.slope  # only the relaxed scheme reads it
     owner = model.of(model.owner, lane.mode).astype(jnp.int32)
     return lane._replace(
-        phase=jnp.int32(ENTER), t=resumed, x=after, mode=jnp.asarray(model.target, jnp.int32)[edge], scale=scale,
+        phase=jnp.int32(ENTER), t=resumed, resumed=frozen(resumed), x=after, scale=scale,
+        mode=jnp.asarray(model.target, jnp.int32)[edge],
         since=kept(lane.since, since_of(config, lane, event)), inside=jnp.zeros_like(lane.inside),
         reset_at=kept(NAN, frozen(event.t)), held=jnp.full_like(lane.held, -1), made=kept(lane.made, True),
-        flowed=kept(lane.flowed, event.t > lane.entered_t), edge=edge, slope=kept(lane.slope, slope),
+        flowed=kept(lane.flowed, event.t > lane.resumed), edge=edge, slope=kept(lane.slope, slope),
         mode_before=kept(lane.mode_before, owner), times=jnp.append(lane.times[1:], frozen(event.t)),
         waits=jnp.append(lane.waits[1:], frozen(resumed - event.t)),
         loops=jnp.append(lane.loops[1:], kept(-1, edge).astype(jnp.int32)), count=lane.count + 1, trial=lane.h,

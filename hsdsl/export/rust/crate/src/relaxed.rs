@@ -236,7 +236,8 @@ impl<S: Sink> Run<'_, S> {
         self.record(crossing, event.tied, resumed, &after, false);
         let mut slope = [0.0; W];
         let unknown = self.flow(t, &crossing.state, &mut slope);
-        let (mode, dimension, flowed) = (self.mode, self.dimension, t > self.entered_at);
+        let (mode, dimension, flowed) = (self.mode, self.dimension, t > self.resumed);
+        self.resumed = resumed;
         let edge = &self.here().edges[crossing.edge];
         self.x = after;
         self.scale = scale;

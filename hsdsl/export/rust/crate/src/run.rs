@@ -82,7 +82,7 @@ pub struct Run<'a, S> {
     pub(crate) segment: usize,
     pub(crate) p: [f64; P + D],
     pub(crate) t: f64,
-    pub(crate) entered_at: f64,
+    pub(crate) resumed: f64,
     pub(crate) x: State,
     pub(crate) slope: State,
     pub(crate) z: State,
@@ -132,7 +132,7 @@ pub fn simulate<S: Sink>(
         segment: 0,
         p: [0.0; P + D],
         t: 0.0,
-        entered_at: 0.0,
+        resumed: 0.0,
         x: *x,
         slope: [0.0; W],
         z: [0.0; W],
@@ -260,7 +260,6 @@ impl<S: Sink> Run<'_, S> {
         self.segment = segment_at(t);
         self.p = bound(&self.parameters, &SEGMENTS[self.segment]);
         self.t = t;
-        self.entered_at = t;
         self.active = [false; M];
         self.emerging = [false; M];
         let x = self.x;
