@@ -36,7 +36,6 @@ def fit(
     """Fit parameters and initial states to measurements."""
     with answer.reporting():
         check_target(plot, "--plot", (".png", ".svg"))
-        from hsdsl.fitting.words import as_json, summary
         from hsdsl.model import load
 
         with progress(answer.hidden) as show:
@@ -46,7 +45,7 @@ def fit(
         if plot is not None:
             found.plot(plot)
             say(f"wrote {plot}")
-        answer.give(lambda: as_json(found), lambda: summary(found))
+        answer.give(found.as_json, lambda: found.summary)
     if not found.success:
         raise Exit(3)
 

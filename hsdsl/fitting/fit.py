@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
+from hsdsl.names import called
+from hsdsl.report.json_form import plain
+from hsdsl.report.words import number
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +58,33 @@ class Fit:
         """The standard deviation of each value."""
         return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
+    def as_json(self) -> dict[str, Any]:
+        """The object of `fit --json`; what is not determined is null."""
+        names = ("values", "deviations", "covariance", "deviation", "success", "message", "evaluations", "at_bound")
+        known = {name: getattr(self, name) for name in names}
+        return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})
+
+    @property
+    def summary(self) -> str:
+        """The fit as lines of text."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        run = self.execution
+        yield f"{called(run.title, run.model)}: {self.measured.count} measurements, {self.evaluations} runs"
+        width = max(map(len, self.values))
+        for name, value in self.values.items():
+            deviation = self.deviations[name]
+            determined = bool(np.isfinite(deviation))
+            known = f"+- {number(deviation, 3)}" if determined else "not determined by the measurements"
+            bound = ", at its bound" if name in self.at_bound else ""
+            yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{bound}"
+        yield f"left over: {number(self.deviation, 4)} (weighted root mean square)"
+        yield f"{'ended' if self.success else 'did not end'} well: {self.message}"
+        yield from (f"not smooth: {reason}" for reason in self.nonsmooth)
+
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the measurements and the run to a .png or .svg file."""
-        from hsdsl.plot.measured import plot_measured
+        from hsdsl.plot.analyses import plot_measured
 
         plot_measured(path, self.execution, self.measured.times, self.measured.columns)

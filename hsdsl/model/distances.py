@@ -125,7 +125,7 @@ def plot_distance(
     After ``seconds`` the remaining times have wide bounds.
     """
     from hsdsl.metrics.profile import profiles
-    from hsdsl.plot.over_time import plot_over_time
+    from hsdsl.plot.analyses import plot_over_time
 
     check_same_model(run, other)
     source = _RunSpace(run, other, model, parameters, budget_of(seconds), hops)

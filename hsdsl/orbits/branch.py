@@ -87,7 +87,7 @@ class Branch:
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the state that varies most over the parameter to a .png or .svg file, with its bifurcations."""
-        from hsdsl.plot.branch import plot_branch
+        from hsdsl.plot.analyses import plot_branch
 
         states = np.array([p.state for p in self.points])
         drift = [k for k, name in enumerate(self.states) if name in self.first.drift]

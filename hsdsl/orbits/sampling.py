@@ -69,7 +69,7 @@ class OrbitalStability:
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw distances over radii to a .png or .svg file, a colour for each sequence of transitions."""
-        from hsdsl.plot.nearby import plot_nearby
+        from hsdsl.plot.analyses import plot_nearby
 
         points = [(run.radius, run.upper, run.transitions) for run in self.runs]
         plot_nearby(path, points, f"{self.title}: {self.verdict} (sampled)")

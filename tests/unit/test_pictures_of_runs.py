@@ -290,12 +290,12 @@ def test_a_failed_run_says_so_in_every_picture():
 
 
 def test_the_legend_of_many_sequences_is_short():
-    from hsdsl.plot import nearby
+    from hsdsl.plot import analyses
 
     points = [(10.0**-k, 10.0**-k, (f"a_transition_with_a_name_{j}",) * 9) for k in (2, 3) for j in range(40)]
-    figure = nearby.plot_nearby.__wrapped__(points, "title")
+    figure = analyses.plot_nearby.__wrapped__(points, "title")
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert len(texts) == nearby.MOST + 2 and texts[-1] == "and 28 other sequences"
+    assert len(texts) == analyses.MOST + 2 and texts[-1] == "and 28 other sequences"
     figure.draw_without_rendering()
     (axis,) = figure.axes
     assert axis.get_window_extent().height > figure.bbox.height / 3
@@ -303,10 +303,10 @@ def test_the_legend_of_many_sequences_is_short():
 
 
 def test_a_branch_says_which_lines_are_stable():
-    from hsdsl.plot import branch
+    from hsdsl.plot import analyses
 
     points = [(0.1 * k, float(k), k not in (4, 5, 6)) for k in range(12)]
-    figure = branch.plot_branch.__wrapped__("c", "x", points, [("fold", 0.3, 3.0)], "title")
+    figure = analyses.plot_branch.__wrapped__("c", "x", points, [("fold", 0.3, 3.0)], "title")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["stable", "unstable", "fold"]
 
 
