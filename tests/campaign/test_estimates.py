@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.families import FAMILIES
-from campaign.test_campaign import NOT_FOR_RELAXED, model_of
-from hsdsl import Execution
+from campaign.test_campaign import NOT_FOR_RELAXED
+from hsdsl import Execution, loads
 from hsdsl.model.estimate import Estimate
 
 FIXED = ("euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853")
@@ -51,7 +51,7 @@ def test_twice_an_estimate_bounds_the_error(kind):
     for name, family in FAMILIES.items():
         if not family.ordinary or (kind is relaxed and name in NOT_FOR_RELAXED):
             continue
-        model, r = model_of(family), random.Random(f"{name} {kind.__name__}")
+        model, r = loads(family.text), random.Random(f"{name} {kind.__name__}")
         for _ in range(MANY):
             values = family.draw(r)
             right = model.simulate(parameters=values, scheme="located", method="dop853", tolerance=1e-13)

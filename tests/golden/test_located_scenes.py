@@ -152,25 +152,23 @@ def test_runner_to_its_apex(w: str, apex: float, method: str) -> None:
 
 
 @lru_cache
-def varied(directory: Path) -> Any:
+def varied() -> Any:
     """Example 1 with the amplitude of its forcing as a parameter."""
     text = (MODELS / "oscillator-with-stop-1.yaml").read_text()
     text = text[: text.index("# Between impacts")].replace("{a: 0.05,", "{A: 20, a: 0.05,").replace("20*cos", "A*cos")
-    path = directory / "varied.yaml"
-    path.write_text(text)
-    return hsdsl.load(path)
+    return hsdsl.loads(text)
 
 
 @pytest.mark.parametrize(
     "count", [8, pytest.param(40, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.campaign)]
 )
-def test_no_impact_is_missed_or_made_up_whatever_the_parameters(count: int, tmp_path: Path) -> None:
+def test_no_impact_is_missed_or_made_up_whatever_the_parameters(count: int) -> None:
     """Restitution and forcing varied, against the closed form."""
     rng, until = random.Random(7), 37.7
     for _ in range(count):
         c, amplitude = f"{rng.uniform(0.3, 0.95):.6f}", f"{rng.uniform(8, 30):.6f}"
         exact = Motion(Oscillator("0.05", c, "2.5", "14", amplitude), mp.mpf("11.36"), mp.mpf("31.4"), mp.mpf(until))
-        run = varied(tmp_path).simulate(
+        run = varied().simulate(
             scheme="located", method="taylor", tolerance=1e-10, until=until, parameters={"c": c, "A": amplitude}
         )
         assert len(run.transitions) == len(exact.impacts), (c, amplitude)
@@ -190,38 +188,30 @@ experiment: {until: 3}
 
 @pytest.mark.parametrize("until", [250, 300, 301, 1000, 3000])
 @pytest.mark.parametrize("method", ["taylor", "dop853"])
-def test_a_clock_faster_than_the_flow_is_not_passed_over(method: str, until: int, tmp_path: Path) -> None:
+def test_a_clock_faster_than_the_flow_is_not_passed_over(method: str, until: int) -> None:
     """The flow alone would allow steps of many periods, and the period divides them: on for 5/12 of each."""
-    path = tmp_path / "clock.yaml"
-    path.write_text(CLOCK)
-    run = hsdsl.load(path).simulate(until, method=method)
+    run = hsdsl.loads(CLOCK).simulate(until, method=method)
     assert len(run.transitions) == 2 * until
     assert run.final.state["x"] == pytest.approx(until * 5 / 12, abs=1e-8)
     assert run.verdict.theorem == "holds"
 
 
 @pytest.mark.parametrize("method", ["taylor", pytest.param("dopri5", marks=pytest.mark.slow)])
-def test_a_clock_of_thousands_of_periods_is_followed(method: str, tmp_path: Path) -> None:
-    path = tmp_path / "clock.yaml"
-    path.write_text(CLOCK)
-    run = hsdsl.load(path).simulate(20_000, method=method)
+def test_a_clock_of_thousands_of_periods_is_followed(method: str) -> None:
+    run = hsdsl.loads(CLOCK).simulate(20_000, method=method)
     assert len(run.transitions) == 40_000
     assert run.final.state["x"] == pytest.approx(20_000 * 5 / 12, abs=1e-5)
     assert len(run.times) < 10 * len(run.transitions)  # a stretch begins with a step as long as the last one allowed
 
 
-def test_a_clock_too_fast_to_be_followed_is_told_of(tmp_path: Path) -> None:
-    path = tmp_path / "clock.yaml"
-    path.write_text(CLOCK)
-    run = hsdsl.load(path).simulate("1e9", max_transitions=1000)
+def test_a_clock_too_fast_to_be_followed_is_told_of() -> None:
+    run = hsdsl.loads(CLOCK).simulate("1e9", max_transitions=1000)
     assert any("would not settle" in reason for reason in run.verdict.reasons)
     assert run.verdict.theorem != "holds"
 
 
-def test_the_relaxed_scheme_says_what_it_passed_over(tmp_path: Path) -> None:
-    path = tmp_path / "clock.yaml"
-    path.write_text(CLOCK)
-    run = hsdsl.load(path).simulate(10, scheme="relaxed")
+def test_the_relaxed_scheme_says_what_it_passed_over() -> None:
+    run = hsdsl.loads(CLOCK).simulate(10, scheme="relaxed")
     assert len(run.transitions) < 20
     assert run.verdict.theorem == "unknown" and "passed over" in run.verdict.reasons[0]
 

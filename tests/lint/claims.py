@@ -10,11 +10,9 @@ from __future__ import annotations
 import math
 import random
 import re
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import hsdsl
 from hsdsl.errors import ModelError, UsageError
@@ -206,7 +204,7 @@ class Attack:
         key = self.model.text(**text)
         try:
             if key not in self._runs:
-                self._runs[key] = _loaded(key)
+                self._runs[key] = hsdsl.loads(key)
             states = {name: at.get(name, 0.3) for name in NAMES}
             initial = {"mode": mode, **states}
             return self._runs[key].simulate(
@@ -226,13 +224,6 @@ class Attack:
         for _ in range(self.starts):
             some = (0.0, 1.0, -1.0, 0.5, -0.5, self.rng.uniform(-1.5, 1.5), self.rng.gauss(0, 0.3))
             yield {name: self.rng.choice(some) for name in NAMES}
-
-
-def _loaded(text: str) -> hsdsl.Model:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model.yaml"
-        path.write_text(text)
-        return hsdsl.load(path)
 
 
 def _at(run: hsdsl.Execution, time: float) -> dict[str, float]:

@@ -124,9 +124,8 @@ def test_any_units_by_default_settings(name: str, factors: tuple[float, float, f
 
 
 @pytest.mark.parametrize("scheme", ["located", "relaxed"])
-def test_an_oscillator_of_a_nanosecond(scheme: str, tmp_path: Path) -> None:
-    path = tmp_path / "m.yaml"
-    path.write_text("""
+def test_an_oscillator_of_a_nanosecond(scheme: str) -> None:
+    text = """
 hsdsl: 1
 parameters: {tau: 1e-9, u: 5}
 modes:
@@ -134,24 +133,23 @@ modes:
   drain: {flow: {x: -x/tau}, transitions: [{when: x <= u/3, to: charge}]}
 initial: {mode: charge, x: 0}
 experiment: {until: 1e-7}
-""")
-    run = hsdsl.load(path).simulate(scheme=scheme, tolerance=1e-9)
+"""
+    run = hsdsl.loads(text).simulate(scheme=scheme, tolerance=1e-9)
     assert len(run.transitions) == int((1e-7 - 1e-9 * np.log(3)) / (1e-9 * np.log(2))) + 1
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e9])
 @pytest.mark.parametrize("method", METHODS)
-def test_surfaces_of_time_alone_are_crossed_once(scale: float, method: str, tmp_path: Path) -> None:
-    path = tmp_path / "m.yaml"
-    path.write_text(f"""
+def test_surfaces_of_time_alone_are_crossed_once(scale: float, method: str) -> None:
+    text = f"""
 hsdsl: 1
 modes:
   a: {{flow: {{x: 1}}, transitions: [{{when: sin(10*t/{scale!r}) <= 0, to: b}}]}}
   b: {{flow: {{x: -1}}, transitions: [{{when: sin(10*t/{scale!r}) >= 0, to: a}}]}}
 initial: {{mode: a, x: 0}}
 experiment: {{until: {20 * scale!r}}}
-""")
-    run = hsdsl.load(path).simulate(method=method)
+"""
+    run = hsdsl.loads(text).simulate(method=method)
     times = np.array([t.time for t in run.transitions])
     wanted = np.pi / 10 * scale * np.arange(1, 64)
     assert np.allclose(times[times > 0.01 * scale], wanted, rtol=1e-12)

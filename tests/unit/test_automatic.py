@@ -48,10 +48,8 @@ CASES = {
 }
 
 
-def made(folder: Path, flow: str, initial: str, until: str) -> hsdsl.Model:
-    path = folder / "m.yaml"
-    path.write_text(ROOT.format(flow=flow, initial=initial, until=until))
-    return hsdsl.load(path)
+def made(flow: str, initial: str, until: str) -> hsdsl.Model:
+    return hsdsl.loads(ROOT.format(flow=flow, initial=initial, until=until))
 
 
 def prepared(model: hsdsl.Model, **asked: object):
@@ -59,9 +57,9 @@ def prepared(model: hsdsl.Model, **asked: object):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_auto_is(name: str, tmp_path: Path) -> None:
+def test_what_auto_is(name: str) -> None:
     flow, initial, until, method = CASES[name]
-    settings = prepared(made(tmp_path, flow, initial, until))
+    settings = prepared(made(flow, initial, until))
     assert settings.method.name == method
     assert settings.method_chosen.startswith(f"{method}: ")
 
@@ -72,28 +70,27 @@ def test_the_models(path: Path) -> None:
     assert settings.method.name == ("radau" if path.stem == "stiff-switch" else "taylor")
 
 
-def test_a_stiff_mode_that_an_edge_leads_to(tmp_path: Path) -> None:
-    path = tmp_path / "m.yaml"
-    path.write_text("""
+def test_a_stiff_mode_that_an_edge_leads_to() -> None:
+    text = """
 hsdsl: 1
 modes:
   slow: {flow: {x: 1}, transitions: [{when: x >= 1, to: fast}]}
   fast: {flow: {x: -1e6*(x - cos(t))}}
 initial: {mode: slow, x: 0}
 experiment: {until: 10}
-""")
-    settings = prepared(hsdsl.load(path))
+"""
+    settings = prepared(hsdsl.loads(text))
     assert settings.method.name == "radau" and "fast is stiff" in settings.method_chosen
 
 
-def test_a_fixed_step_and_digits_are_not_looked_into(tmp_path: Path) -> None:
-    model = made(tmp_path, *CASES["a fast decay to a slow curve"][:3])
+def test_a_fixed_step_and_digits_are_not_looked_into() -> None:
+    model = made(*CASES["a fast decay to a slow curve"][:3])
     assert prepared(model, step=1e-3).method.name == "dopri5"
     assert prepared(model, precision=30).method.name == "taylor"
 
 
 def test_what_was_picked_is_said_and_estimates_keep_it(tmp_path: Path) -> None:
-    model = made(tmp_path, "{x: v, v: -x}", "x: 1, v: 0", "1")
+    model = made("{x: v, v: -x}", "x: 1, v: 0", "1")
     run = model.simulate(engine="python")
     assert run.method == "taylor" and run.settings["method_chosen"].startswith("taylor: every flow is smooth")
     assert "method_chosen" not in model.simulate(method="taylor", engine="python").settings
@@ -103,9 +100,9 @@ def test_what_was_picked_is_said_and_estimates_keep_it(tmp_path: Path) -> None:
     assert load(tmp_path / "run.npz").settings == run.settings
 
 
-def test_a_stiff_run_takes_few_steps(tmp_path: Path) -> None:
+def test_a_stiff_run_takes_few_steps() -> None:
     flow, initial, until, _ = CASES["a fast decay to a slow curve"]
-    run = made(tmp_path, flow, initial, until).simulate(engine="python")
+    run = made(flow, initial, until).simulate(engine="python")
     assert len(run.times) < 500
     assert run.final["x"] == pytest.approx(np.cos(10) + np.sin(10) * 1e-5, abs=1e-7)
 

@@ -102,9 +102,8 @@ def test_past_a_zeno_point_transitions_are_not_counted():
     assert judge(scene, exactly(scene, transitions=20_000)).verdict == "right"
 
 
-def test_modes_with_other_states_compare_what_both_have(tmp_path):
-    (tmp_path / "m.yaml").write_text(SHEDDING)
-    model = hsdsl.load(tmp_path / "m.yaml")
+def test_modes_with_other_states_compare_what_both_have():
+    model = hsdsl.loads(SHEDDING)
     scene = Scene.of(model, samples=101)
     assert scene.states == ("x", "y")
     rows, _ = work_precision(
@@ -186,21 +185,20 @@ experiment: {until: 5}
 
 
 @pytest.mark.parametrize("name", ["scipy", "heyoka", "sksundae", "diffrax"])
-def test_a_condition_decides_between_edges_of_one_guard(tmp_path, name):
+def test_a_condition_decides_between_edges_of_one_guard(name):
     if not find_spec(PACKAGES[name]):
         pytest.skip(f"{name} is not installed")
-    (tmp_path / "m.yaml").write_text(CHOOSING)
-    scene = Scene.of(hsdsl.load(tmp_path / "m.yaml"), samples=500)
+    scene = Scene.of(hsdsl.loads(CHOOSING), samples=500)
     judgement = judge(scene, prepare(name, scene)(1e-10))
     assert (judgement.verdict, judgement.transitions) == ("right", 4)
     assert judgement.error < 1e-7
 
 
-def test_sampled_inputs_are_refused(tmp_path):
+def test_sampled_inputs_are_refused():
     sampled = "inputs: {u: {times: [0, 2], values: [0, 1]}}\nmodes:"
-    (tmp_path / "m.yaml").write_text(SHEDDING.replace("modes:", sampled).replace("y: 1}\n", "y: 1 + u}\n"))
+    text = SHEDDING.replace("modes:", sampled).replace("y: 1}\n", "y: 1 + u}\n")
     with pytest.raises(Refused, match="sampled inputs"):
-        prepare("scipy", Scene.of(hsdsl.load(tmp_path / "m.yaml"), samples=50))
+        prepare("scipy", Scene.of(hsdsl.loads(text), samples=50))
 
 
 @pytest.mark.parametrize("name", PEERS)

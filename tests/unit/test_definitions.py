@@ -33,9 +33,8 @@ def test_a_call_is_the_expression_written_out():
     assert called.modes[0].edges[0].surface.residual == written.modes[0].edges[0].surface.residual
 
 
-def test_functions_are_known_to_overrides(tmp_path):
-    (tmp_path / "m.yaml").write_text(HILL % CALLS)
-    model = hsdsl.load(tmp_path / "m.yaml")
+def test_functions_are_known_to_overrides():
+    model = hsdsl.loads(HILL % CALLS)
     run = model.simulate(until=0, parameters={"rate": "hill(1, 3)"}, initial={"x": "gain(2)"})
     assert run.final.state["x"] == 0.1 / 2
     with pytest.raises(UsageError, match="`hill` takes 2 arguments, not 1"):
@@ -69,9 +68,8 @@ experiment: {until: 1}
 
 
 @pytest.fixture
-def start(tmp_path):
-    (tmp_path / "m.yaml").write_text(START)
-    return hsdsl.load(tmp_path / "m.yaml")
+def start():
+    return hsdsl.loads(START)
 
 
 FOLLOWING = [
@@ -130,16 +128,15 @@ def test_a_name_of_the_file_goes_before_the_timer():
     assert elaborate("m.yaml", text=text.encode()).states == ("x",)
 
 
-def test_derivatives_through_a_dwell(tmp_path):
+def test_derivatives_through_a_dwell():
     """The mode is left when since = rest, entered at 0: x = 1 - exp(-rest) then."""
-    (tmp_path / "m.yaml").write_text(SINCE.replace("1/3", "rest").replace("modes:", "parameters: {rest: 1/3}\nmodes:"))
-    found = hsdsl.load(tmp_path / "m.yaml").sensitivity("rest", until="3/4").final.state["x"]
+    text = SINCE.replace("1/3", "rest").replace("modes:", "parameters: {rest: 1/3}\nmodes:")
+    found = hsdsl.loads(text).sensitivity("rest", until="3/4").final.state["x"]
     assert found["rest"] == pytest.approx(math.exp(-1 / 3), rel=1e-9)
 
 
-def test_completions_as_text_refuse_the_timer(tmp_path):
+def test_completions_as_text_refuse_the_timer():
     mode = "{flow: {h: v, v: -1}, transitions: [{when: h <= 0, to: m, reset: {v: -v/2}}], outputs: {s: since}}"
     text = f"hsdsl: 1\nmodes: {{m: {mode}}}\ninitial: {{mode: m, h: 1, v: 0}}\nexperiment: {{until: 9}}\n"
-    (tmp_path / "m.yaml").write_text(text)
     with pytest.raises(UsageError, match="`since` or events cannot be written with its completions"):
-        hsdsl.load(tmp_path / "m.yaml").completed()
+        hsdsl.loads(text).completed()

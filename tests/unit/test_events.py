@@ -24,10 +24,9 @@ HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 ENGINES = ["python", *(["c"] if COMPILER else [])]
 
 
-def model(tmp_path, flow: str, transitions: str, initial: str, until: str = "10"):
+def model(flow: str, transitions: str, initial: str, until: str = "10"):
     text = f"{HEAD}    flow: {{{flow}}}\n    transitions: [{transitions}]\n"
-    (tmp_path / "m.yaml").write_text(f"{text}initial: {{mode: m, {initial}}}\nexperiment: {{until: {until}}}\n")
-    return hsdsl.load(tmp_path / "m.yaml")
+    return hsdsl.loads(f"{text}initial: {{mode: m, {initial}}}\nexperiment: {{until: {until}}}\n")
 
 
 def times(run, edge):
@@ -35,17 +34,17 @@ def times(run, edge):
 
 
 @pytest.mark.parametrize("method", ["auto", "dop853", "radau"])
-def test_turns_true_again_after_it_was_false(tmp_path, method):
+def test_turns_true_again_after_it_was_false(method):
     """sin(t) rises through 1/2 at pi/6 + 2 k pi, and |sin(t)| through 9/10 at asin(9/10) + k pi."""
     two = "{name: high, event: x >= 1/2}, {name: far, event: x >= 9/10 or not x > -9/10, reset: {n: n + 1}}"
-    run = model(tmp_path, "x: y, y: -x, n: 0", two, "x: 0, y: 1, n: 0", "20").simulate(method=method)
+    run = model("x: y, y: -x, n: 0", two, "x: 0, y: 1, n: 0", "20").simulate(method=method)
     close = {"abs": 1e-6 if method == "radau" else 1e-8}
     assert times(run, "high") == pytest.approx([math.pi / 6 + 2 * k * math.pi for k in range(4)], **close)
     assert times(run, "far") == pytest.approx([math.asin(0.9) + k * math.pi for k in range(7)], **close)
     assert run.final.state["n"] == 7
 
 
-def test_engines_agree_to_the_last_bit(tmp_path):
+def test_engines_agree_to_the_last_bit():
     if not COMPILER:
         pytest.skip("no compiler")
     four = (
@@ -53,7 +52,7 @@ def test_engines_agree_to_the_last_bit(tmp_path):
         "{name: b, event: x <= -1/2 or y >= 3/4, reset: {n: -n, x: x/2}, priority: 1},"
         "{name: c, event: n > 1, initially: false, reset: {n: n - y}}"
     )
-    made = model(tmp_path, "x: y, y: -x + n/10, n: 1/7", four, "x: 0, y: 1, n: 2", "12")
+    made = model("x: y, y: -x + n/10, n: 1/7", four, "x: 0, y: 1, n: 2", "12")
     for scheme in ("located", "relaxed"):
         python, c = (made.simulate(engine=engine, scheme=scheme) for engine in ("python", "c"))
         assert len(python.transitions) > 10
@@ -63,31 +62,30 @@ def test_engines_agree_to_the_last_bit(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_two_comparisons_reached_together(tmp_path, engine):
+def test_two_comparisons_reached_together(engine):
     """Each is within round-off of its surface where the other one is crossed."""
     both = "{name: both, event: x >= 1/3 and y >= 2/3 and z <= -1/9, reset: {n: n + 1}}"
-    run = model(tmp_path, "x: 1, y: 2, z: -1/3, n: 0", both, "x: 0, y: 0, z: 0, n: 0", "1").simulate(engine=engine)
+    run = model("x: 1, y: 2, z: -1/3, n: 0", both, "x: 0, y: 0, z: 0, n: 0", "1").simulate(engine=engine)
     assert times(run, "both") == pytest.approx([1 / 3], abs=1e-12)
 
 
-def test_the_order_of_events_reached_together(tmp_path):
+def test_the_order_of_events_reached_together():
     """Each goes with the values that the one before left."""
     three = (
         "{name: low, event: x >= 1, reset: {n: 2*n}}, {name: high, event: x >= 1, priority: 2, reset: {n: n + 1}},"
         "{name: never, event: x >= 1 and n <= 1/2, priority: 1, persistent: false, reset: {n: 100}}"
     )
-    run = model(tmp_path, "x: 1, n: 0", three, "x: 0, n: 0", "2").simulate()
+    run = model("x: 1, n: 0", three, "x: 0, n: 0", "2").simulate()
     assert [m.edge for m in run.transitions][:2] == ["high", "low"]
     assert run.final.state["n"] == 2
     kept = three.replace(", persistent: false", "")
-    run = model(tmp_path, "x: 1, n: 0", kept, "x: 0, n: 0", "2").simulate()
+    run = model("x: 1, n: 0", kept, "x: 0, n: 0", "2").simulate()
     assert [m.edge for m in run.transitions][:3] == ["high", "never", "low"]
     assert run.final.state["n"] == 200
 
 
-def test_a_second_trigger_while_it_waits_ends_the_run(tmp_path):
+def test_a_second_trigger_while_it_waits_ends_the_run():
     run = model(
-        tmp_path,
         "x: y, y: -x, n: 0",
         "{name: e, event: x >= 1/2, delay: 9, waiting: 1, reset: {n: 1}}",
         "x: 0, y: 1, n: 0",
@@ -97,12 +95,12 @@ def test_a_second_trigger_while_it_waits_ends_the_run(tmp_path):
     assert end.stop.time == pytest.approx(math.pi / 6 + 2 * math.pi, abs=1e-8)
 
 
-def test_no_execution_is_lost(tmp_path):
+def test_no_execution_is_lost():
     """sin(t) rises through 1/2 once a period, and what waits for 1 to 4 periods is made."""
     for periods in (1, 2, 3.5):
         wait = 2 * math.pi * periods - 0.01
         event = f"{{name: e, event: x >= 1/2, delay: {wait!r}, reset: {{n: n + 1, m: t}}}}"
-        run = model(tmp_path, "x: y, y: -x, n: 0, m: 0", event, "x: 0, y: 1, n: 0, m: 0", "60").simulate()
+        run = model("x: y, y: -x, n: 0, m: 0", event, "x: 0, y: 1, n: 0, m: 0", "60").simulate()
         triggers = [math.pi / 6 + 2 * k * math.pi for k in range(10)]
         assert times(run, "e triggers") == pytest.approx([t for t in triggers if t < 60], abs=1e-7)
         assert times(run, "e") == pytest.approx([t + wait for t in triggers if t + wait < 60], abs=1e-7)
@@ -111,18 +109,18 @@ def test_no_execution_is_lost(tmp_path):
         assert run.stop.reason == "until"
 
 
-def test_a_fifth_trigger_ends_the_run_also_by_a_reset(tmp_path):
+def test_a_fifth_trigger_ends_the_run_also_by_a_reset():
     """At first four executions can wait."""
     text = (
         "{name: e, event: x >= 1, delay: 90, reset: {n: 1}}, {name: go, when: s >= 1, to: m, reset: {s: 0, x: 3 - x}}"
     )
-    run = model(tmp_path, "s: 1, x: 0, n: 0", text, "s: 0, x: 0, n: 0", "20").simulate()
+    run = model("s: 1, x: 0, n: 0", text, "s: 0, x: 0, n: 0", "20").simulate()
     assert times(run, "e triggers") == pytest.approx([1, 3, 5, 7])
     assert run.final.mode == "e-waits-already" and run.stop.time == pytest.approx(9)
 
 
 @pytest.mark.parametrize(("engine", "scheme"), [*((e, "located") for e in ENGINES), (ENGINES[-1], "relaxed")])
-def test_executions_overtake_each_other(tmp_path, engine, scheme):
+def test_executions_overtake_each_other(engine, scheme):
     """Delays that shrink and grow: each execution is made at its own time with its own values."""
     random = np.random.default_rng(11)
     for waiting, most in ((2, 1.9), (4, 3.9), (7, 6.9)):
@@ -130,9 +128,7 @@ def test_executions_overtake_each_other(tmp_path, engine, scheme):
         delay = f"{a} + {most - a}*(1 + sin({w}*t))/2"
         event = f"{{name: e, event: x >= 1/2, delay: {delay}, waiting: {waiting}, reset: {{n: 7, m: t}}}}"
         flow = "x: 2*pi*y, y: -2*pi*x, n: 0, m: 0"
-        run = model(tmp_path, flow, event, "x: 0, y: 1, n: 0, m: 0", "20").simulate(
-            engine=engine, scheme=scheme, tolerance=1e-10
-        )
+        run = model(flow, event, "x: 0, y: 1, n: 0, m: 0", "20").simulate(engine=engine, scheme=scheme, tolerance=1e-10)
         triggers = [1 / 12 + k for k in range(20)]
         due = sorted((t + a + (most - a) * (1 + math.sin(w * t)) / 2, t) for t in triggers)
         assert [t for _, t in due] != triggers
@@ -142,30 +138,30 @@ def test_executions_overtake_each_other(tmp_path, engine, scheme):
 
 
 @pytest.mark.parametrize("waiting", [0, 101])
-def test_how_many_wait_is_checked(tmp_path, waiting):
+def test_how_many_wait_is_checked(waiting):
     event = f"{{name: e, event: x >= 1/2, delay: 9, waiting: {waiting}, reset: {{n: 1}}}}"
     with pytest.raises(hsdsl.ModelError, match="from 1 to 100, got"):
-        model(tmp_path, "x: 1, n: 0", event, "x: 0, n: 0")
+        model("x: 1, n: 0", event, "x: 0, n: 0")
 
 
-def test_delays_are_evaluated_when_the_condition_turns_true(tmp_path):
-    run = model(tmp_path, "x: 1, n: 0", "{name: e, event: x >= 1, delay: x/2, reset: {n: 10*x}}", "x: 0, n: 0", "2")
+def test_delays_are_evaluated_when_the_condition_turns_true():
+    run = model("x: 1, n: 0", "{name: e, event: x >= 1, delay: x/2, reset: {n: 10*x}}", "x: 0, n: 0", "2")
     (made,) = [m for m in run.simulate().transitions if m.edge == "e"]
     assert made.time == pytest.approx(1.5, abs=1e-12) and made.after["n"] == pytest.approx(10, abs=1e-12)
 
 
-def test_an_event_is_no_wall(tmp_path):
-    run = model(tmp_path, "x: 1, n: 0", "{name: e, event: x >= 1, reset: {n: 1}}", "x: 3, n: 0").simulate()
+def test_an_event_is_no_wall():
+    run = model("x: 1, n: 0", "{name: e, event: x >= 1, reset: {n: 1}}", "x: 3, n: 0").simulate()
     assert run.stop.reason == "until" and not run.transitions and run.final.state["x"] == 13
 
 
-def test_random_events_against_a_grid(tmp_path):
+def test_random_events_against_a_grid():
     """Conditions over sines, judged on a fine grid: as many times of turning true as the run has."""
     random = np.random.default_rng(4)
     for _ in range(3):
         a, b, c = (round(float(v), 3) for v in random.uniform(-0.8, 0.8, 3))
         text = f"{{name: e, event: (x >= {a} and y <= {b}) or not (x < {c} or y > 0), reset: {{n: n + 1}}}}"
-        run = model(tmp_path, "x: y, y: -x, n: 0", text, "x: 0, y: 1, n: 0", "25").simulate()
+        run = model("x: y, y: -x, n: 0", text, "x: 0, y: 1, n: 0", "25").simulate()
         t = np.linspace(0, 25, 2_000_001)
         x, y = np.sin(t), np.cos(t)
         holds = ((x >= a) & (y <= b)) | ~((x < c) | (y > 0))
@@ -174,10 +170,10 @@ def test_random_events_against_a_grid(tmp_path):
 
 
 @pytest.mark.parametrize("target", ["latex"])
-def test_exports_that_cannot_keep_events_refuse(tmp_path, target):
+def test_exports_that_cannot_keep_events_refuse(target):
     from hsdsl.export import files_of, source_of
 
-    made = model(tmp_path, "x: 1", "{name: e, event: x >= 1, reset: {x: 0}}", "x: 0")
+    made = model("x: 1", "{name: e, event: x >= 1, reset: {x: 0}}", "x: 0")
     with pytest.raises(UsageError, match="events"):
         files_of(source_of(made, {}), target)
 
@@ -228,9 +224,9 @@ MADE = {  # flow, transitions, initial values, and the transitions that are made
 
 
 @pytest.mark.parametrize("what", MADE)
-def test_which_events_are_made(tmp_path, what):
+def test_which_events_are_made(what):
     flow, transitions, initial, expected = MADE[what]
-    run = model(tmp_path, flow, transitions, initial, "2").simulate(engine="python")
+    run = model(flow, transitions, initial, "2").simulate(engine="python")
     made = [(m.edge, m.time) for m in run.transitions if "re-arms" not in m.edge]
     assert [name for name, _ in made] == [name for name, _ in expected]
     assert [time for _, time in made] == pytest.approx([time for _, time in expected], abs=1e-12)
@@ -253,7 +249,7 @@ def test_keys_of_events_are_refused_elsewhere(key):
         hsdsl.loads(text + "initial: {mode: m, x: 0}\nexperiment: {until: 1}\n")
 
 
-def test_a_strict_condition_does_not_hold_where_its_surface_is_entered(tmp_path):
+def test_a_strict_condition_does_not_hold_where_its_surface_is_entered():
     """The mode is entered on the surface of its event, which turns true there."""
     text = "hsdsl: 1\nmodes:\n  m: {flow: {x: 1}, transitions: [{name: go, event: t >= 9/50, to: n}]}\n"
     text += "  n: {flow: {x: 1}, transitions: [{name: e, event: t > 9/50, delay: 1/2, reset: {x: 0}}]}\n"
@@ -262,12 +258,12 @@ def test_a_strict_condition_does_not_hold_where_its_surface_is_entered(tmp_path)
     assert run.transitions[-1].time == pytest.approx(0.68, abs=1e-12)
 
 
-def test_the_memory_of_events_leaves_the_verdict_alone(tmp_path):
+def test_the_memory_of_events_leaves_the_verdict_alone():
     transitions = (
         "{name: dose, event: t >= 3, delay: 2, reset: {x: x + 1}}, "
         "{name: stress, event: x > 2 and y < 1, delay: 1, persistent: false, reset: {x: x - 1, y: y + 1}}"
     )
-    run = model(tmp_path, "x: 0.3 - 0.1*x, y: 1 - y", transitions, "x: 0, y: 1/2", "20").simulate()
+    run = model("x: 0.3 - 0.1*x, y: 1 - y", transitions, "x: 0, y: 1/2", "20").simulate()
     assert run.verdict.theorem == "holds", run.verdict
     assert not any("was passed" in reason for reason in run.verdict.reasons), run.verdict
 
@@ -275,10 +271,10 @@ def test_the_memory_of_events_leaves_the_verdict_alone(tmp_path):
 @pytest.mark.parametrize(
     ("start", "flow", "when"), [("x: 0, y: 0", "x: 1, y: 1", 0.0), ("x: -1, y: -0.1", "x: 1, y: 0.1", 1.0)]
 )
-def test_comparisons_that_are_reached_together_turn_true_once(tmp_path, start, flow, when):
+def test_comparisons_that_are_reached_together_turn_true_once(start, flow, when):
     """The reset of x leaves y on its surface, where it counted as reached."""
     event = "{name: e, event: x > 0 and y > 0, reset: {x: x + 1}}"
-    run = model(tmp_path, flow, event, start, "3").simulate()
+    run = model(flow, event, start, "3").simulate()
     assert times(run, "e") == pytest.approx([when])
 
 
@@ -361,7 +357,7 @@ def test_events_are_shown_as_written(delayed, tmp_path, capsys):
     assert [(line.label, line.value) for line in guard_lines(delayed.pipeline.values(FLOAT64))] == [("rise", 0.5)]
 
 
-def test_a_run_that_ends_as_too_many_wait_shows_where(tmp_path):
+def test_a_run_that_ends_as_too_many_wait_shows_where():
     text = DELAYED.replace("delay: 0.3", "delay: 9, waiting: 1").replace("t >= 8", "t >= 80")
     model = hsdsl.loads(text)
     run = model.simulate(until=20)
@@ -377,12 +373,12 @@ def test_memory_is_never_suggested(delayed):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_many_events_at_one_instant_cost_no_time(tmp_path, engine):
+def test_many_events_at_one_instant_cost_no_time(engine):
     """All 18 are made at t = 1: a cascade of different edges is no tail, which would go through strips."""
     names = [f"x{k}" for k in range(18)]
     flow, start = (", ".join(f"{name}: 0" for name in names) for _ in "12")
     events = ", ".join(f"{{name: e{name}, event: t >= 1, reset: {{{name}: 1}}}}" for name in names)
-    run = model(tmp_path, flow, events, start, "2").simulate(engine=engine)
+    run = model(flow, events, start, "2").simulate(engine=engine)
     assert [(made.time, made.resumed) for made in run.transitions] == [(1.0, 1.0)] * 18
     assert {run.final.state[name] for name in names} == {1.0}
 
@@ -396,9 +392,9 @@ def test_many_events_at_one_instant_cost_no_time(tmp_path, engine):
         "reset: {b: 2}}",
     ],
 )
-def test_verdict_names_what_is_lost_in_a_strip(tmp_path, engine, transitions):
+def test_verdict_names_what_is_lost_in_a_strip(engine, transitions):
     """Behind the strip of the first one the second one's surface is passed; `located` makes both."""
-    of = model(tmp_path, "a: 0, b: 0", transitions, "a: 0, b: 0", "2")
+    of = model("a: 0, b: 0", transitions, "a: 0, b: 0", "2")
     run = of.simulate(engine=engine, scheme="relaxed")
     assert [made.edge for made in run.transitions] == ["one"]
     assert run.verdict.theorem == "left"

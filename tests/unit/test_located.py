@@ -13,10 +13,8 @@ import hsdsl
 METHODS = ["taylor", "dopri5"]
 
 
-def run(directory: Any, text: str, **more: Any) -> Any:
-    path = directory / "model.yaml"
-    path.write_text("hsdsl: 1\n" + text)
-    return hsdsl.load(path).simulate(scheme="located", **more)
+def run(text: str, **more: Any) -> Any:
+    return hsdsl.loads("hsdsl: 1\n" + text).simulate(scheme="located", **more)
 
 
 CHATTER = """
@@ -29,8 +27,8 @@ experiment: {until: 1.1, relaxation: 1e-3}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_strips_open_only_after_sixteen_transitions_within_the_relaxation(method: str, tmp_path: Any) -> None:
-    made = run(tmp_path, CHATTER, method=method)
+def test_strips_open_only_after_sixteen_transitions_within_the_relaxation(method: str) -> None:
+    made = run(CHATTER, method=method)
     delays = [t.resumed - t.time for t in made.transitions if t.resumed is not None]
     assert delays[:16] == [0] * 16
     assert delays[16:] == pytest.approx([1e-3] * len(delays[16:]), abs=1e-12)
@@ -49,14 +47,14 @@ experiment: {until: 4, tolerance: 1e-12}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_kinked_surfaces(method: str, tmp_path: Any) -> None:
-    made = run(tmp_path, KINKED, method=method)
+def test_kinked_surfaces(method: str) -> None:
+    made = run(KINKED, method=method)
     assert [t.time for t in made.transitions] == pytest.approx([asin(0.9), pi - asin(0.1)], abs=1e-10)
 
 
-def test_a_jumping_surface_is_met_and_named_as_uncertain(tmp_path: Any) -> None:
+def test_a_jumping_surface_is_met_and_named_as_uncertain() -> None:
     text = "modes: {a: {flow: {x: 1}, transitions: [{when: sign(x - 1) >= 0, to: b}]}, b: {flow: {x: 0}}}\n"
-    made = run(tmp_path, text + "initial: {mode: a, x: 1/3}\nexperiment: {until: 2}\n", method="dopri5")
+    made = run(text + "initial: {mode: a, x: 1/3}\nexperiment: {until: 2}\n", method="dopri5")
     assert [t.time for t in made.transitions] == pytest.approx([2 / 3], abs=1e-9)
     assert "would not settle on a polynomial" in made.verdict.reasons[0]
 
@@ -71,9 +69,9 @@ experiment: {until: 1}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_surface_far_faster_than_the_flow(method: str, tmp_path: Any) -> None:
+def test_a_surface_far_faster_than_the_flow(method: str) -> None:
     """Above for 14 millionths at a time, while the flow alone would allow steps of a tenth."""
-    made = run(tmp_path, FAST, method=method)
+    made = run(FAST, method=method)
     assert [t.time for t in made.transitions] == pytest.approx([asin(0.999999) / 200], abs=1e-11)
 
 
@@ -87,18 +85,18 @@ experiment: {until: 3}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_visit_of_a_billionth_within_one_step(method: str, tmp_path: Any) -> None:
-    assert run(tmp_path, GRAZE, method=method).final.state["x"] == pytest.approx(1 - sqrt(1e-9), abs=1e-9)
-    below = run(tmp_path, GRAZE.replace("y: 1e-9", "y: -1e-9"), method=method)
+def test_a_visit_of_a_billionth_within_one_step(method: str) -> None:
+    assert run(GRAZE, method=method).final.state["x"] == pytest.approx(1 - sqrt(1e-9), abs=1e-9)
+    below = run(GRAZE.replace("y: 1e-9", "y: -1e-9"), method=method)
     assert below.transitions == () and below.stop.reason == "until"
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("push", "fires"), [("t**2", True), ("-t**2", False), ("t - t**2/2", True)])
-def test_a_restart_on_the_guard_that_leaves_it_tangentially(push: str, fires: bool, method: str, tmp_path: Any) -> None:
+def test_a_restart_on_the_guard_that_leaves_it_tangentially(push: str, fires: bool, method: str) -> None:
     """From r = 0 with L_f r = 0: outwards it goes at once, inwards never."""
     text = f"modes: {{a: {{flow: {{x: {push}}}, transitions: [{{when: x >= 0, to: b}}]}}, b: {{flow: {{x: 0}}}}}}\n"
-    made = run(tmp_path, text + "initial: {mode: a, x: 0}\nexperiment: {until: 1}\n", method=method)
+    made = run(text + "initial: {mode: a, x: 0}\nexperiment: {until: 1}\n", method=method)
     assert [t.time for t in made.transitions] == ([0] if fires else [])
 
 
@@ -112,16 +110,16 @@ experiment: {until: 3}
 
 
 @pytest.mark.parametrize("method", ["taylor", "rk4"])
-def test_a_second_rise_in_one_step_behind_a_shallow_dip(method: str, tmp_path: Any) -> None:
+def test_a_second_rise_in_one_step_behind_a_shallow_dip(method: str) -> None:
     """Up at 1, where `if` is false, down by less than a hundredth at 1.5, up again at 1.8."""
-    made = run(tmp_path, TWICE, method=method, step=3)
+    made = run(TWICE, method=method, step=3)
     assert [t.time for t in made.transitions] == pytest.approx([1.8], abs=1e-12)
     assert len(made.times) == 4
 
 
 @needs_compiler
 @pytest.mark.parametrize("priority", [0, 1])
-def test_a_clock_at_the_end_fires_over_a_state_that_comes_to_rest_there(tmp_path: Any, priority: int) -> None:
+def test_a_clock_at_the_end_fires_over_a_state_that_comes_to_rest_there(priority: int) -> None:
     text = f"""modes:
   wait: {{flow: {{y: 1}}, transitions: [{{name: go, when: y >= 1, to: push, reset: {{x: 0}}}}]}}
   push:
@@ -133,7 +131,7 @@ def test_a_clock_at_the_end_fires_over_a_state_that_comes_to_rest_there(tmp_path
 initial: {{mode: wait, y: 0}}
 experiment: {{until: 1}}
 """
-    made = run(tmp_path, text, method="dopri5", engine="python")
+    made = run(text, method="dopri5", engine="python")
     assert [t.edge for t in made.transitions] == ["go", "clock"]
     assert made.stop.reason == "until"
-    assert_engines_agree(hsdsl.load(tmp_path / "model.yaml"), method="dopri5")
+    assert_engines_agree(hsdsl.loads("hsdsl: 1\n" + text), method="dopri5")

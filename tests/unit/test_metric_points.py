@@ -119,27 +119,25 @@ def test_on_the_quotient_a_point_of_a_strip_counts_as_its_guard_point(oscillator
     assert 0.0 in found.interval and found.interval.upper < 1e-12
 
 
-def test_same_point_and_no_path(tmp_path, oscillator):
+def test_same_point_and_no_path(oscillator):
     assert distance(oscillator, SpacePoint("free", (1, 2)), SpacePoint("free", (1, 2))).interval == ZERO
-    model = tmp_path / "m.yaml"
-    model.write_text(
+    text = (
         "hsdsl: 1\nmodes:\n  a: {flow: {x: 1}}\n  b: {flow: {x: 1}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n"
     )
-    space = make_space(hsdsl.load(model).system, [])
+    space = make_space(hsdsl.loads(text).system, [])
     assert distance(space, SpacePoint("a", (0,)), SpacePoint("b", (0,))).interval == INFINITE
     lower, upper, _ = distances(space, "a", np.zeros((3, 1)), "b", np.zeros((3, 1)))
     assert np.all(lower == np.inf) and np.all(upper == np.inf)
 
 
-def test_no_path_has_more_passages_than_asked_for(tmp_path):
+def test_no_path_has_more_passages_than_asked_for():
     """Each passage halves v, so that n of them leave 16 / 2**n - 1 to go from 16 to 1."""
-    model = tmp_path / "m.yaml"
-    model.write_text(
+    text = (
         "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1, v: 0}\n"
         "    transitions: [{when: x >= 0, to: a, reset: {v: v/2}}]\n"
         "initial: {mode: a, x: -1, v: 1}\nexperiment: {until: 1}\n"
     )
-    space = make_space(hsdsl.load(model).system, [])
+    space = make_space(hsdsl.loads(text).system, [])
     for hops, expected in enumerate((15, 7, 3, 1, 0)):
         found = distance(space, SpacePoint("a", (0, 16)), SpacePoint("a", (0, 1)), hops=hops)
         assert found.interval.lower == 0  # whatever the cap: four passages lead there
@@ -155,13 +153,12 @@ def test_hops_are_counted(hops):
         model.distance("free x=1 v=2", "free x=1 v=3", hops=hops)
 
 
-def test_guard_on_time_makes_time_a_coordinate(tmp_path):
-    model = tmp_path / "m.yaml"
-    model.write_text(
+def test_guard_on_time_makes_time_a_coordinate():
+    text = (
         "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 2, to: b}]\n"
         "  b: {flow: {x: -1}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 3}\n"
     )
-    space = make_space(hsdsl.load(model).system, [])
+    space = make_space(hsdsl.loads(text).system, [])
     assert space.timed
     found = distance(space, SpacePoint("a", (0,), t=1.0), SpacePoint("b", (3,), t=5.0))
     assert 5.0 in found.interval and found.interval.width < 1e-9
@@ -173,16 +170,15 @@ def test_guard_on_time_makes_time_a_coordinate(tmp_path):
     ("condition", "expected"),
     [("y >= 1", np.hypot(1, 2) * 2 - 0), ("y >= -1 and y <= 1", 2.0), ("y >= 2 or y <= -1", 2 * np.hypot(1, 1))],
 )
-def test_condition_says_which_part_of_the_surface_is_the_guard(tmp_path, condition, expected):
+def test_condition_says_which_part_of_the_surface_is_the_guard(condition, expected):
     if condition == "y >= 1":
         expected = 2 * np.hypot(1, 1)
-    model = tmp_path / "m.yaml"
-    model.write_text(
+    text = (
         "hsdsl: 1\nmodes:\n  a:\n    flow: {x: 1, y: 0}\n"
         f"    transitions: [{{when: x >= 0, if: {condition}, to: b}}]\n"
         "  b: {flow: {x: 1, y: 0}}\ninitial: {mode: a, x: -1, y: 0}\nexperiment: {until: 3}\n"
     )
-    space = make_space(hsdsl.load(model).system, [])
+    space = make_space(hsdsl.loads(text).system, [])
     found = distance(space, SpacePoint("a", (-1, 0)), SpacePoint("b", (1, 0)))
     assert expected in found.interval and found.interval.width < 1e-9
 
@@ -317,10 +313,9 @@ experiment: {until: 60}
 """
 
 
-def test_runs_that_are_near_are_near_through_every_guard(tmp_path):
+def test_runs_that_are_near_are_near_through_every_guard():
     """Through the other guard the way is 2 long, and a path by it was all that was known when this guard came."""
-    (tmp_path / "tanks.yaml").write_text(TANKS)
-    model = hsdsl.load(tmp_path / "tanks.yaml")
+    model = hsdsl.loads(TANKS)
     relaxed = model.simulate(scheme="relaxed", method="taylor", tolerance=1e-5, relaxation=1e-7)
     exact = model.simulate(tolerance=1e-13)
     found = hsdsl.distance(relaxed, exact, model=model)

@@ -35,16 +35,14 @@ CASES = {
 }  # fmt: skip
 
 
-def loaded(tmp_path, text):
-    path = tmp_path / "m.yaml"
-    path.write_text(HEAD + text + TAIL)
-    return hsdsl.load(path)
+def loaded(text):
+    return hsdsl.loads(HEAD + text + TAIL)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_distance_with_time_as_a_coordinate(tmp_path, name):
+def test_distance_with_time_as_a_coordinate(name):
     text, (mode_p, x_p, t_p), (mode_q, x_q, t_q), expected = CASES[name]
-    space = make_space(loaded(tmp_path, text).system, [])
+    space = make_space(loaded(text).system, [])
     assert space.timed
     found = distance(space, SpacePoint(mode_p, (x_p,), t=t_p), SpacePoint(mode_q, (x_q,), t=t_q)).interval
     if expected is None:  # by hand: cross at time s, then (1 + s/10, s) to (1.2, 2)
@@ -54,13 +52,12 @@ def test_distance_with_time_as_a_coordinate(tmp_path, name):
     assert expected * (1 - 1e-6) <= found.upper <= expected * (1 + 1e-6)
 
 
-def test_runs_that_switch_at_other_times_are_as_near_as_their_times(tmp_path):
+def test_runs_that_switch_at_other_times_are_as_near_as_their_times():
     """A run delayed by a strip of 1e-3: at its end it is 1e-3 beyond t = 1 in mode a, the other one 1e-3 beyond in b.
 
     From there to the guard and back is 2e-3 in t, and 1e-3 in x.
     """
     model = loaded(
-        tmp_path,
         "modes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 1, to: b}]\n  b: {flow: {x: -1}}\n",
     )
     runs = [model.simulate(scheme="relaxed", relaxation=eps) for eps in (1e-8, 1e-3)]
@@ -69,10 +66,9 @@ def test_runs_that_switch_at_other_times_are_as_near_as_their_times(tmp_path):
     assert found.upper <= found.lower * 1.011
 
 
-def test_a_sampled_input_of_too_many_samples_is_refused(tmp_path):
+def test_a_sampled_input_of_too_many_samples_is_refused():
     times = ", ".join(str(k) for k in range(300))
     model = loaded(
-        tmp_path,
         f"inputs: {{u: {{times: [{times}], values: [{times}], hold: zero}}}}\n"
         "modes:\n  a:\n    flow: {x: 3}\n    transitions: [{when: x >= u, to: b}]\n  b: {flow: {x: 1}}\n",
     )

@@ -20,17 +20,15 @@ HEAD = "hsdsl: 1\ninputs: {u: sin(t)}\nmodes:\n"
 TAIL = "initial: {mode: a, x: 0, y: 0}\nexperiment: {until: 1}\n"
 
 
-def space_of(tmp_path, text):
-    path = tmp_path / "m.yaml"
-    path.write_text(text)
-    return make_space(hsdsl.load(path).system, [])
+def space_of(text):
+    return make_space(hsdsl.loads(text).system, [])
 
 
 def measured(space, scene, mode, x, units):
     return SpacePoint(f"m{mode}", tuple(float(v) for v in units.point(scene, mode, x)))
 
 
-def faults(tmp_path, seeds, pairs, tolls=(None, 0.05)):
+def faults(seeds, pairs, tolls=(None, 0.05)):
     """What is false in the distances of random scenes, each in all units; and how many were measured."""
     found, count = [], 0
     for seed in seeds:
@@ -42,7 +40,7 @@ def faults(tmp_path, seeds, pairs, tolls=(None, 0.05)):
         exact = [brute.distance(p, q, toll or 0.0) for p, q in ends]
         for number, units in enumerate(UNITS):
             written = units.write(scene)
-            space = space_of(tmp_path, text_of(written))
+            space = space_of(text_of(written))
             unit = float(units.length)
             for (p, q), expected in zip(ends, exact, strict=True):
                 a, b = measured(space, scene, *p, units), measured(space, scene, *q, units)
@@ -62,20 +60,20 @@ def _fault(answer, scene, p, q, expected, toll):
     return path_fault(scene, p, q, answer.path, upper, toll) if 0 < upper < np.inf else None
 
 
-def test_no_false_end_in_eight_units(tmp_path):
-    found, count = faults(tmp_path, range(8), 2)
+def test_no_false_end_in_eight_units():
+    found, count = faults(range(8), 2)
     assert found == [] and count == 128
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("block", range(10))
-def test_two_thousand_distances_in_eight_units(tmp_path, block):
-    found, count = faults(tmp_path, range(40 * block, 40 * block + 40), 5)
+def test_two_thousand_distances_in_eight_units(block):
+    found, count = faults(range(40 * block, 40 * block + 40), 5)
     assert found == [] and count == 1600
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_ends_in_more_dimensions_agree_in_all_units(tmp_path, seed):
+def test_ends_in_more_dimensions_agree_in_all_units(seed):
     """No brute force there: intervals of one distance, each divided by its unit, have to meet."""
     rng = np.random.default_rng(100 + seed)
     scene = random_scene(rng, dimensions=(3, 4), modes=2, edges=2)
@@ -83,7 +81,7 @@ def test_ends_in_more_dimensions_agree_in_all_units(tmp_path, seed):
     lower, upper = 0.0, np.inf
     for units in UNITS:
         written = units.write(scene)
-        space = space_of(tmp_path, text_of(written))
+        space = space_of(text_of(written))
         a, b = measured(space, scene, *p, units), measured(space, scene, *q, units)
         answer = distance(space, a, b, hops=3)
         if 0 < answer.interval.upper < np.inf:
@@ -105,10 +103,9 @@ ONE_POINT = {
 
 
 @pytest.mark.parametrize("name", ONE_POINT)
-def test_a_point_and_its_image_are_one_in_any_units(tmp_path, name):
+def test_a_point_and_its_image_are_one_in_any_units(name):
     when, reset, guard, image = ONE_POINT[name]
     space = space_of(
-        tmp_path,
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    transitions: [{{when: {when}, to: a, reset: {{{reset}}}}}]\n{TAIL}",
     )
     found = distance(space, SpacePoint("a", guard), SpacePoint("a", image)).interval
@@ -117,11 +114,10 @@ def test_a_point_and_its_image_are_one_in_any_units(tmp_path, name):
 
 
 @pytest.mark.parametrize("unit", ["1e-12", "1e-6", "1", "1e9"])
-def test_a_domain_and_its_guard_may_be_tiny_or_huge(tmp_path, unit):
+def test_a_domain_and_its_guard_may_be_tiny_or_huge(unit):
     """From the middle of a square through its right side, glued to its left one: as far as the way round."""
     size = float(unit)
     space = space_of(
-        tmp_path,
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    domain: [x >= -{unit}, y >= -{unit}, y <= {unit}]\n"
         f"    transitions: [{{when: x >= {unit}, to: a, reset: {{x: -{unit}, y: y}}}}]\n{TAIL}",
     )
@@ -131,7 +127,7 @@ def test_a_domain_and_its_guard_may_be_tiny_or_huge(tmp_path, unit):
     assert found.interval.upper == pytest.approx(0.75 * size, rel=1e-9)
 
 
-def test_a_guard_is_empty_only_if_it_is(tmp_path):
+def test_a_guard_is_empty_only_if_it_is():
     """A strip one part in 1e12 wide is a guard, and one that is a part in 1e30 too narrow is none."""
     text = (
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n"
@@ -139,7 +135,7 @@ def test_a_guard_is_empty_only_if_it_is(tmp_path):
         f"  b: {{flow: {{x: u, y: u}}}}\n{TAIL}"
     )
     for level, connected in (("1 + 1e-12", True), ("1", True), ("1 - 1e-30", False)):
-        space = space_of(tmp_path, text.replace("LEVEL", level))
+        space = space_of(text.replace("LEVEL", level))
         found = distance(space, SpacePoint("a", (-1, 1)), SpacePoint("b", (1, 1))).interval
         assert (2 in found) == connected == (found.upper < 3)
 
@@ -191,12 +187,12 @@ def test_what_rests_on_several_promises_no_more_than_each():
     assert (Interval(1, 2) + Interval(1, 1, "sampled")).status == "sampled"
 
 
-def test_many_pairs_at_once_have_no_false_end_under_any_cap(tmp_path):
+def test_many_pairs_at_once_have_no_false_end_under_any_cap():
     """Bounds of one pair under every cap hold the distance that the highest one certifies."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
         scene = random_scene(rng)
-        space = space_of(tmp_path, text_of(scene))
+        space = space_of(text_of(scene))
         ends = [(random_point(rng, scene), random_point(rng, scene)) for _ in range(3)]
         brute = BruteForce(scene)
         for (i, x), (j, y) in ends:
@@ -223,14 +219,14 @@ class Looks(Budget):
 
 
 @pytest.mark.parametrize("looks", [0, 1, 10, 40])
-def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path, monkeypatch, looks):
+def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(monkeypatch, looks):
     solved = []
     monkeypatch.setattr(passage_bounds, "solve", lambda *asked: solved.append(1) or solve(*asked))
     for seed in range(4):
         rng = np.random.default_rng(300 + seed)
         scene = random_scene(rng, dimensions=(2,), edges=6)
         p, q = random_point(rng, scene), random_point(rng, scene)
-        space = space_of(tmp_path, text_of(scene))
+        space = space_of(text_of(scene))
         expected = BruteForce(scene).distance(p, q)
         solved.clear()
         found = distance(space, *(SpacePoint(f"m{m}", tuple(map(float, x))) for m, x in (p, q)), budget=Looks(looks))
@@ -241,10 +237,9 @@ def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(tmp_path
             assert path_fault(scene, *ends, found.path, found.interval.upper) is None
 
 
-def test_runs_back_and_forth_through_one_gate_are_bounded_at_once(tmp_path):
+def test_runs_back_and_forth_through_one_gate_are_bounded_at_once():
     """A reset that shortens one direction and lengthens the other: no path is left out, and none goes on for ever."""
     space = space_of(
-        tmp_path,
         f"{HEAD}  a:\n    flow: {{x: u, y: u, z: u}}\n    domain: [y <= 1, y >= -1, z <= 1, z >= -1]\n"
         "    transitions: [{when: x >= 0, to: b, reset: {x: 0, y: 2*y, z: z/2}}]\n"
         "  b: {flow: {x: u, y: u, z: u}, domain: [y <= 2, y >= -2, z <= 2, z >= -2]}\n"

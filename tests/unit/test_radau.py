@@ -23,14 +23,13 @@ MANY = multiprecision(50)
 MODELS = Path(__file__).parents[2] / "models"
 
 
-def model(directory: Path, flow: str, initial: str, until: Any = 1, transitions: str = "") -> Any:
+def model(flow: str, initial: str, until: Any = 1, transitions: str = "") -> Any:
     """A model of one mode ``m``."""
-    path = directory / "model.yaml"
-    path.write_text(
+    text = (
         f"hsdsl: 1\nmodes:\n  m:\n    flow: {flow}\n    {transitions}\n"
         f"initial: {{mode: m, {initial}}}\nexperiment: {{until: {until}, method: radau}}\n"
     )
-    return hsdsl.load(path)
+    return hsdsl.loads(text)
 
 
 def test_coefficients_as_published() -> None:
@@ -120,9 +119,9 @@ def test_what_decays_is_gone_after_one_step() -> None:
 
 @pytest.mark.parametrize("rate", [-1e2, -1e6, -1e9])
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
-def test_prothero_robinson(rate: float, scheme: str, tmp_path: Path) -> None:
+def test_prothero_robinson(rate: float, scheme: str) -> None:
     """The equation x' = rate (x - cos t) - sin t is solved by cos t, whatever the rate; between the samples too."""
-    made = model(tmp_path, f"{{x: {rate!r}*(x - cos(t)) - sin(t)}}", "x: 1", 10)
+    made = model(f"{{x: {rate!r}*(x - cos(t)) - sin(t)}}", "x: 1", 10)
     for tolerance in (1e-4, 1e-7):
         run = made.simulate(tolerance=tolerance, scheme=scheme)
         times = np.linspace(0, 10, 501)
@@ -130,9 +129,9 @@ def test_prothero_robinson(rate: float, scheme: str, tmp_path: Path) -> None:
         assert len(run.times) <= 10 * tolerance**-0.25
 
 
-def test_van_der_pol(tmp_path: Path) -> None:
+def test_van_der_pol() -> None:
     """At mu = 1000, in its own time, against the reference solution of the Test Set for IVP Solvers."""
-    made = model(tmp_path, '{x: v, v: "((1 - x**2)*v - x)/1e-6"}', "x: 2, v: 0", 2)
+    made = model('{x: v, v: "((1 - x**2)*v - x)/1e-6"}', "x: 2, v: 0", 2)
     run = made.simulate(tolerance=1e-8)
     assert abs(run.final.state["x"] - 1.706167732170483) <= 1e-8
     peak = np.max(np.abs(run.values[:, 1]))  # v's scale, 1.3e3: its errors are held against that
@@ -141,7 +140,7 @@ def test_van_der_pol(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_linear_systems(seed: int, tmp_path: Path) -> None:
+def test_random_linear_systems(seed: int) -> None:
     """Rates from 1 to 1e6 in random directions: against the matrix exponential, and another Radau code."""
     rng = np.random.default_rng(seed)
     basis = rng.normal(size=(3, 3))
@@ -150,7 +149,7 @@ def test_random_linear_systems(seed: int, tmp_path: Path) -> None:
     rows = [" + ".join(f"({float(a)!r})*{s}" for a, s in zip(row, "xyz", strict=True)) for row in matrix]
     flow = "{" + ", ".join(f'{s}: "{row}"' for s, row in zip("xyz", rows, strict=True)) + "}"
     initial = ", ".join(f"{s}: {float(a)!r}" for s, a in zip("xyz", start, strict=True))
-    run = model(tmp_path, flow, initial).simulate(tolerance=1e-6)
+    run = model(flow, initial).simulate(tolerance=1e-6)
     theirs = solve_ivp(
         lambda t, x: matrix @ x, (0, 1), start, "Radau", rtol=1e-8, atol=1e-8, jac=matrix, dense_output=True
     ).sol
@@ -164,9 +163,9 @@ FLOWS = ["x*v", "sin(x)/(2 + v**2)", "sqrt(x)*exp(-v)", "x**v + atan2(x, v)", "a
 
 
 @pytest.mark.parametrize("flow", FLOWS)
-def test_jacobian(flow: str, tmp_path: Path) -> None:
+def test_jacobian(flow: str) -> None:
     """Against differences in fifty digits."""
-    made = PythonKernel(model(tmp_path, f"{{x: {flow!r}, v: x - t*v}}", "x: 0, v: 0").program, MANY)
+    made = PythonKernel(model(f"{{x: {flow!r}, v: x - t*v}}", "x: 0, v: 0").program, MANY)
     slopes, field = made.jacobian(0, ()), made.bind(0, ()).flow
     t, x, v, h = (MANY.zero + n for n in (0.5, 0.75, 1.25, 1e-20))
     columns = [
@@ -177,9 +176,9 @@ def test_jacobian(flow: str, tmp_path: Path) -> None:
     assert all(abs(a - b) <= 1e-28 for a, b in zip(slopes(t, x, v), wanted, strict=True))
 
 
-def test_many_digits(tmp_path: Path) -> None:
+def test_many_digits() -> None:
     """A decay with rate 1000 beside a slow one, in thirty digits."""
-    run = model(tmp_path, "{x: -1000*(x - v), v: -v}", "x: 1, v: 1", "1/100").simulate(precision=30, tolerance=1e-15)
+    run = model("{x: -1000*(x - v), v: -v}", "x: 1, v: 1", "1/100").simulate(precision=30, tolerance=1e-15)
     with mp.workdps(40):
         v = mp.exp(mp.mpf(-1) / 100)
         x = mp.mpf(1000) / 999 * v + (1 - mp.mpf(1000) / 999) * mp.exp(-10)
@@ -188,28 +187,26 @@ def test_many_digits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
-def test_crossings(scheme: str, tmp_path: Path) -> None:
+def test_crossings(scheme: str) -> None:
     """A ball on the way down, up and down again: bounces at the known times."""
     bounce = "transitions: [{when: h <= 0, to: m, reset: {v: -v}}]"
-    run = model(tmp_path, "{h: v, v: -2}", "h: 1, v: 0", 4.5, bounce).simulate(
-        tolerance=1e-9, scheme=scheme, relaxation=1e-12
-    )
+    run = model("{h: v, v: -2}", "h: 1, v: 0", 4.5, bounce).simulate(tolerance=1e-9, scheme=scheme, relaxation=1e-12)
     assert np.allclose([t.time for t in run.transitions], [1, 3], rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
 @pytest.mark.parametrize("size", [{"tolerance": 1e-6}, {"step": 0.01}])
-def test_blow_up(scheme: str, size: dict[str, float], tmp_path: Path) -> None:
-    run = model(tmp_path, "{x: x**2}", "x: 1", 2).simulate(scheme=scheme, **size)
+def test_blow_up(scheme: str, size: dict[str, float]) -> None:
+    run = model("{x: x**2}", "x: 1", 2).simulate(scheme=scheme, **size)
     assert run.stop.reason == "not_finite"
     assert abs(run.stop.time - 1) <= 1e-3
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
 @pytest.mark.parametrize("size", [{"tolerance": 1e-6}, pytest.param({"step": 0.01}, marks=pytest.mark.slow)])
-def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float], tmp_path: Path) -> None:
+def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float]) -> None:
     """No step over x = 0 solves x' = -sign(x), which stays there; the run ends and says so."""
-    run = model(tmp_path, "{x: -sign(x)}", "x: 1", 2).simulate(scheme=scheme, **size)
+    run = model("{x: -sign(x)}", "x: 1", 2).simulate(scheme=scheme, **size)
     assert run.stop.reason == "step_underflow"
     assert abs(run.final.state["x"]) <= size.get("tolerance", 1e-8)
     most = 1e4 * 1e-6  # it gives up after ten thousand rejections, of steps about as long as the tolerance
@@ -217,18 +214,18 @@ def test_a_flow_that_jumps_against_itself(scheme: str, size: dict[str, float], t
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
-def test_robertson(scheme: str, tmp_path: Path) -> None:
+def test_robertson(scheme: str) -> None:
     """Three reactions with rates from 0.04 to 3e7, against published values at t = 40; their sum is kept."""
     rates = '{a: "-0.04*a + 1e4*b*c", b: "0.04*a - 1e4*b*c - 3e7*b**2", c: "3e7*b**2"}'
-    run = model(tmp_path, rates, "a: 1, b: 0, c: 0", 40).simulate(tolerance=1e-9, scheme=scheme)
+    run = model(rates, "a: 1, b: 0, c: 0", 40).simulate(tolerance=1e-9, scheme=scheme)
     found = run.final.state
     assert np.allclose(list(found.values()), [0.7158270688, 9.185534765e-6, 0.2841637457], rtol=1e-8, atol=0)
     assert abs(sum(found.values()) - 1) <= 1e-14
 
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
-def test_a_flow_without_derivatives(scheme: str, tmp_path: Path) -> None:
-    run = model(tmp_path, "{x: 1 + sqrt(x)}", "x: 0").simulate(scheme=scheme)
+def test_a_flow_without_derivatives(scheme: str) -> None:
+    run = model("{x: 1 + sqrt(x)}", "x: 0").simulate(scheme=scheme)
     assert run.stop.reason == "not_finite"
     assert "the flow of mode m has no derivatives at t = 0" in run.stop.message
 
@@ -239,16 +236,15 @@ def test_a_step_that_newton_does_not_solve() -> None:
         stepper.step(lambda t, x: (x * x,), 0.0, 10.0, (1.0,), (1.0,))
 
 
-def test_engines(tmp_path: Path) -> None:
-    made = model(tmp_path, "{x: -x}", "x: 1")
+def test_engines() -> None:
+    made = model("{x: -x}", "x: 1")
     assert made.simulate().engine == "c"
     assert made.simulate(precision=20, until=0.1, tolerance=1e-4).engine == "python"
 
 
-def test_a_mode_without_states(tmp_path: Path) -> None:
-    path = tmp_path / "model.yaml"
-    path.write_text("hsdsl: 1\nmodes: {m: {flow: {}}}\ninitial: {mode: m}\nexperiment: {until: 1, method: radau}\n")
-    assert hsdsl.load(path).simulate().stop.reason == "until"
+def test_a_mode_without_states() -> None:
+    text = "hsdsl: 1\nmodes: {m: {flow: {}}}\ninitial: {mode: m}\nexperiment: {until: 1, method: radau}\n"
+    assert hsdsl.loads(text).simulate().stop.reason == "until"
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 40])

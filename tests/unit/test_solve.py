@@ -33,9 +33,8 @@ experiment: {until: 5}
 
 
 @pytest.fixture
-def cart(tmp_path):
-    (tmp_path / "m.yaml").write_text(CART)
-    return hsdsl.load(tmp_path / "m.yaml")
+def cart():
+    return hsdsl.loads(CART)
 
 
 @pytest.mark.parametrize("method", ["taylor", "dop853", "radau"])
@@ -126,7 +125,7 @@ experiment: {until: 1}
     assert run.stop.reason == "not_finite" and "the flow of y, a" in run.stop.message
 
 
-def test_modes_have_their_own(tmp_path):
+def test_modes_have_their_own():
     text = """hsdsl: 1
 modes:
   one: {solve: {unknowns: [a], equations: [2*a == 4]}, flow: {x: a}, transitions: [{when: x >= 2*a, to: two}]}

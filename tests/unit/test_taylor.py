@@ -158,24 +158,18 @@ experiment: {until: 1, method: taylor}
 """
 
 
-def test_kinked_flows_are_refused_in_a_sentence(tmp_path: Any) -> None:
-    path = tmp_path / "kinked.yaml"
-    path.write_text(KINKED)
+def test_kinked_flows_are_refused_in_a_sentence() -> None:
     with pytest.raises(hsdsl.UsageError, match="needs smooth flows; that of mode a has abs"):
-        hsdsl.load(path).simulate()
+        hsdsl.loads(KINKED).simulate()
 
 
-def test_a_flow_without_a_series_stops_in_a_sentence(tmp_path: Any) -> None:
-    path = tmp_path / "root.yaml"
-    path.write_text(KINKED.replace("abs(x) - 1", "1 + sqrt(t)"))
-    run = hsdsl.load(path).simulate()
+def test_a_flow_without_a_series_stops_in_a_sentence() -> None:
+    run = hsdsl.loads(KINKED.replace("abs(x) - 1", "1 + sqrt(t)")).simulate()
     assert run.stop.reason == "not_finite"
     assert "the flow of mode a has no Taylor series at t = 0; another method may go on" in run.stop.message
 
 
-def test_an_even_solution_is_no_trap(tmp_path: Any) -> None:
+def test_an_even_solution_is_no_trap() -> None:
     """All coefficients up to the order vanish at the start."""
-    path = tmp_path / "late.yaml"
-    path.write_text(KINKED.replace("abs(x) - 1", "t**40"))
-    run = hsdsl.load(path).simulate(tolerance=1e-12)
+    run = hsdsl.loads(KINKED.replace("abs(x) - 1", "t**40")).simulate(tolerance=1e-12)
     assert run.final.state["x"] == pytest.approx(1 / 41, abs=1e-11)
