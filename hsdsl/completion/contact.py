@@ -8,7 +8,7 @@ the reset's directions that keeps R(x) = x.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -41,9 +41,10 @@ class Contact:
     ``projection`` has what each of these rows takes away of the flow, as shares of the rates of time and states.
     ``release`` is in the place of the edge in contact: its surface is the push of the flow on the guard, negative.
     ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` has the condition under which each
-    does. ``push`` is the derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where
-    the guard's own derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead
-    from a state near the guard. ``counts`` are the states that they count with, which keep their values.
+    does; ``kept`` has those of its inequalities that motion along the guard keeps at their limits. ``push`` is the
+    derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where the guard's own
+    derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead from a state
+    near the guard. ``counts`` are the states that they count with, which keep their values.
     """
 
     edge: int
@@ -59,6 +60,7 @@ class Contact:
     ends: tuple[sp.Basic, ...]
     near: Nearby
     counts: tuple[int, ...] = ()
+    kept: tuple[Relational, ...] = ()
 
     @property
     def last(self) -> sp.Expr:
@@ -96,10 +98,12 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
         return None
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
                       reset=symbols(mode.states), reset_texts=mode.states)  # fmt: skip
-    further, ends = _ends_of_condition(release, edge.condition, lambda value: _is_kept(value, near, rows, push, at))
+    atoms = sorted(edge.condition.atoms(Relational), key=str) if edge.condition is not None else ()
+    kept = tuple(atom for atom in atoms if _is_kept(_falling(atom), near, rows, push, at))
+    further, ends = _ends_of_condition(release, edge.condition, [atom for atom in atoms if atom not in kept])
     rate = cancelled(near.along(near.guard))
     return Contact(
-        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts
+        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept
     )
 
 
@@ -157,21 +161,22 @@ def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Ex
     return presses and abs(value_at(value, at)) <= SMALL and abs(value_at(stays, at)) <= SMALL
 
 
-def _ends_of_condition(release: Edge, condition: sp.Basic | None, is_kept: Callable[[sp.Expr], bool]):
-    """Edges where an `if` may end, one for each inequality in it and each way that counts, and when it does there.
+def _falling(atom: Relational) -> sp.Expr:
+    """What is positive where an inequality holds."""
+    return atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
 
-    An inequality of a value that ``is_kept`` ends nowhere.
-    """
+
+def _ends_of_condition(release: Edge, condition: sp.Basic | None, ending: Sequence[Relational]):
+    """Edges where an `if` may end, one for each inequality ``ending`` and each way that counts, and when it does."""
     edges: list[Edge] = []
     ends: list[sp.Basic] = []
     if condition is None:
         return edges, ends
-    atoms = sorted(condition.atoms(Relational), key=str)
-    plain = isinstance(condition, Relational) or (isinstance(condition, sp.And) and set(condition.args) == set(atoms))
-    for atom in atoms:
-        falling = atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
-        if is_kept(falling):
-            continue
+    plain = isinstance(condition, Relational) or (
+        isinstance(condition, sp.And) and set(condition.args) == condition.atoms(Relational)
+    )
+    for atom in ending:
+        falling = _falling(atom)
         for residual, beyond in ((-falling, sp.false),) if plain else ((-falling, sp.false), (falling, sp.true)):
             edges.append(replace(release, surface=zero_surface(residual)))
             ends.append(sp.Not(condition.xreplace({atom: beyond})))

@@ -7,7 +7,7 @@ subset costs as much as all of them. Of the others each connected set has rows o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -16,7 +16,7 @@ from hsdsl.completion.contact import Contact, contact
 from hsdsl.completion.coupled_contacts import Pairs, connected_sets, coupled_flow, neighbours
 from hsdsl.completion.nearby import along
 from hsdsl.expression.scope import symbol
-from hsdsl.functions import below
+from hsdsl.functions import absolute, below
 from hsdsl.program import HELD, LOOKED_AT
 from hsdsl.system import TIME, Edge, Mode, Surface
 
@@ -50,7 +50,8 @@ def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
     chosen = flags if len(flags) > 1 else (sp.Integer(HELD),)
     edges, releases = list(mode.edges), list[int | None]([None] * len(mode.edges))
     for i, (found, flag) in enumerate(zip(contacts, chosen, strict=True)):
-        edges[found.edge], releases[found.edge] = _released(mode.edges[found.edge], flag, pushes[i]), i
+        edges[found.edge] = _released(found, flag, flags[i], *pushes[i])
+        releases[found.edge] = i
         edges += [replace(end, surface=_nowhere_else(end.surface, flag)) for end in found.further]
         releases += [i] * len(found.further)
     known = dict(zip(flags, chosen, strict=True)) if len(flags) == 1 else {}
@@ -59,7 +60,7 @@ def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
 
 
 def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp.Symbol]):
-    """The flow with all choices, and the push of each contact."""
+    """The flow with all choices, and for each contact its push and the size of that."""
     flow, near = list[sp.Expr](map(sp.sympify, mode.flow)), neighbours(contacts)
     off = [below(flag, HELD, sp.S.One, sp.S.Zero) for flag in flags]
     pairs: dict[int, Pairs] = {}
@@ -87,33 +88,47 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
             for i in contacts[first].rows:
                 other = sp.Add(*(1 - off[j] for j in sorted(near[first])))
                 flow[i] = below(flags[first], HELD, flow[i], below(other, 1, flow[i], _NAN))
-    return flow, [_push(mode, found, flow, flag) if near[k] else found.push
+    return flow, [_push(mode, found, flow, flag) if near[k] else (found.push, _size(found, found.near.flow))
                   for k, (found, flag) in enumerate(zip(contacts, flags, strict=True))]  # fmt: skip
 
 
-def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> sp.Expr:
-    """The push on a guard along the flow that the others leave."""
+def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+    """The push on a guard along the flow that the others leave, and the size of its terms."""
     places = dict(zip(found.near.states, flow, strict=True))
 
     def left(x: sp.Symbol) -> sp.Expr:
         return sp.S.One if x == TIME else places[x].xreplace({flag: sp.S.Zero})
 
-    return along(found.last, found.near.among(found.last), left)
+    return along(found.last, found.near.among(found.last), left), _size(found, left)
 
 
-def _released(edge: Edge, flag: sp.Expr, push: sp.Expr) -> Edge:
-    """An edge that, in contact, is reached where the push on its guard falls through zero."""
-    was = edge.surface
+def _size(found: Contact, flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
+    """The size of the terms of a push along a flow."""
+    return sp.Add(*(absolute(sp.diff(found.last, x) * flow(x)) for x in found.near.among(found.last)))
+
+
+def _released(found: Contact, chosen: sp.Expr, flag: sp.Symbol, push: sp.Expr, size: sp.Expr) -> Edge:
+    """An edge that, in contact, is reached where the push on its guard falls through zero.
+
+    Where it is looked at, the parts of its `if` hold that motion along its guard keeps at their limits.
+    """
+    edge = found.near.edge
+    was, condition = edge.surface, edge.condition
     left, right, residual = (
-        below(flag, LOOKED_AT, sp.sympify(side), other)
-        for side, other in ((was.left, -push), (was.right, sp.S.Zero), (was.residual, -push))
+        below(chosen, LOOKED_AT, sp.sympify(side), other)
+        for side, other in ((was.left, size), (was.right, sp.S.Zero), (was.residual, -push))
     )
-    condition = edge.condition
     if condition is not None:
         parts = condition.args if isinstance(condition, sp.And) else (condition,)
-        condition = sp.And(*(sp.Or(sp.Gt(flag, 0), part) for part in parts))
+        lasting = dict.fromkeys(found.kept, sp.true)
+        condition = sp.And(*(_of_contact(part, part.xreplace(lasting), flag) for part in parts))
     condition = None if condition in (None, sp.true) else condition
     return replace(edge, surface=Surface(left, right, residual, was.text), condition=condition)
+
+
+def _of_contact(part: sp.Basic, lasting: sp.Basic, flag: sp.Symbol) -> sp.Basic:
+    """A part of an `if`: in contact it holds; where that is looked at, what ``lasting`` says of it."""
+    return sp.Or(part, sp.Ge(flag, HELD), sp.And(sp.Ge(flag, LOOKED_AT), lasting))
 
 
 def _nowhere_else(surface: Surface, flag: sp.Expr) -> Surface:

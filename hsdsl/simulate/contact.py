@@ -22,6 +22,7 @@ from hsdsl.simulate.surfaces import Surfaces
 
 SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that it keeps
 ZERO_UNITS = 16  # of round-off: a rate that counts as zero
+FURTHER = 16  # times as far ahead: where a push that is zero is looked at next
 
 
 def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
@@ -69,15 +70,41 @@ def pressing(run: Run, here: ModeState, kept: list[int]) -> list[int] | None:
 
 def pushes(run: Run, here: ModeState, holding: list[int], kept: list[int]) -> list[int] | None:
     """Those of some guards that the flow presses on while those ``holding`` hold it; None without such a flow."""
-    looked = in_contact(run, here, holding, kept)
+    looked, asked = in_contact(run, here, holding, kept), in_contact(run, here, (), kept)
+    t, x = here.t, here.x
     try:
-        r = looked.kernel.surfaces(here.t, *here.x)
+        r = looked.kernel.surfaces(t, *x)
         if any(r[k] != r[k] for k in kept):
             return None
-        pushed = [k for k in kept if r[k] < -looked.surfaces.roundoff_bound(k, here.t, here.x)]
-        return [k for k in pushed if is_possible(run, here, k, here.t, here.x, holding)]
+        noise = {k: looked.surfaces.roundoff_bound(k, t, x) for k in kept}
+        pushed = [k for k in kept if r[k] < -noise[k] or (r[k] <= noise[k] and not lifts_next(run, looked, k))]
     except DOMAIN_ERRORS:
         return []
+    return [k for k in pushed if holds(asked, k, t, x) or is_possible(run, here, k, t, x, holding)]
+
+
+def holds(here: ModeState, k: int, t: Number, x: State) -> bool:
+    """Whether the `if` of edge k holds; not where it has no value."""
+    try:
+        return bool(here.kernel.conditions[k](t, *x)[0])
+    except DOMAIN_ERRORS:
+        return False
+
+
+def lifts_next(run: Run, looked: ModeState, k: int) -> bool:
+    """Whether the push on a guard, zero now, is first negative where the flow makes it differ from zero."""
+    t, x, after = looked.t, looked.x, run.arithmetic.unit * run.settings.until
+    try:
+        slope = looked.kernel.flow(t, *x)
+        while t + after < looked.segment.end:
+            time, later = t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
+            r = looked.kernel.surfaces(time, *later)[k]
+            if abs(r) > looked.surfaces.roundoff_bound(k, time, later):
+                return r > 0
+            after = after * FURTHER
+    except DOMAIN_ERRORS:
+        pass
+    return False
 
 
 def reset_but_counts(here: ModeState, k: int, t: Number, x: State) -> State:
@@ -107,11 +134,24 @@ def is_possible(run: Run, here: ModeState, k: int, t: Number, x: State, touched:
         return False
 
 
+def holds_next(run: Run, here: ModeState, k: int, t: Number, x: State) -> bool:
+    """Whether the `if` of an edge that leads back, of a surface that the state is on, holds next along the flow."""
+    edge = here.mode.edges[k]
+    returns = edge.target == here.index and edge.target_states == here.mode.states == here.arc.states
+    return returns and is_possible(run, here, k, t, x, ())
+
+
 def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Collection[int]) -> State:
-    """Where the flow that other edges' guards leave takes a state: off by round-off where the reset changes it."""
-    others, after = sorted({*touched} - {k}), run.arithmetic.zero
+    """Where the flow presses a state, by what its guard would take away of the flow that others' guards leave.
+
+    It is off by round-off where the reset changes it.
+    """
+    edge, others, after = here.mode.edges[k], sorted({*touched} - {k}), run.arithmetic.zero
     slope = (in_contact(run, here, others) if others else here).kernel.flow(t, *x)
-    for i in here.mode.edges[k].changes:
+    if edge.contact is not None:
+        left = in_contact(run, here, sorted({*others, k})).kernel.flow(t, *x)
+        slope = tuple(f - g for f, g in zip(slope, left, strict=True))
+    for i in edge.changes:
         if slope[i] != 0:
             after = max(after, ZERO_UNITS * run.arithmetic.unit * here.arc.scales[i] / abs(slope[i]))
     after = after or run.arithmetic.unit * run.settings.until  # where these states have been zero only

@@ -13,7 +13,7 @@ from dataclasses import replace
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.contact import behind_end, contact_at, in_touch, is_possible
+from hsdsl.simulate.contact import behind_end, contact_at, holds_next, in_touch, keeps
 from hsdsl.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.simulate.diagnostics import FREE, slides
 from hsdsl.simulate.entry import enter
@@ -25,7 +25,7 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly
+from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts
 
 MOST_CORRECTIONS = 8
 
@@ -116,6 +116,7 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
         guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
     if not guards:
         return None
+    guards += unseen(run, here, span, min(guards, key=lambda c: c.time), {c.edge for c in guards})
     chosen, alternatives = choose(here, guards, run)
     write(here, span, chosen)
     return Event(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
@@ -126,11 +127,20 @@ def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing
     found = tuple(map(max, sizes(span.x, crossing.state, here), span.sizes(crossing.theta)))
     if before is not None:
         found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
-    if crossing.edge in here.surfaces.active:  # it is off the surface by as much as the state was that it came from
+    if stands(here, crossing):  # it is off that surface by as much as the state was that it came from
         found = tuple(map(max, found, here.surfaces.scale))
     if here.surfaces.touched:  # it is off the guards that hold it by as much as it has ever been computed from
         found = tuple(map(max, found, here.arc.scales))
     return found
+
+
+def stands(here: ModeState, crossing: Crossing) -> bool:
+    """Whether a crossing's state is on a surface that the state was on that it came from."""
+    t, q, surfaces = crossing.time, crossing.state, here.surfaces
+    if not surfaces.active:
+        return False
+    r = here.kernel.surfaces(t, *q)
+    return any(k == crossing.edge or abs(r[k]) <= surfaces.roundoff_bound(k, t, q) for k in surfaces.active)
 
 
 def write(here: ModeState, span: Span, crossing: Crossing) -> None:
@@ -149,18 +159,36 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
     beyond = pieces[0].coefficients[0] > first
     for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
         theta, time, q = settled(here, span, k, rise)
-        if k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0] or holds_next(run, here, k, time, q):
+        holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
+        if holds or (k in surfaces.active and holds_next(run, here, k, time, q)):
             if not rise.certain:
                 run.diagnostics.unsettled(here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return touched(run, here, span, k, pieces)
 
 
-def holds_next(run: Run, here: ModeState, k: int, t: Number, x: State) -> bool:
-    """Whether the `if` of an edge that leads back, of a surface that the state was on, holds next along the flow."""
-    edge = here.mode.edges[k]
-    returns = edge.target == here.index and edge.target_states == here.mode.states == here.arc.states
-    return returns and k in here.surfaces.active and is_possible(run, here, k, t, x, ())
+def unseen(run: Run, here: ModeState, span: Span, first: Crossing, seen: set[int]) -> list[Crossing]:
+    """Crossings before a first one of surfaces with an `if` that rise by less than a step's polynomials are off by."""
+    t, x, found = span.t, span.x, list[Crossing]()
+    start, end = here.kernel.surfaces(t, *x), here.kernel.surfaces(first.time, *first.state)
+    for k, edge in enumerate(here.mode.edges):
+        if k in seen or not edge.conditional or here.surfaces.releases(k) or not first.theta > 0:
+            continue
+        bound = here.surfaces.roundoff_bound
+        if not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):
+            continue
+
+        def residual(s: Number, k: int = k) -> Number:
+            time, q = span.point(s)
+            return here.kernel.surfaces(time, *q)[k]
+
+        s = first.theta * 0
+        if not start[k] > 0:
+            s = close_bracket(residual, (s, start[k]), (first.theta, end[k]), s, run.arithmetic.unit * first.theta)
+        time, q = span.point(s)
+        if here.kernel.conditions[k](time, *q)[0] or (k in here.surfaces.active and holds_next(run, here, k, time, q)):
+            found.append(Crossing(k, s, time, q, run.arithmetic.zero))
+    return found
 
 
 def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
@@ -207,7 +235,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     if stop := run.limit_reached(t):
         return stop
     outcome, resumed = reset(here, crossing, event.scale, run), t
-    if crowded(run, here, edge.name, t):
+    if crowded(run, here, crossing):
         run.diagnostics.crowded(t)
         resumed = t + run.settings.relaxation
         if resumed > until + run.tie(until):
@@ -238,18 +266,27 @@ def same_instant(run: Run, t: Number) -> bool:
     return bool(made) and made[-1].resumed is not None and t - made[-1].resumed <= run.tie(t)
 
 
-def crowded(run: Run, here: ModeState, edge: str, t: Number) -> bool:
+def crowded(run: Run, here: ModeState, crossing: Crossing) -> bool:
     """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
 
-    Those of one instant count only where the edge is one of theirs.
+    Those of one instant count only where the edge is one of theirs. Those of contacts that move the state run to one.
     """
+    t, edge = crossing.time, here.mode.edges[crossing.edge]
     last = run.recorder.transitions[-FREE:]
-    if len(last) < FREE or contraction(last) is not None:
+    if len(last) < FREE or contraction(last) is not None or flown(last, t) > run.settings.relaxation:
         return False
-    again = any(made.edge == edge and made.source == here.mode.name for made in last)
+    again = any(made.edge == edge.name and made.source == here.mode.name for made in last)
     if not again and t - last[0].time <= run.tie(t):
         return False
-    return flown(last, t) <= run.settings.relaxation
+    return not (of_contacts(run, here, last) and edge.contact is not None and moves(run, here, crossing))
+
+
+def moves(run: Run, here: ModeState, crossing: Crossing) -> bool:
+    """Whether a transition moves the state, beyond round-off."""
+    try:
+        return not keeps(run, here.moved(crossing.time, crossing.state), crossing.edge)
+    except DOMAIN_ERRORS:
+        return False
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:

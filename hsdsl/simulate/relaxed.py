@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
@@ -16,6 +17,7 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.stepper import Stages, State, Stepper
 from hsdsl.simulate.cascade import takes_back
 from hsdsl.simulate.chatter import Chatter
+from hsdsl.simulate.contact import holds_next
 from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.run import ModeState, Run, choose, reset
@@ -127,7 +129,7 @@ def attempts(run: Run, here: ModeState, method: Stepper) -> Attempt:
             if not isfinite(sum(z) + sum(values)):
                 return NOT_FINITE, z, stages, None
             trial = Trial(t, h, t1, x, slope, z, stages, flow, method)
-            found = here.surfaces.judge(trial, values, epsilon)
+            found = here.surfaces.judge(trial, values, epsilon, partial(holds_next, run, here))
             if found or trial.end_slope is not None:  # beyond a guard the flow need not have a value, inside it must
                 return found, z, stages, trial.end_slope
         except NoConvergence:

@@ -20,6 +20,7 @@ ROUNDOFF_UNITS = 32
 TIE = 1e-12  # times closer than TIE max(|t|, length of the run) are the same instant
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
+Condition = Callable[[int, Number, State], bool]
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
 
 
@@ -213,11 +214,21 @@ class Surfaces:
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
                 near = abs(r) <= max(self.roundoff_bound(k, t, x), rate * since)
-                if near and rate > 0 and self.kernel.conditions[k](t, *x)[0]:
+                if near and self._points_out(k, t, x, rate) and self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)
             except DOMAIN_ERRORS:
                 continue
         return found
+
+    def _points_out(self, k: int, t: Number, x: State, rate: Number) -> bool:
+        """Whether the flow points out of surface k, beyond the round-off of its rate."""
+        if not rate > 0:
+            return False
+        first, *gradient = self.kernel.gradients[k](t, *x)
+        size = abs(first)
+        for g, f in zip(gradient, self.kernel.flow(t, *x), strict=True):
+            size = size + abs(g) * abs(f)
+        return rate > ROUNDOFF_UNITS * self.arithmetic.unit * size
 
     def excursion(self, trial: Trial) -> StepFailure | None:
         """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
@@ -253,9 +264,10 @@ class Surfaces:
                 return k >= len(self.edges) or bool(self.kernel.conditions[k](t, *x)[0])
         return False
 
-    def judge(self, trial: Trial, values: Vector, epsilon: Number) -> list[Crossing] | StepFailure:
+    def judge(self, trial: Trial, values: Vector, epsilon: Number, next_: Condition) -> list[Crossing] | StepFailure:
         """Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
 
+        ``next_`` says of an edge whether its `if` holds next along the flow, where it does not hold at a point.
         Raises one of ``DOMAIN_ERRORS`` where a surface or condition has no finite value on the way.
         """
         noise = {k: self.roundoff_bound(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
@@ -269,7 +281,7 @@ class Surfaces:
         for k in beyond:
             if k >= len(self.edges):
                 continue
-            found = self._crossing(trial, values, noise, k, epsilon)
+            found = self._crossing(trial, values, noise, k, epsilon, next_)
             if isinstance(found, StepFailure):
                 return found
             if found is not None:
@@ -285,7 +297,7 @@ class Surfaces:
         return None if values[k] <= epsilon * norm + noise[k] else StepFailure("deep", k)
 
     def _crossing(
-        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
+        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number, next_: Condition
     ) -> Crossing | StepFailure | None:
         """Find the last up-crossing of surface k on the interpolant; None where the surface is transparent there."""
         piece = trial.piece
@@ -302,7 +314,9 @@ class Surfaces:
             return StepFailure("inward", k)
         theta, time, q = found
         if not self.kernel.conditions[k](time, *q)[0]:
-            return None
+            on = theta == 0 or k in self.active
+            if not (on and next_(k, *self._after_hop(trial, piece, found, k, values[k]))):
+                return None
         if failure := self._too_deep(trial, values, noise, k, epsilon):
             return failure
         if self._deeper_before(trial, piece, theta, k, values[k] + noise[k]):
@@ -326,6 +340,17 @@ class Surfaces:
         _, time, q = found
         back = -self.kernel.rates[k](time, *q)[0] * trial.h
         return back if back > noise else self.arithmetic.zero
+
+    def _after_hop(
+        self, trial: Trial, piece: Polynomial, found: tuple[Number, Number, State], k: int, end: Number
+    ) -> tuple[Number, State]:
+        """Where the flow comes back to surface k, which it is on, after a hop that round-off hides; r ends at that."""
+        theta, time, q = found
+        back = -self.kernel.rates[k](time, *q)[0] * trial.h
+        if not back > 0:
+            return time, q
+        s = theta + (1 - theta) * (back / (back + end))
+        return trial.t + s * trial.h, at(trial.x, piece, s)
 
     def _smallest(self, trial: Trial, k: int) -> Number:
         """How close to zero a crossing of this step can be located: round-off of its own numbers, no older ones."""

@@ -9,11 +9,13 @@ transitions as cost no time have fallen within the relaxation, if the flow moves
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial, reduce
 from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
+from hsdsl.integrators.linear import Vector
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.contact import (
     after_contact,
@@ -72,14 +74,22 @@ def nearly_over(run: Run, here: ModeState, k: int) -> tuple[list[int], Number] |
         flight, ratio = found
         left = flight * ratio / (1 - ratio)
         return ([k], left) if left <= relaxation else None
-    own = {edge.name: j for j, edge in enumerate(here.mode.edges) if edge.contact is not None}
-    mode, left = here.mode.name, flown(made, here.t)
-    if len(made) < FREE or left > relaxation or run.settings.completion == "none":
+    left = flown(made, here.t)
+    if len(made) < FREE or left > relaxation:
         return None
-    if not all(one.source == one.target == mode and one.edge in own and not one.entry for one in made):
-        return None
-    edges = sorted({own[one.edge] for one in made})
+    edges = of_contacts(run, here, made)
     return (edges, left) if len(edges) > 1 else None
+
+
+def of_contacts(run: Run, here: ModeState, made: Sequence[Transition]) -> list[int]:
+    """The edges of some transitions, where each leads back to the present mode and its guard can hold a state."""
+    own = {edge.name: j for j, edge in enumerate(here.mode.edges) if edge.contact is not None}
+    mode = here.mode.name
+    if run.settings.completion == "none":
+        return []
+    if not all(one.source == one.target == mode and one.edge in own and not one.entry for one in made):
+        return []
+    return sorted({own[one.edge] for one in made})
 
 
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
@@ -90,7 +100,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return here
     edges, left = found
     end = min(here.t + left, here.segment.end)
-    if not end > here.t:
+    instant = len(edges) > 1 and end == here.t
+    if not (end > here.t or instant):
         return here
     edge = here.mode.edges[k]
     try:
@@ -98,7 +109,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         if isinstance(held, Stop):
             return held
         touched = in_touch(here, held)
-        if any(j in touched for j in edges):
+        if all(j in touched for j in edges):
             return here
         q = limit_of(run, here, touched, edges, end)
         if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
@@ -108,7 +119,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
             return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
         if keeping(run, there, edges) != edges:
             return here
-        if not {*edges} & {*(pressing(run, there, sorted({*touched, *edges})) or ())}:
+        if not instant and not {*edges} & {*(pressing(run, there, sorted({*touched, *edges})) or ())}:
             return here
         if meets_another(here, there, edges):
             return here
@@ -116,7 +127,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         return here
     for j in edges:
         run.diagnostics.replaced(here.mode.edges[j], len(made) - 1, end, left)
-    here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
+    if end > here.t:
+        here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
     rest = run.place(here.index, here.mode.states, end, q, here.surfaces.scale)
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
     rest.surfaces.active.update(edges)
@@ -125,25 +137,41 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
 
 def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
-    q = in_turn(partial(fixed_point, here), edges, here.t, here.x)
-    if len(edges) > 1:
-        sizes = flow_sizes(run, here, here.kernel.flow(here.t, *here.x))
-        most = (run.settings.relaxation * size for size in sizes)
-        if not all(abs(a - b) <= far for a, b, far in zip(q, here.x, most, strict=True)):
-            return None
+    kept = partial(fixed_point, here)
+    most = reach(run, here) if len(edges) > 1 else ()
+    if most and not all(is_near(here.x, kept(k, here.t, here.x), most) for k in edges):
+        return None  # the limit is no nearer than what each of them keeps
+    q = in_turn(kept, edges, here.t, here.x)
+    if most and not is_near(here.x, q, most):
+        return None
     if here.mode.edges[edges[0]].contact is not None:
         slope = in_contact(run, here, sorted({*touched, *edges})).kernel.flow(here.t, *q)
         q = tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True))
         q = in_turn(partial(onto_guard, here), edges, end, q)
-    q = in_turn(partial(fixed_point, here), edges, end, q)
+    q = in_turn(kept, edges, end, q)
     bound = here.surfaces.roundoff_bound
     on = all(abs(here.kernel.surfaces(end, *q)[k]) <= bound(k, end, q, entry=True) for k in edges)
     return q if on else None
 
 
+def reach(run: Run, here: ModeState) -> Vector:
+    """How far the flow moves each state within the relaxation."""
+    return [run.settings.relaxation * size for size in flow_sizes(run, here, here.kernel.flow(here.t, *here.x))]
+
+
+def is_near(x: State, q: State, most: Sequence[Number]) -> bool:
+    """Whether a point is no further than that from a state."""
+    return all(abs(a - b) <= far for a, b, far in zip(q, x, most, strict=True))
+
+
 def held_exactly(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> ModeState:
-    """The mode itself again, the state without what steps along its guards were off by: they may hold it again."""
+    """The mode itself again, the state without what steps along its guards were off by: they may hold it again.
+
+    It is off them by the round-off of what it has ever been computed from.
+    """
     touched, after = in_touch(here, held), after_contact(here, held, t, x)
+    scale = tuple(map(max, after.surfaces.scale, here.arc.scales))
+    after = replace(after, surfaces=replace(after.surfaces, scale=scale))
     try:
         q = in_turn(partial(onto_guard, after), touched, t, x)
         q = in_turn(partial(fixed_point, after), touched, t, q)

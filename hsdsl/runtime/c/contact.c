@@ -7,6 +7,7 @@
 
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
+#define FURTHER 16
 
 /* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
@@ -78,7 +79,7 @@ static void bind_contacts(hs_run *run, const int *held, const int *kept) {
   for (int i = 0; i < run->model->contacts; i++) *level_of(run, i) = 0.0;
   for (int k = 0; k < own->edges; k++)
     if (own->edge[k].contact >= 0)
-      *level_of(run, own->edge[k].contact) = held[k] ? HS_HELD : kept[k] ? HS_LOOKED_AT : 0.0;
+      *level_of(run, own->edge[k].contact) = held && held[k] ? HS_HELD : kept[k] ? HS_LOOKED_AT : 0.0;
   here->table = &run->model->mode[own->held];
   here->p = run->held_p;
 }
@@ -89,24 +90,34 @@ static void bind_mode(hs_run *run) {
   run->here.p = run->own_p;
 }
 
-/* Where the flow that the guards of other edges leave, of those `touched`, 0 for none, takes a state: off by round-off
-   where the reset of edge k changes it, to run->after. */
-static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
+/* The flow at a point that the guards of edges `touched`, 0 for none, without k and with it, leave. */
+static int flow_beside(hs_run *run, int k, int with, hs_time t, const hs_real *x, const int *touched, hs_real *flow) {
   const hs_mode *const own = run->here.table;
-  const hs_edge *const edge = &own->edge[k];
-  int others = 0;
-  hs_real after = 0.0;
-  for (int j = 0; touched && j < own->edges; j++) others += run->others[j] = j != k && touched[j];
-  if (others) bind_contacts(run, run->others, run->others);
-  const int raised = run->here.table->flow(run->here.p, t, x, run->at);
-  if (others) bind_mode(run);
-  if (raised) return RAISED;
+  int count = 0;
+  for (int j = 0; j < own->edges; j++) count += run->others[j] = j == k ? with : touched && touched[j];
+  if (count) bind_contacts(run, run->others, run->others);
+  const int raised = run->here.table->flow(run->here.p, t, x, flow);
+  if (count) bind_mode(run);
+  return raised;
+}
+
+/* Where the flow presses a state, by what the guard of edge k would take away of the flow that those of `touched`, 0
+   for none, leave: off by round-off where the reset of edge k changes it, to run->after. */
+static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
+  const hs_edge *const edge = &run->here.table->edge[k];
+  const int n = run->here.dimension;
+  hs_real after = 0.0, *const slope = run->at, *const left = run->after;
+  if (flow_beside(run, k, 0, t, x, touched, slope)) return RAISED;
+  if (edge->contact >= 0) {
+    if (flow_beside(run, k, 1, t, x, touched, left)) return RAISED;
+    for (int s = 0; s < n; s++) slope[s] = slope[s] - left[s];
+  }
   for (int i = 0; i < edge->changes; i++) {
     const int s = edge->change[i];
-    if (run->at[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * run->scales[s] / fabs(run->at[s]));
+    if (slope[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * run->scales[s] / fabs(slope[s]));
   }
   if (!(after > 0)) after = HS_UNIT * run->until; /* where these states have been zero only */
-  for (int s = 0; s < run->here.dimension; s++) run->after[s] = x[s] + after * run->at[s];
+  for (int s = 0; s < n; s++) run->after[s] = x[s] + after * slope[s];
   return 0;
 }
 
@@ -115,6 +126,14 @@ static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const in
   const int now = condition(run, k, t, x);
   if (now || !run->here.table->edge[k].conditional) return now == 1;
   return !pressed(run, k, t, x, touched) && condition(run, k, t, run->after) == 1;
+}
+
+/* Whether the `if` of an edge that leads back, of a surface that the state is on, holds next along the flow. */
+static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x) {
+  const hs_mode_state *here = &run->here;
+  const hs_edge *edge = &here->table->edge[k];
+  const int returns = edge->target == here->mode && here->dimension && here->dimension == here->table->dimension;
+  return returns && is_possible(run, k, t, x, 0);
 }
 
 /* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
@@ -136,6 +155,19 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
   return count;
 }
 
+/* Whether the push on the guard of edge k, which is looked at and zero now, is first negative where the flow makes it
+   differ from zero. */
+static int lifts_next(hs_run *run, hs_time t, const hs_real *x, int k) {
+  hs_real r, noise;
+  if (run->here.table->flow(run->here.p, t, x, run->at)) return 0;
+  for (hs_real after = HS_UNIT * run->until; t + after < segment_end(run); after = after * FURTHER) {
+    for (int s = 0; s < run->here.dimension; s++) run->after[s] = x[s] + after * run->at[s];
+    if (surface(run, k, t + after, run->after, &r) || roundoff_bound(run, k, t + after, run->after, 0, &noise)) return 0;
+    if (fabs(r) > noise) return r > 0;
+  }
+  return 0;
+}
+
 /* Of the edges `kept`, mark those in `pushed` that the flow presses on while those `held` hold the state: 1 where they
    are the same, else 0; RAISED where these have no flow together. */
 static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed) {
@@ -149,14 +181,17 @@ static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, con
     pushed[k] = 0;
     if (kept[k] && !raised) {
       run->active_surfaces[k] = 0;
-      pushed[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 0);
+      const hs_real r = run->values[k], noise = bound_from(run, run->magnitudes, k, t, x, 0);
+      pushed[k] = r < -noise || (r <= noise && !lifts_next(run, t, x, k));
       run->active_surfaces[k] = active;
-      apart |= run->values[k] != run->values[k];
+      apart |= r != r;
     }
   }
+  bind_contacts(run, 0, kept);
+  for (int k = 0; k < edges; k++) pushed[k] += pushed[k] && condition(run, k, t, x) == 1; /* 2: surely */
   bind_mode(run);
   for (int k = 0; k < edges; k++) {
-    pushed[k] = pushed[k] && is_possible(run, k, t, x, held);
+    pushed[k] = pushed[k] == 2 || (pushed[k] && is_possible(run, k, t, x, held));
     same &= !pushed[k] == !held[k];
   }
   return apart ? RAISED : same;

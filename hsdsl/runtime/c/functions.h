@@ -227,6 +227,7 @@ static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const h
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
 static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks);
 static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched);
+static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x);
 static void bind_contacts(hs_run *run, const int *held, const int *kept);
 static void bind_mode(hs_run *run);
 static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed);
@@ -241,6 +242,7 @@ static int behind_end(hs_run *run, int j, hs_time *t);
 static const hs_made *made_before(const hs_run *run, int back);
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
 static hs_time flown(const hs_run *run, hs_time t);
+static int of_contacts(hs_run *run);
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x);
 static int close_tail(hs_run *run, int k);
 

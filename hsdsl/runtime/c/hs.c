@@ -90,6 +90,8 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->emerging = take(store, m, sizeof(int));
   run->tied = take(store, e, sizeof(int));
   run->alternatives = take(store, e, sizeof(int));
+  run->held_p = numbers(store, run->model->data + run->model->contacts);
+  run->others = take(store, m, sizeof(int));
   run->cascade.x = numbers(store, w);
   run->source = numbers(store, w);
   run->trial.piece = polynomial(store, run);
@@ -120,10 +122,8 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
   const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
   run->jacobian = numbers(store, run->model->derivatives);
-  run->held_p = numbers(store, run->model->data + run->model->contacts);
   run->kept = take(store, m, sizeof(int));
   run->held = take(store, m, sizeof(int));
-  run->others = take(store, m, sizeof(int));
   run->tail = take(store, m, sizeof(int));
   run->turn = numbers(store, 2 * (int64_t)w);
   run->span = lay_out_span(run, store);

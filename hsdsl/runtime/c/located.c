@@ -55,14 +55,6 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
   return span_point(run, best, &crossing->time, &crossing->state);
 }
 
-/* Whether the `if` of an edge that leads back, of a surface that the state was on, holds next along the flow. */
-static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x) {
-  const hs_mode_state *here = &run->here;
-  const hs_edge *edge = &here->table->edge[k];
-  const int returns = edge->target == here->mode && here->dimension && here->dimension == here->table->dimension;
-  return returns && run->active_surfaces[k] && is_possible(run, k, t, x, 0);
-}
-
 /* Find the first point of the step where surface k is crossed and its condition holds: 1, or 0. */
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
@@ -77,7 +69,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     if (settled(run, k, &rise, crossing)) return RAISED;
     const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
     if (holds == RAISED) return RAISED;
-    if (!holds && !holds_next(run, k, crossing->time, crossing->state)) continue;
+    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, crossing->time, crossing->state))) continue;
     if (!rise.certain) doubt(run, k, crossing->time);
     crossing->edge = k;
     crossing->depth = 0.0;
@@ -86,18 +78,34 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   return touched(run, k, crossing);
 }
 
+/* Whether a crossing's state is on a surface that the state was on that it came from: 1, 0 or RAISED. */
+static int stands(hs_run *run, const hs_crossing *crossing) {
+  int stood = 0;
+  for (int k = 0; run->here.standing && k < run->here.table->surfaces && !stood; k++) {
+    hs_real r, noise;
+    if (!run->active_surfaces[k]) continue;
+    if (surface(run, k, crossing->time, crossing->state, &r)) return RAISED;
+    if (roundoff_bound(run, k, crossing->time, crossing->state, 0, &noise)) return RAISED;
+    stood = k == crossing->edge || fabs(r) <= noise;
+  }
+  return stood;
+}
+
 /* The sizes of the numbers behind the chosen crossing's state, to run->landed: the terms of its step and of the one
    before. */
-static void largest(hs_run *run) {
+static int largest(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
+  const int stood = stands(run, crossing);
+  if (stood == RAISED) return RAISED;
   sizes(run, run->x, crossing->state);
   for (int s = 0; s < run->here.dimension; s++) {
     hs_real *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
-    if (run->active_surfaces[crossing->edge]) *found = hs_max(*found, run->scale[s]);
+    if (stood) *found = hs_max(*found, run->scale[s]);
     if (run->here.p == run->held_p) *found = hs_max(*found, run->scales[s]); /* off guards that hold it by as much */
   }
+  return 0;
 }
 
 /* Record the part of the step that leads to a crossing. */
@@ -130,6 +138,41 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   return count;
 }
 
+/* Add crossings before the first one, of `count`, of surfaces with an `if` that rise by less than the step's polynomials
+   are off by: how many there are then, or RAISED. */
+static int with_unseen(hs_run *run, int count) {
+  const hs_mode *mode = run->here.table;
+  const hs_span *span = &run->span;
+  const hs_crossing *first = &run->crossings[0];
+  const int seen = count;
+  for (int i = 1; i < count; i++)
+    if (run->crossings[i].time < first->time) first = &run->crossings[i];
+  if (!(first->theta > 0)) return count;
+  for (int k = 0; k < mode->edges; k++) {
+    int was = !mode->edge[k].conditional || releases(run, k);
+    for (int i = 0; i < seen; i++) was |= run->crossings[i].edge == k;
+    if (was) continue;
+    hs_real start, end, before, noise, s = 0.0;
+    if (surface(run, k, span->t, run->x, &start) || surface(run, k, first->time, first->state, &end)) return RAISED;
+    if (roundoff_bound(run, k, first->time, first->state, 0, &noise)) return RAISED;
+    if (!(end > noise)) continue;
+    if (roundoff_bound(run, k, span->t, run->x, 0, &before)) return RAISED;
+    if (start > before) continue;
+    const hs_real unit = HS_UNIT * first->theta;
+    if (!(start > 0) && close_bracket(run, residual_of, 0, k, 0.0, start, first->theta, end, 0.0, unit, &s))
+      return RAISED;
+    hs_crossing *const found = &run->crossings[count];
+    if (span_point(run, s, &found->time, &found->state)) return RAISED;
+    const int holds = condition(run, k, found->time, found->state);
+    if (holds == RAISED) return RAISED;
+    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, found->time, found->state))) continue;
+    found->edge = k;
+    found->theta = s, found->depth = 0.0;
+    count++;
+  }
+  return count;
+}
+
 /* Say what happens first along the step: a guard, a wall with no guard on it, or nothing (GOES_ON). */
 static int first_event(hs_run *run) {
   const hs_mode *mode = run->here.table;
@@ -149,10 +192,10 @@ static int first_event(hs_run *run) {
   for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(run, wall->time);
   if (wall && !tied && !(guards = guards_at(run, wall))) return walked_out(run, wall);
   if (!guards) return GOES_ON;
+  if ((guards = with_unseen(run, guards)) == RAISED) return WITHOUT_VALUE;
   choose(run, guards);
   write_crossing(run, &run->chosen);
-  largest(run);
-  return LANDED;
+  return largest(run) ? WITHOUT_VALUE : LANDED;
 }
 
 /* No step is short enough: take a guard on which the state is, or stop with the reason. */
@@ -285,14 +328,17 @@ static int same_instant(const hs_run *run, hs_time t) {
 }
 
 /* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
-   Those of one instant count only where edge k is one of theirs. */
-static int crowded(const hs_run *run, int k, hs_time t) {
+   Those of one instant count only where the edge is one of theirs. Those of contacts that move the state run to one. */
+static int crowded(hs_run *run, const hs_crossing *crossing) {
   hs_real flight, ratio;
+  const hs_time t = crossing->time;
+  const int k = crossing->edge;
   int again = 0;
-  if (run->jump < FREE || contraction(run, &flight, &ratio)) return 0;
+  if (run->jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon) return 0;
   const hs_time since = t - made_before(run, FREE - 1)->time;
   for (int i = 0; i < FREE; i++) again |= made_before(run, i)->edge == k && made_before(run, i)->mode == run->here.mode;
-  return flown(run, t) <= run->epsilon && (again || since > tie(run, t));
+  if (!again && since <= tie(run, t)) return 0;
+  return !(of_contacts(run) && run->here.table->edge[k].contact >= 0 && !keeps(run, t, crossing->state, k));
 }
 
 /* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */
@@ -304,8 +350,8 @@ static int jump(hs_run *run) {
   const int mode = run->here.mode;
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
-  const int without_value = reset(run, run->landed);
-  if (crowded(run, k, t)) {
+  const int waits = crowded(run, crossing), without_value = reset(run, run->landed);
+  if (waits) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
     run->noted_crowded = 1;
     resumed = t + run->epsilon;

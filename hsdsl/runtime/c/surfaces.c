@@ -175,6 +175,17 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   return answer;
 }
 
+/* Whether the flow points out of surface k, beyond the round-off of its rate. */
+static int points_out(hs_run *run, int k, hs_time t, const hs_real *x, hs_real rate) {
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  hs_real size = 0.0;
+  if (!(rate > 0)) return 0;
+  if (row->values(run->here.p, t, x, run->gradient) || run->here.table->flow(run->here.p, t, x, run->near)) return 0;
+  for (int i = 0; i < row->count; i++)
+    size = size + fabs(run->gradient[i]) * (row->place[i] ? fabs(run->near[row->place[i] - 1]) : 1.0);
+  return rate > ROUNDOFF_UNITS * HS_UNIT * size;
+}
+
 /* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
    On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
 static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
@@ -187,8 +198,8 @@ static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int
     found[k] = 0;
     if (raised || releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
-    if (fabs(run->values[k]) <= hs_max(noise, rate * since) && rate > 0 && condition(run, k, t, x) == 1)
-      found[k] = 1, count++;
+    const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
+    if (near && points_out(run, k, t, x, rate) && condition(run, k, t, x) == 1) found[k] = 1, count++;
   }
   return count;
 }
@@ -359,6 +370,19 @@ static int inward_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *i
   return 0;
 }
 
+/* Whether the `if` of edge k holds next, on whose surface the state is, after a hop that round-off hides: where the
+   flow comes back to the surface, which is at `end` at the step's end. */
+static int holds_after_hop(hs_run *run, const hs_polynomial *piece, int k, const hs_crossing *crossing, hs_real end) {
+  const hs_trial *trial = &run->trial;
+  hs_real rate;
+  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
+  const hs_real back = -rate * trial->h;
+  if (!(back > 0)) return holds_next(run, k, crossing->time, crossing->state);
+  const hs_real s = crossing->theta + (1 - crossing->theta) * (back / (back + end));
+  at(run, piece, s, run->near);
+  return holds_next(run, k, trial->t + s * trial->h, run->near);
+}
+
 /* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
 static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) {
   hs_real norm;
@@ -387,6 +411,8 @@ static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *c
   }
   if (inward != 0) return *found = failure(HS_INWARD, k), 0;
   status = condition(run, k, crossing->time, crossing->state);
+  if (!status && (crossing->theta == 0 || run->active_surfaces[k]))
+    status = holds_after_hop(run, piece, k, crossing, values[k]);
   if (status != 1) return status;
   status = too_deep(run, k, values, found);
   if (status) return status == RAISED ? RAISED : 0;

@@ -95,7 +95,7 @@ static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count,
 }
 
 /* Be in the mode itself again at t, the state x without what steps along its guards were off by: they may hold it
-   again. */
+   again. It is off them by the round-off of what it has ever been computed from. */
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
   const hs_mode_state *here = &run->here;
   const int edges = run->model->mode[here->mode].edges;
@@ -103,6 +103,7 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
   run->still = same_state(run->began, x, here->dimension);
   for (int k = 0; k < edges; k++) count += run->kept[k] = in_touch(run, k);
   after_contact(run);
+  for (int s = 0; s < here->dimension; s++) run->scale[s] = hs_max(run->scale[s], run->scales[s]);
   for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
   copy(run->z, x, here->dimension);
   if (in_turn(run, onto_guard, count, t) || in_turn(run, fixed_point, count, t)) return;
@@ -110,12 +111,23 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
   if (held) copy(x, run->z, here->dimension);
 }
 
-/* Whether run->z is no further than the flow moves run->x within the relaxation. */
-static int is_near(hs_run *run) {
+/* Whether run->z is no further than the flow, whose sizes are known, moves run->x within the relaxation. */
+static int is_near(const hs_run *run) {
+  for (int s = 0; s < run->here.dimension; s++)
+    if (!(fabs(run->z[s] - run->x[s]) <= run->epsilon * run->flow_sizes[s])) return 0;
+  return 1;
+}
+
+/* Whether what each edge of the tail keeps is that near: 1, 0 or RAISED. The limit is no nearer. */
+static int may_be_near(hs_run *run) {
   const hs_mode_state *here = &run->here;
   if (here->table->flow(here->p, here->t, run->x, run->end) || flow_sizes(run, here->t, run->x, run->end)) return RAISED;
-  for (int s = 0; s < here->dimension; s++)
-    if (!(fabs(run->z[s] - run->x[s]) <= run->epsilon * run->flow_sizes[s])) return 0;
+  for (int k = 0; k < here->table->edges; k++) {
+    if (!run->tail[k]) continue;
+    copy(run->z, run->x, here->dimension);
+    if (fixed_point(run, k, here->t)) return RAISED;
+    if (!is_near(run)) return 0;
+  }
   return 1;
 }
 
@@ -126,9 +138,10 @@ static int limit_of(hs_run *run, int count, hs_time end) {
   const int n = here->dimension;
   int along = 0;
   hs_real r, noise, *const q = run->z;
+  if (count > 1 && may_be_near(run) != 1) return 0;
   copy(q, run->x, n);
   if (in_turn(run, fixed_point, count, here->t)) return RAISED;
-  if (count > 1 && is_near(run) != 1) return 0;
+  if (count > 1 && !is_near(run)) return 0;
   for (int k = 0; k < here->table->edges; k++) along |= run->tail[k] && here->table->edge[k].contact >= 0;
   if (along) {
     bind_contacts(run, run->held, run->held);
@@ -172,21 +185,13 @@ static hs_time flown(const hs_run *run, hs_time t) {
   return found;
 }
 
-/* Mark in run->tail the edges of a tail that ends within the relaxation, and bound what is `left` of it; return how
-   many. The last transition was that of edge k. */
-static int nearly_over(hs_run *run, int k, hs_time *left) {
+/* Mark in run->tail the edges of the last transitions, where each leads back to the present mode and its guard can hold a
+   state; return how many. */
+static int of_contacts(hs_run *run) {
   const hs_mode_state *here = &run->here;
-  hs_real flight, ratio;
   int count = 0;
   for (int j = 0; j < here->table->surfaces; j++) run->tail[j] = 0;
-  if (contraction(run, &flight, &ratio)) {
-    *left = flight * ratio / (1 - ratio);
-    run->tail[k] = 1;
-    return !(*left > run->epsilon);
-  }
-  if (run->jump < FREE || !run->task->settings.contacts) return 0;
-  *left = flown(run, here->t);
-  if (*left > run->epsilon) return 0;
+  if (!run->task->settings.contacts) return 0;
   for (int i = 0; i < FREE; i++) {
     const hs_made *made = made_before(run, i);
     if (made->entry || made->mode != here->mode || made->target != here->mode) return 0;
@@ -194,14 +199,33 @@ static int nearly_over(hs_run *run, int k, hs_time *left) {
     count += !run->tail[made->edge];
     run->tail[made->edge] = 1;
   }
+  return count;
+}
+
+/* Mark in run->tail the edges of a tail that ends within the relaxation, and bound what is `left` of it; return how
+   many. The last transition was that of edge k. */
+static int nearly_over(hs_run *run, int k, hs_time *left) {
+  const hs_mode_state *here = &run->here;
+  hs_real flight, ratio;
+  if (contraction(run, &flight, &ratio)) {
+    for (int j = 0; j < here->table->surfaces; j++) run->tail[j] = j == k;
+    *left = flight * ratio / (1 - ratio);
+    return !(*left > run->epsilon);
+  }
+  if (run->jump < FREE) return 0;
+  *left = flown(run, here->t);
+  if (*left > run->epsilon) return 0;
+  const int count = of_contacts(run);
   return count > 1 ? count : 0;
 }
 
-/* Whether resets keep a limit q of the tail, of `count` edges, and the flow presses on their guards. */
-static int is_held(hs_run *run, hs_time end, const hs_real *q, int count) {
+/* Whether resets keep a limit q of the tail, of `count` edges, and the flow presses on their guards, or it is reached at
+   one `instant`. */
+static int is_held(hs_run *run, hs_time end, const hs_real *q, int count, int instant) {
   const int edges = run->here.table->edges;
   int all = 0, presses = 0;
   if (keeping(run, end, q, run->kept) != count) return 0;
+  if (instant) return 1;
   for (int j = 0; j < edges; j++) all += run->held[j];
   if (!pressing(run, end, q, run->held, all, run->kept, run->beyond)) return 0;
   for (int j = 0; j < edges; j++) presses |= run->tail[j] && run->kept[j];
@@ -213,16 +237,17 @@ static int is_held(hs_run *run, hs_time end, const hs_real *q, int count) {
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
-  int touches = 0;
+  int touches = 1;
   if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
   const int count = nearly_over(run, k, &left);
   if (!count) return GOES_ON;
   const hs_time whole = here->t + left, end = earlier(whole, segment_end(run));
-  if (whole > run->pause || !(end > here->t)) return GOES_ON;
+  const int instant = count > 1 && end == here->t;
+  if (whole > run->pause || !(end > here->t || instant)) return GOES_ON;
   const hs_mode *const own = here->table;
   if (contact_at(run) != GOES_ON) return HS_ACCUMULATED;
   for (int j = 0; j < own->edges; j++) {
-    touches |= run->tail[j] && in_touch(run, j);
+    touches &= !run->tail[j] || in_touch(run, j);
     run->held[j] = run->tail[j] || in_touch(run, j), run->kept[j] = run->tail[j];
   }
   if (here->table != own) after_contact(run);
@@ -235,11 +260,13 @@ static int close_tail(hs_run *run, int k) {
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
-  if (!is_held(run, end, q, count) || meets_another(run, here->t, run->x, end, q)) return GOES_ON;
+  if (!is_held(run, end, q, count, instant) || meets_another(run, here->t, run->x, end, q)) return GOES_ON;
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j]) note(run, HS_REPLACED, j, run->jump - 1, end, left);
-  secant(run, &run->cubic);
-  append(run, end, q, &run->cubic);
+  if (!instant) {
+    secant(run, &run->cubic);
+    append(run, end, q, &run->cubic);
+  }
   swap(&run->x, &run->z);
   place(run, here->mode, here->dimension, end, 0);
   here->table->values(here->p, end, run->x, run->ahead);

@@ -1,0 +1,106 @@
+"""Cascades of impacts at one instant, and bodies that touch without a force, against closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from engines import assert_engines_agree
+
+import hsdsl
+
+LIFT = """
+hsdsl: 1
+parameters: {{s: {speed}, e: {e}, m: {m}}}
+modes:
+  a:
+    flow: {{x: u, y: v, u: -10, v: -10}}
+    transitions:
+      - {{name: floor, when: x <= s*t, {low}to: a, reset: {{u: s - e*(u - s)}}}}
+      - name: meet
+        when: y <= x
+        {high}to: a
+        reset: {{u: (m*u + v - e*(u - v))/(m + 1), v: (m*u + v + m*e*(u - v))/(m + 1)}}
+initial: {{mode: a, x: 0, u: s, y: 1, v: 0}}
+experiment: {{until: 3}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("speed", "e", "m", "conditional"),
+    [("0.2", "0", "1", False), ("0.2", "0", "1", True), ("-0.3", "1/9", "1", True), ("0.2", "1/2", "1/8", False)],
+)
+def test_a_cascade_of_one_instant_ends_in_the_motion_that_all_guards_keep(
+    speed: str, e: str, m: str, conditional: bool
+) -> None:
+    """A body falls on another one that rests on a lift: both end at rest there, at the lift's speed."""
+    low, high = ("if: u < s, ", "if: v < u\n        ") if conditional else ("", "")
+    run = assert_engines_agree(hsdsl.loads(LIFT.format(speed=speed, e=e, m=m, low=low, high=high)))
+    right = [3 * float(speed)] * 2 + [float(speed)] * 2
+    assert [run.final.state[name] for name in "xyuv"] == pytest.approx(right, abs=1e-12)
+    assert run.verdict.theorem == "left"
+    assert any(
+        "of meet after number" in reason and "replaced by their limit" in reason for reason in run.verdict.reasons
+    )
+    assert not any("in strips" in reason for reason in run.verdict.reasons)
+
+
+def test_bodies_that_collapse_in_flight_have_their_common_momentum() -> None:
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: u, y: v, z: w, u: 0, v: 0, w: 0}
+    transitions:
+      - {name: low, when: y <= x, if: v < u, to: a, reset: {u: (u + v)/2, v: (u + v)/2}}
+      - {name: high, when: z <= y, if: w < v, to: a, reset: {v: (v + 3*w)/4, w: (v + 3*w)/4}}
+initial: {mode: a, x: -1, u: 1, y: 0, v: 0, z: 1, w: -1}
+experiment: {until: 4}
+"""
+    run = assert_engines_agree(hsdsl.loads(text))
+    assert [run.final.state[name] for name in "uvw"] == pytest.approx([-0.4] * 3, abs=1e-9)
+    assert [run.final.state[name] for name in "xyz"] == pytest.approx([-1.2] * 3, abs=1e-9)
+
+
+PAIR = """
+hsdsl: 1
+modes:
+  a:
+    flow: {{x: v, y: w, v: '-10 + {pull}', w: -10}}
+    transitions:
+      - {{name: meet, when: y <= x, {condition}to: a, reset: {{v: (v + w)/2, w: (v + w)/2}}}}
+initial: {{mode: a, x: 0, y: 0, v: 1, w: 1}}
+experiment: {{until: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("pull", "right", "condition"),
+    [
+        ("t**2", [2 / 3 - 18, 2 / 3 - 18], "if: w < v, "),
+        ("1e-9*t**3", [8e-10 - 18, 8e-10 - 18], "if: w < v, "),
+        ("max(t - 1, 0)", [1 / 12 - 18, 1 / 12 - 18], ""),
+        ("-t**2", [-18 - 4 / 3, -18], ""),
+    ],
+)
+def test_bodies_that_touch_are_pressed_together_once_a_force_begins(
+    pull: str, right: list[float], condition: str
+) -> None:
+    """A force that begins at zero presses next: half of it acts on each body, all of it where it pulls them apart."""
+    run = assert_engines_agree(hsdsl.loads(PAIR.format(pull=pull, condition=condition)))
+    assert run.stop.reason == "until"
+    assert [run.final.state[name] for name in "xy"] == pytest.approx(right, abs=1e-12)
+
+
+@pytest.mark.parametrize("arguments", [{"method": "rk4", "step": 1e-2}, {"method": "dopri5"}, {}])
+def test_an_if_does_not_let_a_resting_ball_through_its_floor_in_strips(arguments: dict[str, Any]) -> None:
+    text = """
+hsdsl: 1
+modes:
+  a: {flow: {x: v, v: -2}, transitions: [{when: x <= 3, if: v < 0, to: a, reset: {v: -v/2}}]}
+initial: {mode: a, x: 4, v: 0}
+experiment: {until: 5, relaxation: 1e-3, scheme: relaxed}
+"""
+    run = assert_engines_agree(hsdsl.loads(text), **arguments)
+    assert run.stop.reason == "until"
+    assert run.final.state["x"] == pytest.approx(3, abs=1e-3)
