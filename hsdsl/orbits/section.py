@@ -11,8 +11,8 @@ from hsdsl.execution import Array, Execution
 from hsdsl.sensitivity.result import Sensitivity
 
 Differentiate = Callable[[Mapping[str, float], float, float, Sequence[str]], Sensitivity]
-LONGER = 4  # a run that does not return is made so many times longer, as often as this
-MOST_LONGER = 5
+LONGER = 4  # a run that does not return is made so many times longer,
+MOST_LONGER = 4  # as often as this
 
 
 class NoReturn(Exception):
@@ -55,8 +55,10 @@ class Section:
     run: Differentiate
     numbers: Mapping[str, int]
 
-    def follow(self, point: Array, phase: float, horizon: float, parameter: str | None = None) -> Return:
-        """Make the map at a point.
+    def follow(
+        self, point: Array, phase: float, horizon: float, parameter: str | None = None, longer: int = MOST_LONGER
+    ) -> Return:
+        """Make the map at a point, by a run to the horizon, or one that is made ``longer`` as often as this.
 
         Raises NoReturn: the run does not come back.
         """
@@ -64,11 +66,11 @@ class Section:
         wrt = [*names, *([self.phase] if self.phase else []), *([parameter] if parameter else [])]
         start = dict(zip(self.states, point.tolist(), strict=True))
         found = self.run(start, phase, horizon, wrt)
-        for _ in range(MOST_LONGER):
+        for tried in range(1 + longer):
             passed = [made.index for made in found.execution.transitions if made.edge == self.edge]
             if len(passed) >= self.laps:
                 return self._return(found, passed[self.laps - 1], wrt, parameter)
-            if found.execution.stop.reason != "until":
+            if found.execution.stop.reason != "until" or tried == longer:
                 break
             horizon *= LONGER
             found = self.run(start, phase, horizon, wrt)

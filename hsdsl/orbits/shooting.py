@@ -12,7 +12,8 @@ from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
 
 MOST_STEPS, MOST_HALVINGS = 40, 12
 SMALLEST = 1e-10  # singular values below this share of the largest one are directions in which orbits form families
-CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off of a run
+CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off of a run; so is one below the run's error
+ROUNDOFF = float(np.finfo(float).eps)
 SYMMETRY = 1e-9  # a column of the identity to this
 COARSER = 1e-10  # a tolerance for runs that show how good others are
 
@@ -54,23 +55,28 @@ def closed(
     Raises NotClosed: it did not converge.
     """
     try:
-        passage = section.follow(point, phase, horizon)
-        sizes = _sizes(passage, point, coarse.follow(point, phase, horizon))
+        passage, other = (each.follow(point, phase, horizon) for each in (section, coarse))
     except NoReturn as error:
         raise NotClosed(str(error)) from None
-    best: Closed | None = None
+    sizes = _sizes(passage, point, other)
+    enough = max(CLOSED, float(np.max(np.abs(passage.point - other.point) / sizes, initial=0.0)))
+    best = _looked_at(point, phase, passage, sizes, multiple)
+    here = best
     for _ in range(MOST_STEPS):
-        here = _looked_at(point, phase, passage, sizes, multiple)
-        if best is not None and here.residual >= best.residual and best.residual < CLOSED:
-            return best
-        best = here if best is None or here.residual < best.residual else best
-        if here.residual == 0:
+        if here.residual <= ROUNDOFF:
             return here
-        point, phase, passage = _damped(section, here, newton_step(here, multiple), multiple)
-    if best is not None and best.residual < CLOSED:
+        try:
+            here = _damped(section, here, newton_step(here, multiple), multiple, enough)
+        except NotClosed:
+            if best.residual < enough:
+                return best
+            raise
+        if here.residual >= best.residual and best.residual < enough:
+            return best
+        best = here if here.residual < best.residual else best
+    if best.residual < enough:
         return best
-    left = f", by {best.residual:.2g}" if best else ""
-    raise NotClosed(f"after {MOST_STEPS} steps of Newton's method the orbit does not close{left}")
+    raise NotClosed(f"after {MOST_STEPS} steps of Newton's method the orbit does not close, by {best.residual:.2g}")
 
 
 def _looked_at(point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None) -> Closed:
@@ -148,20 +154,18 @@ def newton_step(here: Closed, multiple: float | None) -> Array:
     return step
 
 
-def _damped(section: Section, here: Closed, step: Array, multiple: float | None) -> tuple[Array, float, Return]:
-    """Take a step, halved until the run comes back and the gap does not grow much."""
+def _damped(section: Section, here: Closed, step: Array, multiple: float | None, enough: float) -> Closed:
+    """Take a step, halved until the run comes back and the gap does not grow much; a whole one where that is enough."""
     problem = "the gap grows"
-    for halvings in range(MOST_HALVINGS):
+    for halvings in range(MOST_HALVINGS if here.residual >= enough else 1):
         share = 0.5**halvings
         point, phase = here.point + share * step[:-1], here.phase + share * float(step[-1])
         try:
-            passage = section.follow(point, phase, 1.5 * here.passage.time)
+            passage = section.follow(point, phase, 1.5 * here.passage.time, longer=1)
         except NoReturn as error:
             problem = str(error)
             continue
-        if (
-            _looked_at(point, phase, passage, here.sizes, multiple).residual < 2 * here.residual
-            or here.residual < CLOSED
-        ):
-            return point, phase, passage
+        there = _looked_at(point, phase, passage, here.sizes, multiple)
+        if there.residual < 2 * here.residual or here.residual < enough:
+            return there
     raise NotClosed(f"Newton's method is stuck where the orbit does not close, by {here.residual:.2g}: {problem}")

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 import hsdsl
 from hsdsl import UsageError
 from hsdsl.cli.verbs import obey
+from hsdsl.orbits.section import Section
 
 BELT = "models/gallery/stick-slip.yaml"
 OSCILLATOR = "models/oscillator-with-stop-1.yaml"
@@ -47,6 +48,36 @@ def test_oscillator_with_a_period_that_is_given() -> None:
     single = model.orbit("impact", period="2*pi/2.5")
     assert np.isclose(double.period, 2 * single.period, rtol=1e-12)
     assert close(double.multipliers, single.multipliers**2)
+
+
+@pytest.mark.parametrize("section", ["up", "down"])
+def test_section_through_a_point_at_rest(section: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's method goes to where the section and the flow meet at rest, and ends there: nearby no run comes back."""
+    model, passages = hsdsl.load("models/gallery/lorenz-section.yaml"), list[float]()
+    follow = Section.follow
+
+    def counted(self: Section, point: Any, phase: float, horizon: float, *rest: Any, **others: Any) -> Any:
+        passages.append(horizon)
+        return follow(self, point, phase, horizon, *rest, **others)
+
+    monkeypatch.setattr(Section, "follow", counted)
+    with pytest.raises(UsageError, match="it closes where the flow is at rest"):
+        model.orbit(section)
+    assert len(passages) < 6 * 30  # of six guesses
+
+
+def test_orbit_of_a_section_at_rest() -> None:
+    """The shortest orbit of the flow, twice through the section: its period by D. Viswanath, Nonlinearity 16, 2003."""
+    orbit = hsdsl.load("models/gallery/lorenz-section.yaml").orbit("up", laps=2)
+    assert np.isclose(orbit.period, 1.558652210716, rtol=1e-11)
+    assert np.isclose(abs(orbit.multipliers[0]), 4.71294727, rtol=1e-8)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_closing_within_the_error_of_a_run(tolerance: float) -> None:
+    orbit = hsdsl.load(OSCILLATOR).orbit("impact", tolerance=tolerance)
+    assert orbit.verdict == "stable"
+    assert np.isclose(orbit.period, 2 * np.pi / 2.5, rtol=tolerance)
 
 
 WALKER = (0.7344606213364, [-0.202216100148 + 0.543414971353j, -0.202216100148 - 0.543414971353j, 0.131386707191])
