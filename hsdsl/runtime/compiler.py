@@ -57,7 +57,8 @@ class Compiler:
     ) -> None:
         """Compile sources to a file in a folder for temporary files, with so much effort to make it fast.
 
-        :data:`FLAGS` make a shared library of them. Several are compiled at the same time.
+        :data:`FLAGS` make a shared library of them. Several are compiled at the same time; objects among them are
+        only linked.
 
         Raises
         ------
@@ -67,11 +68,12 @@ class Compiler:
         if _responding.get(self) is False:
             raise NoCompiler(self._endless())
         options = (effort, *flags, *(f"-I{folder}" for folder in includes))
-        objects = [str(target.with_name(f"{source.stem}.o")) for source in sources]
+        inputs = [str(source) for source in sources]
         if len(sources) > 1:
-            given = zip(objects, map(str, sources), strict=True)
-            self._run([[*self.command, *options, "-c", "-o", made, source] for made, source in given], target.parent)
-        inputs = objects if len(sources) > 1 else map(str, sources)
+            objects = {s: s if s.endswith(".o") else str(target.with_name(f"{Path(s).stem}.o")) for s in inputs}
+            made = [[*self.command, *options, "-c", "-o", o, s] for s, o in objects.items() if o != s]
+            self._run(made, target.parent)
+            inputs = [*objects.values()]
         self._run([[*self.command, *options, "-o", str(target), *inputs, "-lm"]], target.parent)
         if not target.is_file():
             raise NoCompiler(f"{self} made no library")

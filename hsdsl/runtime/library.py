@@ -27,9 +27,29 @@ KIND = "compiled"
 GIVEN_UP = "given-up"  # entries for models that took too long to compile: the seconds that the compiler had
 
 
-LOOP = '#include "hs.c"\n', "hs_simulate"  # its text and symbol
+LOOP = '#include "library.c"\n', "hs_simulate"  # its text and symbol
 EFFORT: Effort = "-O1"  # -O2 compiles 1.5 times as long, for code that is a hundredth faster
 _OPTIONS = " ".join((EFFORT, *FLAGS))
+
+
+def loop_object(folder: Path) -> Path:
+    """The loop as an object in a folder, to be linked into another library: compiled at first use, and kept.
+
+    Raises
+    ------
+    NoCompiler
+        There is no compiler, or it fails.
+    """
+    compiler, made = find_compiler(), folder / "hs.o"
+    key = _key("object", compiler)
+    with making(KIND, key):
+        if kept := find(KIND, key):
+            _copy(kept, made)
+            return made
+        flags = ("-c", *(flag for flag in FLAGS if flag != "-shared"))
+        compiler.build([RUNTIME / "hs.c"], [RUNTIME], made, EFFORT, flags)
+        _keep(key, made)
+    return made
 
 
 def ship(folder: Path) -> Path:
@@ -174,7 +194,7 @@ def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:
 
 def _keep(key: str, library: Path) -> None:
     try:
-        keep(KIND, key, ".so", lambda target: _copy(library, target))
+        keep(KIND, key, library.suffix, lambda target: _copy(library, target))
     except OSError as refusal:
         _say_unkept(str(refusal))
 

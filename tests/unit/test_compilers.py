@@ -177,7 +177,7 @@ def test_what_takes_too_long_is_tried_once(use, capsys, tmp_path: Path) -> None:
 @needs_compiler
 def test_a_compiler_that_fails_for_the_runtime_alone(use, capsys) -> None:
     real = compiler.find_compiler().command[0]
-    use(f'grep -qsF hs.c "$TMPDIR"/model.c && exit 1\nexec {real} "$@"')
+    use(f'grep -qsF library.c "$TMPDIR"/model.c && exit 1\nexec {real} "$@"')
     assert_python_runs_with_one_remark("exit code 1", capsys)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from hsdsl.backends.c import model_source
@@ -14,6 +16,8 @@ from hsdsl.runtime.library import RUNTIME
 
 PARTS = Path(__file__).parent / "parts"
 COMPILED = ("model.c", "problem.c", "instance.c", "runtime/hs.c")  # with -I. -Iruntime, and linked with -lm
+
+_INCLUDE = re.compile(r'^#include "(.+)"', re.MULTILINE)
 
 # those that decide the bits of a run
 EXACT_FLAGS = tuple(flag for flag in FLAGS if flag.startswith(("-ffp-", "-fno-math-", "-fno-builtin-")))
@@ -35,6 +39,18 @@ def c_sources(source: Source, tunable: bool = False) -> dict[str, bytes]:
         "problem.h": header(source, tunable),
         "problem.c": numbers(source),
     }
-    runtime = {f"runtime/{path.name}": path.read_bytes() for path in sorted(RUNTIME.glob("*.[ch]"))}
-    parts = {path.name: path.read_bytes() for path in sorted(PARTS.glob("instance.[ch]"))}
-    return {name: text.encode() for name, text in files.items()} | parts | runtime
+    parts = {path.name: path.read_text() for path in sorted(PARTS.glob("instance.[ch]"))}
+    runtime = {f"runtime/{name}": text for name, text in sorted(_included(["hs.c"], {**files, **parts}).items())}
+    return {name: text.encode() for name, text in {**files, **parts, **runtime}.items()}
+
+
+def _included(names: Iterable[str], including: Mapping[str, str]) -> dict[str, str]:
+    """The files of the runtime of these names, and those that they and ``including`` include."""
+    found: dict[str, str] = {}
+    ahead = [*names, *(name for text in including.values() for name in _INCLUDE.findall(text))]
+    while ahead:
+        name = ahead.pop()
+        if name not in found and name not in including:
+            found[name] = (RUNTIME / name).read_text()
+            ahead += _INCLUDE.findall(found[name])
+    return found

@@ -15,10 +15,12 @@ from hsdsl.export.c.sources import c_sources
 from hsdsl.export.fmi import tables
 from hsdsl.export.fmi.variables import Unit
 from hsdsl.runtime.compiler import FLAGS, NoCompiler, find_compiler
+from hsdsl.runtime.library import EFFORT, loop_object
 from hsdsl.runtime.process import workshop
 
 FOLDER = Path(__file__).parent
-COMPILED = ("model.c", "problem.c", "instance.c", "hs.c", "variables.c", "fmu.c", "events.c", "fmi.c")
+LOOP = "hs.c"
+COMPILED = ("model.c", "problem.c", "instance.c", LOOP, "variables.c", "fmu.c", "events.c", "fmi.c")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "i686": "x86"}
@@ -63,9 +65,9 @@ def library_of(sources: Mapping[str, bytes], version: int) -> bytes:
     with workshop() as folder:
         for name, text in sources.items():
             (folder / name).write_bytes(text)
-        target, files = folder / "unit.so", [folder / name for name in compiled_names(version)]
+        target, files = folder / "unit.so", [folder / name for name in compiled_names(version) if name != LOOP]
         try:
-            find_compiler().build(files, [folder], target, "-O1", FLAGS)
+            find_compiler().build([*files, loop_object(folder)], [folder], target, EFFORT, FLAGS)
         except NoCompiler as error:
             raise UsageError(f"a unit has a library for this platform: {error}") from None
         return target.read_bytes()

@@ -38,9 +38,8 @@
 #include "zeno.c"
 #include "touching.c"
 #include "located.c"
-#if !defined(HS_FLOAT32) /* for callers that keep whole runs */
+#if !defined(HS_FLOAT32)
 #include "sample.c"
-#include "pack.c"
 #endif
 
 static void *take(hs_store *store, int64_t count, size_t size) {
@@ -220,14 +219,3 @@ void hs_simulate(hs_task *task) {
 }
 
 #include "pause.c"
-#if !defined(HS_FLOAT32)
-#include "ensemble.c"
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC push_options
-#pragma GCC optimize("O2")
-#endif
-#include "screen.c"
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC pop_options
-#endif
-#endif
