@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from convergence.theorem_scenes import BEFORE_ZENO, LONG, OTHER, SCENES, known, slope
+from convergence.scene import slope
+from convergence.theorem_scenes import BEFORE_ZENO, LONG, OTHER, SCENES, known
 
 from hsdsl.integrators import INTEGRATORS
 from hsdsl.model.distances import distance_of_runs as distance

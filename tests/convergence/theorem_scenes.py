@@ -11,7 +11,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from exact.dimensions import dimensions
 from exact.relaxed import delayed, relaxed_oscillator
 from references.impact_oscillator import exact_example_1, exact_example_2
@@ -99,8 +98,3 @@ LONG = {
     "oscillator 1, 4 impacts": known(OSCILLATOR, 8.5, 4, waits(exact_example_1), o1=2e-4, o2=2e-3, o4=1.6e-2),
 }
 BEFORE_ZENO = {"oscillator 2, 3 impacts": known(OTHER, 5, 3, waits(exact_example_2))}
-
-
-def slope(sizes: Any, errors: Any) -> float:
-    """Exponent p of errors ~ sizes**p, by least squares."""
-    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])

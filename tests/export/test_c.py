@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import subprocess
 import sys
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 from export.c_builds import COMPILERS, OF_PACKAGES, USING, built, exported, output
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -140,14 +140,10 @@ def test_every_model_in_single_precision(name: str, compiler: str, tmp_path: Pat
 
 
 def test_numbers_of_a_program_are_as_they_were() -> None:
-    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
     files = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "c")
     names = ("problem.h", "model.c", "problem.c")
     found = "".join(f"/* {name} */\n" + files[name].decode().partition("*/\n")[2] for name in names)
-    golden = Path(__file__).parent / "golden" / "thermostat.c.txt"
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / "thermostat.c.txt")
 
 
 def test_nothing_is_allocated(tmp_path: Path) -> None:

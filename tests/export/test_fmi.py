@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from export.c_builds import COMPILERS, USING, WARNINGS
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.export import files_of, source_of
@@ -238,16 +239,12 @@ def test_time_may_begin_anywhere(made: Any) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_descriptions_are_as_they_were(version: int) -> None:
-    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
     unit = unit_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}))
     module = __import__(f"hsdsl.export.fmi{version}", fromlist=["description"])
     text = re.sub(
         r' (?:guid|instantiationToken|description|generationTool)="[^"]*"', "", module.description(unit), count=3
     )
-    golden = Path(__file__).parent / "golden" / f"thermostat.fmi{version}.xml"
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        golden.write_text(text)
-    assert text == golden.read_text()
+    assert_golden(text, Path(__file__).parent / "golden" / f"thermostat.fmi{version}.xml")
 
 
 # how far times may be off in model exchange, where the solver's error decides them; of a stiff model more

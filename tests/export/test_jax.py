@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -120,13 +121,9 @@ def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
 
 
 def test_generated_text() -> None:
-    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
     content = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "jax")["thermostat.py"].decode()
-    golden = Path(__file__).parent / "golden" / "thermostat.jax.txt"
     found = content.partition("# The model\n")[2]
-    if "HSDSL_WRITE_GOLDEN" in os.environ:
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / "thermostat.jax.txt")
 
 
 def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.export import files_of, source_of
@@ -70,10 +70,7 @@ def test_text_of_the_document_stays(target: str) -> None:
     (content,) = files_of(source_of(hsdsl.load(MODELS[-1]), {}), target).values()
     lines = content.decode().splitlines(keepends=True)
     found = "".join(line for line in lines if not re.match(r"%+ (Generated|model)", line))
-    golden = Path(__file__).parent / "golden" / f"thermostat.{target}.txt"
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / f"thermostat.{target}.txt")
 
 
 def test_labels_of_a_mode_graph_are_no_markdown() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from functools import cache
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import pytest
 from octave import OCTAVE, Ran, evaluated, exported, ran
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.errors import UsageError
@@ -183,10 +183,7 @@ def test_text_of_the_model_stays() -> None:
     files = files_of(source_of(model, {}), "matlab")
     found = "".join(files[f"thermostat_{part}.m"].decode() for part in ("model", "parameters", "initial", "D"))
     found = "".join(line for line in found.splitlines(keepends=True) if not line.startswith(("% Generated", "% model")))
-    golden = Path(__file__).parent / "golden" / "thermostat.matlab.txt"
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / "thermostat.matlab.txt")
 
 
 def test_what_the_driver_lacks_is_refused(tmp_path: Path) -> None:

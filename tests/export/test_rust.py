@@ -9,6 +9,7 @@ from shutil import which
 from typing import Any
 
 import pytest
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -100,14 +101,10 @@ def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
 
 
 def test_generated_text() -> None:
-    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
     files = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "rust")
     lines = files["src/model.rs"].decode().splitlines(keepends=True)
-    golden = Path(__file__).parent / "golden" / "thermostat.rust.txt"
     found = "".join(line for line in lines if not line.startswith("// "))
-    if "HSDSL_WRITE_GOLDEN" in os.environ:
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / "thermostat.rust.txt")
 
 
 def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

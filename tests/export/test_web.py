@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from html.parser import HTMLParser
 from pathlib import Path
@@ -22,6 +21,7 @@ from export.web_pages import (
     parts,
     typed,
 )
+from shipped import assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -453,16 +453,12 @@ def test_a_scheme_that_has_no_c_is_refused():
 
 
 def test_numbers_and_data_of_a_page_are_as_they_were():
-    """The golden file is written anew where HSDSL_WRITE_GOLDEN is set."""
     model = hsdsl.load(MODELS / "thermostat.yaml")
     source = source_of(model, {})
     data = model_of(source, source, model.simulate())
     del data["about"]  # it names the version
     found = page_numbers.page_numbers(source.problem) + json.dumps(data, indent=1) + "\n"
-    golden = Path(__file__).parent / "golden" / "thermostat.web.txt"
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        golden.write_text(found)
-    assert found == golden.read_text()
+    assert_golden(found, Path(__file__).parent / "golden" / "thermostat.web.txt")
 
 
 def test_fixed_parameters_are_those_that_curved_switches_and_tolerances_depend_on():

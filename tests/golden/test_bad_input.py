@@ -1,9 +1,9 @@
 """Bad models, each beside the text that is printed for it. Every code has at least one."""
 
-import os
 from pathlib import Path
 
 import pytest
+from shipped import assert_golden
 
 from hsdsl.diagnose import as_json, render
 from hsdsl.elaborate import elaborate
@@ -27,10 +27,7 @@ def diagnostics(path):
 @pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem)
 def test_says_what_is_expected(case):
     said = "".join(render(d) + "\n" for d in diagnostics(case))
-    expected = case.with_suffix(".txt")
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        expected.write_text(said, encoding="utf-8")
-    assert said == expected.read_text(encoding="utf-8")
+    assert_golden(said, case.with_suffix(".txt"))
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem)

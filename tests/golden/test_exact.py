@@ -19,20 +19,14 @@ from references.oscillators import oscillator
 from references.stiff_switch import stiff_switch
 from references.thermostat import thermostat
 from scipy.integrate import solve_ivp
+from shipped import shipped
 
 import hsdsl
 from hsdsl import exact
 from hsdsl.exact.residual import residual
 from hsdsl.store import load
 
-MODELS = Path(__file__).parents[2] / "models"
 ZENO = 12.850588106343579
-
-
-@lru_cache
-def model(name: str) -> Any:
-    """A model of the folder, loaded once."""
-    return hsdsl.load(MODELS / f"{name}.yaml")
 
 
 # name: (model, the execution of it)
@@ -54,7 +48,7 @@ SCENES: dict[str, tuple[str, Callable[..., Any]]] = {
 def scene(name: str) -> Any:
     """An exact execution with its model's name on it, made once."""
     of, make = SCENES[name]
-    return replace(make(), digest=model(of).program.digest)
+    return replace(make(), digest=shipped(of).program.digest)
 
 
 FIRST = [
@@ -234,7 +228,7 @@ DEFECTS = {"stiff switch": 2e-10}  # pieces of 2e-7 s: values right to 1e-14 lea
 
 @pytest.mark.parametrize("name", SCENES)
 def test_it_solves_the_model_as_written(name: str) -> None:
-    assert residual(model(SCENES[name][0]).program, scene(name)) <= DEFECTS.get(name, 1e-11)
+    assert residual(shipped(SCENES[name][0]).program, scene(name)) <= DEFECTS.get(name, 1e-11)
 
 
 def test_rest_is_where_the_flow_pushes_out() -> None:
@@ -272,7 +266,7 @@ def test_another_integrator_finds_the_first_impacts() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_it_is_an_execution_like_any_other(name: str, tmp_path: Path) -> None:
     run = scene(name)
-    assert (run.scheme, run.engine, run.digest) == ("exact", "closed form", model(SCENES[name][0]).system.digest)
+    assert (run.scheme, run.engine, run.digest) == ("exact", "closed form", shipped(SCENES[name][0]).system.digest)
     run.save(tmp_path / "run.npz")
     assert load(tmp_path / "run.npz") == run
     assert "closed form" in run._repr_html_()
@@ -298,8 +292,8 @@ REFUSED: dict[str, Callable[[], Any]] = {
     "until below 0": lambda: thermostat(until=-1),
     "above the level": lambda: stiff_switch(6),
     "not stiff": lambda: stiff_switch(fast=3),
-    "too many digits": lambda: exact.precise(model("thermostat"), 20),
-    "a run that stops": lambda: exact.precise(model("bouncing-ball"), 4, max_transitions=2),
+    "too many digits": lambda: exact.precise(shipped("thermostat"), 20),
+    "a run that stops": lambda: exact.precise(shipped("bouncing-ball"), 4, max_transitions=2),
 }
 
 
@@ -311,9 +305,11 @@ def test_refused(case: str) -> None:
 
 def test_refined_pendulum() -> None:
     """Against Taylor series: the error that is stated bounds what it is off by."""
-    run = exact.precise(model("constrained-pendulum"), 6, until=3)
+    run = exact.precise(shipped("constrained-pendulum"), 6, until=3)
     assert len(run.transitions) == 4
-    for found, known in zip(run.transitions, exact.reference(model("constrained-pendulum")).transitions, strict=False):
+    for found, known in zip(
+        run.transitions, exact.reference(shipped("constrained-pendulum")).transitions, strict=False
+    ):
         assert abs(found.time - known.time) <= run.settings["error"] <= 1e-6
         assert abs(found.before["w"] - known.before["w"]) <= run.settings["error"]
         assert abs(found.after["w"] - known.after["w"]) <= run.settings["error"]
@@ -322,7 +318,7 @@ def test_refined_pendulum() -> None:
 
 
 def test_refined_ball_between_its_bounces(tmp_path: Path) -> None:
-    run = exact.precise(model("bouncing-ball"), 8, until=4)
+    run = exact.precise(shipped("bouncing-ball"), 8, until=4)
     truth = bouncing_ball(until=4)
     times = np.linspace(0.01, 3.99, 200)
     for name in ("h", "v"):
@@ -345,7 +341,7 @@ RUNNER = {
 def test_refined_runner(w: str) -> None:
     """Against two integrators of high order, which agree to eleven digits."""
     times, end = RUNNER[w]
-    run = exact.precise(model("pronking-runner"), 11, initial={"w": w})
+    run = exact.precise(shipped("pronking-runner"), 11, initial={"w": w})
     assert np.allclose([t.time for t in run.transitions], times, rtol=0, atol=2e-11)
     for name, value in end.items():
         assert abs(run.final.state[name] - value) <= 2e-11

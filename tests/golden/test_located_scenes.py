@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import random
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
 from references.impact_oscillator import Motion, Oscillator, exact_example_1, exact_example_2
+from shipped import MODELS, shipped
 
 import hsdsl
 
-MODELS = Path(__file__).parents[2] / "models"
 METHODS = ["taylor", "dop853", "dopri5"]
 
 
-@lru_cache
-def model(name: str) -> Any:
-    """A model of the folder, loaded once."""
-    return hsdsl.load(MODELS / f"{name}.yaml")
-
-
 def located(name: str, method: str, tolerance: Any, **more: Any) -> Any:
-    return model(name).simulate(scheme="located", method=method, tolerance=tolerance, **more)
+    return shipped(name).simulate(scheme="located", method=method, tolerance=tolerance, **more)
 
 
 @pytest.mark.parametrize(("method", "within"), [("taylor", 1e-11), ("dop853", 1e-11)])
@@ -218,7 +211,7 @@ def test_the_relaxed_scheme_says_what_it_passed_over() -> None:
 
 @pytest.mark.parametrize("scheme", ["located", pytest.param("relaxed", marks=pytest.mark.campaign)])  # 1000 halvings
 def test_more_digits_than_float64_has_exponents_for(scheme: str) -> None:
-    run = model("bouncing-ball").simulate(
+    run = shipped("bouncing-ball").simulate(
         "1.5", scheme=scheme, method="rk4", step="1/2", relaxation="1e-300", precision=400
     )
     with mp.workdps(400):

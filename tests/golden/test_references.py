@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from references.build import REFERENCES, solved
 from scipy.integrate import solve_ivp
+from shipped import MODELS, shipped
 
 import hsdsl
 from hsdsl.arithmetic import FLOAT64
@@ -18,30 +18,24 @@ from hsdsl.exact import reference
 from hsdsl.exact.references import STORED
 from hsdsl.exact.residual import residual
 
-MODELS = Path(__file__).parents[2] / "models"
 KEPT = [(name, block) for name, solutions in REFERENCES.items() for block in range(len(solutions))]
 KEPT_IDS = [f"{name}-{block}" for name, block in KEPT]
 BY_SERIES = [(name, block) for name, block in KEPT if name in ("constrained-pendulum", "pronking-runner")]
 SERIES_IDS = [f"{name}-{block}" for name, block in BY_SERIES]
 
 
-@lru_cache
-def model(name: str) -> Any:
-    return hsdsl.load(MODELS / f"{name}.yaml")
-
-
 def test_every_model_has_its_exact_executions() -> None:
     assert set(REFERENCES) == {path.stem for path in MODELS.glob("*.yaml")}
     assert {name: len(solutions) for name, solutions in REFERENCES.items()} == {
-        name: len(model(name).system.reference) for name in REFERENCES
+        name: len(shipped(name).system.reference) for name in REFERENCES
     }
     assert {path.stem for path in STORED.glob("*.npz")} == set(KEPT_IDS)
 
 
 @pytest.mark.parametrize(("name", "block"), BY_SERIES, ids=SERIES_IDS)
 def test_stored_executions_say_what_they_rest_on(name: str, block: int) -> None:
-    run = reference(model(name), block)
-    assert run.digest == model(name).system.digest
+    run = reference(shipped(name), block)
+    assert run.digest == shipped(name).system.digest
     assert run.settings["error"] <= 2e-14
     assert run.settings["digits"] >= 30
     assert "Taylor series of order 40" in run.settings["source"]
@@ -53,7 +47,7 @@ def test_stored_executions_say_what_they_rest_on(name: str, block: int) -> None:
 @pytest.mark.parametrize(("name", "block"), BY_SERIES, ids=SERIES_IDS)
 def test_another_integrator_agrees(name: str, block: int) -> None:
     """DOP853 on the model's own flow along each arc: states in between, and at its end, where a guard is met."""
-    run, program = reference(model(name), block), model(name).program
+    run, program = reference(shipped(name), block), shipped(name).program
     kernel = PythonKernel(program, FLOAT64)
     parameters: tuple[float, ...] = ()
     for k in range(len(program.parameters)):
@@ -91,7 +85,7 @@ DEFECTS = {"stiff-switch": 2e-10}  # pieces of 2e-7 s: values right to 1e-14 lea
 @pytest.mark.parametrize("name", REFERENCES)
 def test_the_models_equations_hold(name: str) -> None:
     for block in range(len(REFERENCES[name])):
-        assert residual(model(name).program, reference(model(name), block)) <= DEFECTS.get(name, 1e-11)
+        assert residual(shipped(name).program, reference(shipped(name), block)) <= DEFECTS.get(name, 1e-11)
 
 
 @pytest.mark.parametrize(  # the first of each model; all are rebuilt in a campaign
@@ -102,7 +96,7 @@ def test_the_models_equations_hold(name: str) -> None:
     ],
 )
 def test_rebuilt_it_is_the_same(name: str, block: int) -> None:
-    stored, anew = reference(model(name), block), solved(name, block)
+    stored, anew = reference(shipped(name), block), solved(name, block)
     assert [(t.edge, t.time, t.before, t.after, t.alternatives) for t in stored.transitions] == [
         (t.edge, t.time, t.before, t.after, t.alternatives) for t in anew.transitions
     ]
@@ -120,8 +114,8 @@ NEAR = {name: ({"tolerance": "1e-11"}, 1e-5) for name in ("bouncing-ball", "cons
 @pytest.mark.parametrize("name", NEAR)  # not the runner: bounds between curved guards take seconds
 def test_a_run_is_near_its_reference(name: str) -> None:
     settings, bound = NEAR[name]
-    run = model(name).simulate(relaxation="1e-7", until=3, **settings)
-    found = hsdsl.distance(run, reference(model(name)), model=model(name))
+    run = shipped(name).simulate(relaxation="1e-7", until=3, **settings)
+    found = hsdsl.distance(run, reference(shipped(name)), model=shipped(name))
     assert found.upper <= bound
     assert found.upper - found.lower <= 0.02 * found.upper + 1e-12
 
@@ -140,7 +134,7 @@ def edited(folder: Path, *edits: tuple[str, str], name: str = "constrained-pendu
 def test_a_model_edited_in_its_words_keeps_its_reference(tmp_path: Path) -> None:
     changed = edited(tmp_path, ("title: Pendulum", "# a remark\ntitle: The pendulum"))
     run = reference(changed)
-    assert run.digest == changed.system.digest != model("constrained-pendulum").system.digest
+    assert run.digest == changed.system.digest != shipped("constrained-pendulum").system.digest
     assert hsdsl.distance(run, changed.simulate(until=1)).upper <= 1e-5
 
 
@@ -187,6 +181,6 @@ def test_nothing_known_is_said(tmp_path: Path) -> None:
     with pytest.raises(hsdsl.UsageError, match=r"no exact execution is known for block 0 of copy\.yaml\n"):
         reference(edited(tmp_path, ("heating", "warming"), name="thermostat"))
     with pytest.raises(hsdsl.UsageError, match="block 1 of thermostat"):
-        reference(model("thermostat"), 1)
+        reference(shipped("thermostat"), 1)
     with pytest.raises(hsdsl.UsageError, match="block -1 of thermostat"):
-        reference(model("thermostat"), -1)
+        reference(shipped("thermostat"), -1)

@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from references.digital_control import digital_control
 from references.impact_oscillator import Motion, exact_example_1, exact_example_2
+from shipped import MODELS, shipped
 
 import hsdsl
 
-MODELS = Path(__file__).parents[2] / "models"
 NAMES = sorted(path.stem for path in MODELS.glob("*.yaml"))
-
-
-@lru_cache
-def model(name: str) -> Any:
-    """A model of the folder, loaded once."""
-    return hsdsl.load(MODELS / f"{name}.yaml")
 
 
 @lru_cache
 def default(name: str) -> Any:
     """A model's own experiment, run once."""
-    return model(name).simulate()
+    return shipped(name).simulate()
 
 
 VERDICTS = {
@@ -60,7 +53,7 @@ OSCILLATORS = [
 def test_oscillator(name: str, exact: Any, step: str, relaxation: str, impacts: int | None, bound: float) -> None:
     """Largest position error at the samples (the paper's rho-hat), through both Zeno points in example 2."""
     solution: Motion = exact()
-    run = model(name).simulate(method="midpoint", step=step, relaxation=relaxation)
+    run = shipped(name).simulate(method="midpoint", step=step, relaxation=relaxation)
     assert impacts is None or len(run.transitions) == impacts == len(solution.impacts)
     assert np.max(np.abs(run.values[:, 0] - solution.at(run.times)[0])) <= bound
 
@@ -75,7 +68,7 @@ def corrected(run: Any) -> list[float]:
 
 
 def test_pendulum_switches_as_written() -> None:
-    run, exact = default("constrained-pendulum"), hsdsl.exact.reference(model("constrained-pendulum"))
+    run, exact = default("constrained-pendulum"), hsdsl.exact.reference(shipped("constrained-pendulum"))
     assert np.allclose(corrected(run), [t.time for t in exact.transitions], rtol=0, atol=1e-6)
 
 
@@ -87,7 +80,7 @@ RUNNER = {
 
 @pytest.mark.parametrize("w", RUNNER)
 def test_runner_events_as_written(w: str) -> None:
-    run = model("pronking-runner").simulate(initial={"w": w})
+    run = shipped("pronking-runner").simulate(initial={"w": w})
     assert run.stop.reason == "final"
     assert run.final.mode == "apex"
     assert np.allclose(corrected(run), RUNNER[w], rtol=0, atol=1e-6)
@@ -96,7 +89,7 @@ def test_runner_events_as_written(w: str) -> None:
 @pytest.mark.parametrize("relaxation", ["1e-8", "1e-5", "1e-2"])
 def test_runner_lands_on_both_legs_without_turning(relaxation: str) -> None:
     """One strip after the other, the second from where the first ended, so the symmetry theta = 0 is kept."""
-    run = model("pronking-runner").simulate(relaxation=relaxation)
+    run = shipped("pronking-runner").simulate(relaxation=relaxation)
     first, second = run.transitions[:2]
     assert (first.edge, first.alternatives) == ("aerial->left", ("aerial->right",))
     assert second.edge == "left->ground"
@@ -109,7 +102,7 @@ def test_runner_lands_on_both_legs_without_turning(relaxation: str) -> None:
 @pytest.mark.parametrize("w", RUNNER)
 def test_runner_keeps_its_energy(w: str) -> None:
     """Kinetic, potential and spring energy, m = I = l = d = 1, k = 30: at lift-off and touchdown springs are slack."""
-    run = model("pronking-runner").simulate(initial={"w": w}, tolerance="1e-12", relaxation="1e-9")
+    run = shipped("pronking-runner").simulate(initial={"w": w}, tolerance="1e-12", relaxation="1e-9")
 
     def energy(state: dict[str, float]) -> float:
         total = 9.81 * state["z"] + (state["vx"] ** 2 + state["vz"] ** 2 + state["w"] ** 2) / 2
@@ -138,7 +131,7 @@ def test_digital_control_from_beside_the_diagonal(dx: str, dy: str, path: list[i
 def default_beside(dx: str, dy: str) -> Any:
     """The run from (-1 - dx, -1 - dy), relaxation 1e-4."""
     start = {"x": f"-1 - {dx}", "y": f"-1 - {dy}"}
-    return model("digital-control").simulate(scheme="relaxed", relaxation="1e-4", initial=start)
+    return shipped("digital-control").simulate(scheme="relaxed", relaxation="1e-4", initial=start)
 
 
 def test_digital_control_on_the_diagonal_says_what_it_passed_over() -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
+from shipped import assert_golden
 from switch_times import BY_NAME
 
 import hsdsl
@@ -13,12 +13,6 @@ from hsdsl.cli.verbs import obey
 from hsdsl.spaceex import imported
 
 FOLDER = Path(__file__).parent
-
-
-def same_as_golden(text: str, path: Path) -> None:
-    if os.environ.get("HSDSL_WRITE_GOLDEN"):
-        path.write_text(text, encoding="utf-8")
-    assert text == path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -33,7 +27,7 @@ def test_switches_at_the_exact_times(name: str) -> None:
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_text_is_readable_and_stays(name: str) -> None:
-    same_as_golden(imported(FOLDER / f"{name}.xml"), FOLDER / "golden" / f"{name}.yaml")
+    assert_golden(imported(FOLDER / f"{name}.xml"), FOLDER / "golden" / f"{name}.yaml")
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -52,4 +46,4 @@ def test_says_what_cannot_be_kept(
     assert obey(["import", case.name, "--until", "1"]) in (1, 2)
     out, err = capsys.readouterr()
     assert out == "" and "Traceback" not in err
-    same_as_golden(err, case.with_suffix(".txt"))
+    assert_golden(err, case.with_suffix(".txt"))
