@@ -11,8 +11,6 @@ from hsdsl.chart import PEERS, Refused
 from hsdsl.chart.outcome import Outcome, Tolerance, outcome
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.plan import relaxation
-from hsdsl.chart.result import Result
-from hsdsl.chart.scene import sampled
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.model.options import OWN_FORMULA
@@ -88,9 +86,9 @@ def _own(entry: Entry, setting: Setting) -> Outcome:
         options["relaxation"] = relaxation(setting.method, setting.tolerance or setting.step or 0) * min(1, entry.until)
     engine = setting.tool.removeprefix("hsdsl ")
     run = entry.model.simulate(**options, engine=engine, max_transitions=MOST)
-    values, modes = sampled(run, scene.grid, scene.states)
-    problem = None if run.stop.complete else f"{run.stop.reason}: {run.stop.message}"
-    result = Result(values, modes, lambda: run.made, problem, run)
+    result = scene.result(run)
+    if result.problem:
+        result = replace(result, problem=f"{run.stop.reason}: {result.problem}")
     return outcome(scene, result, WITHIN, run.estimated().verdict)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.result import Attempt, Refused, Result
-from hsdsl.chart.scene import Scene, sampled
+from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.integrators import METHODS
@@ -83,7 +83,4 @@ def _simulate(scene: Scene, until: float, options: dict[str, Any]) -> Execution:
 
 
 def _run(scene: Scene, options: dict[str, Any]) -> Result:
-    execution = _simulate(scene, float(scene.grid[-1]), options)
-    values, modes = sampled(execution, scene.grid, scene.states)
-    problem = None if execution.stop.complete else execution.stop.message
-    return Result(values, modes, lambda: execution.made, problem, execution)
+    return scene.result(_simulate(scene, float(scene.grid[-1]), options))

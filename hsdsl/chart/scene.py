@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from hsdsl.chart.result import Array, Result
 from hsdsl.errors import UsageError
 from hsdsl.exact import precise, reference
 from hsdsl.execution import Execution
 from hsdsl.model import Model
 from hsdsl.names import did_you_mean
 
-Array = npt.NDArray[Any]
 DIGITS = 8  # of a refined reference: each takes longer than the one before
 
 
@@ -115,6 +114,12 @@ class Scene:
             modes(),
             _countable(exact, jumps, end - clearance),
         )
+
+    def result(self, execution: Execution) -> Result:
+        """An execution by hsdsl as the result of a tool."""
+        values, modes = sampled(execution, self.grid, self.states)
+        problem = None if execution.stop.complete else execution.stop.message
+        return Result(values, modes, lambda: execution.made, problem, execution)
 
 
 def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[Array, Callable[[], Array]]:

@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import Any
 
 from hsdsl.elaborate.edges import known_mode
-from hsdsl.elaborate.symbols import SymbolTable, cycle_among
+from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.errors import STEP_AND_TOLERANCE
 from hsdsl.expression.scope import Scope, Value, state
 from hsdsl.expression.syntax import Name, walk
+from hsdsl.graphs import cycle
 from hsdsl.names import SINCE, closest, did_you_mean, shown
 from hsdsl.parts import for_all, meant, of_all
 from hsdsl.source import ABSENT, Key, Scalar
@@ -44,12 +45,12 @@ def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:
         name: [] if tree is None else [n.name for n in walk(tree) if isinstance(n, Name) and n.name in trees]
         for name, tree in trees.items()
     }
-    while (cycle := cycle_among(uses)) is not None:
-        path = " -> ".join((*cycle, cycle[0]))
-        place = next(scalar.place for key, scalar in given.items() if key == cycle[0])
-        message = f"the initial value of '{cycle[0]}' is defined by itself: {path}"
+    while (found := cycle(uses)) is not None:
+        path = " -> ".join((*found, found[0]))
+        place = next(scalar.place for key, scalar in given.items() if key == found[0])
+        message = f"the initial value of '{found[0]}' is defined by itself: {path}"
         symbols.report(place, "HS302", message, "give one of them by numbers and parameters")
-        for name in cycle:
+        for name in found:
             del uses[name]
     ordered: list[str] = []
     while waiting := [name for name in uses if name not in ordered]:

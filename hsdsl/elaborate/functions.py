@@ -7,9 +7,10 @@ from collections import ChainMap
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable, cycle_among
+from hsdsl.elaborate.symbols import KINDS, Meanings, SymbolTable
 from hsdsl.expression import parse
 from hsdsl.expression.scope import Function, Meaning, Refusal, Scope, Value, functions_called, symbol
+from hsdsl.graphs import cycle
 from hsdsl.schema import FunctionDocument
 from hsdsl.source import ABSENT, Key
 from hsdsl.system import FunctionText
@@ -78,10 +79,10 @@ def _spoil(symbols: SymbolTable, function: Function) -> None:
 
 def _refuse_cycles(symbols: SymbolTable, made: Mapping[str, Function]) -> None:
     calls = {name: tuple(functions_called(f.tree)) if f.tree is not None else () for name, f in made.items()}
-    while (cycle := cycle_among(calls)) is not None:
-        message = f"`{cycle[0]}` is defined by itself: {' -> '.join((*cycle, cycle[0]))}"
-        symbols.report(_key(symbols, cycle[0]).place, "HS302", message, "no function may lead back to itself")
-        for name in cycle:
+    while (found := cycle(calls)) is not None:
+        message = f"`{found[0]}` is defined by itself: {' -> '.join((*found, found[0]))}"
+        symbols.report(_key(symbols, found[0]).place, "HS302", message, "no function may lead back to itself")
+        for name in found:
             calls[name] = ()
             _spoil(symbols, made[name])
 

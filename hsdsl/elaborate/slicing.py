@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import sympy as sp
 
+from hsdsl.graphs import closure
 from hsdsl.system import Edge, HybridSystem, Mode, started
 
 Node = tuple[str, str]  # a mode and one of its states
@@ -22,7 +23,7 @@ Node = tuple[str, str]  # a mode and one of its states
 def only(system: HybridSystem, given: Iterable[str]) -> HybridSystem:
     """The system with the given states and outputs and what they need; all transitions stay."""
     names = frozenset(given)
-    needed = _needed(system, names)
+    needed = closure(_roots(system, names), _uses(system).__getitem__)
     if all((mode.name, state) in needed for mode in system.modes for state in mode.states):
         return system
     outputs = [k for k, name in enumerate(system.outputs) if name in names]
@@ -47,18 +48,6 @@ def left_out(system: HybridSystem, reduced: HybridSystem) -> tuple[str, ...]:
             s if s not in reduced.states else f"{s} in {mode.name}" for s in mode.states if s not in smaller.states
         ]
     return tuple(dict.fromkeys(gone))
-
-
-def _needed(system: HybridSystem, names: frozenset[str]) -> set[Node]:
-    uses = _uses(system)
-    needed: set[Node] = set()
-    waiting = list(_roots(system, names))
-    while waiting:
-        node = waiting.pop()
-        if node not in needed:
-            needed.add(node)
-            waiting += uses[node]
-    return needed
 
 
 def _roots(system: HybridSystem, names: frozenset[str]) -> Iterator[Node]:

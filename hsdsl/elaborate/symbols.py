@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -158,23 +158,6 @@ class SymbolTable:
     def without_states(self, mode: ModeDocument) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""
         return mode.final and mode.flow is None
-
-
-def cycle_among(uses: Mapping[str, Iterable[str]]) -> list[str] | None:
-    """Names of which each uses the next, and the last one the first; None where there are none."""
-    done: set[str] = set()
-
-    def search(name: str, path: list[str]) -> list[str] | None:
-        if name in path:
-            return path[path.index(name) :]
-        if name in done:
-            return None
-        found = (search(other, [*path, name]) for other in uses[name] if other in uses)
-        cycle = next((cycle for cycle in found if cycle), None)
-        done.add(name)
-        return cycle
-
-    return next((cycle for name in uses if (cycle := search(name, []))), None)
 
 
 def definition_order(keys: Iterable[Key], kind: str, refused: Meanings) -> Iterator[Key]:

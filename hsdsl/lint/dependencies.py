@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
+from hsdsl.graphs import closure
 from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.schema import ModelDocument
 from hsdsl.system import HybridSystem
 
 _DEFINING = ("parameter", "function", "input", "let")
 _SETTINGS = ("until", "step", "tolerance", "relaxation", "max_transitions")
-T = TypeVar("T")
-
-
-def closure(starts: Iterable[T], following: Callable[[T], Iterable[T]]) -> set[T]:
-    """Everything that is reached from some starts."""
-    reached: set[T] = set()
-    waiting = list(starts)
-    while waiting:
-        item = waiting.pop()
-        if item not in reached:
-            reached.add(item)
-            waiting.extend(following(item))
-    return reached
 
 
 class Definition(NamedTuple):

@@ -9,7 +9,7 @@ import re
 from collections import abc
 from collections.abc import Iterator
 
-from hsdsl.lint.dependencies import closure
+from hsdsl.graphs import closure
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
 from hsdsl.schema import AutomatonDocument, SystemDocument

@@ -15,8 +15,9 @@ from hsdsl.errors import Span
 from hsdsl.expression import parse, symbolic
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.syntax import Tree
+from hsdsl.graphs import closure
 from hsdsl.lint.analysis.dynamics import Dynamics
-from hsdsl.lint.dependencies import Definition, Influence, closure, influence, unused
+from hsdsl.lint.dependencies import Definition, Influence, influence, unused
 from hsdsl.lint.numbers import Number, evaluate, rational, sample_at
 from hsdsl.lint.source_expressions import SourceExpression, written
 from hsdsl.lint.units.model import Units

@@ -10,8 +10,8 @@ from typing import Any
 
 from hsdsl.chart.outcome import Outcome, Tolerance, outcome
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Refused, Result
-from hsdsl.chart.scene import Scene, sampled
+from hsdsl.chart.result import Refused
+from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.exact import reference
 from hsdsl.execution import Execution
@@ -122,9 +122,7 @@ class Bench:
         given |= {key: value for key, value in arguments.items() if key not in given}
         chosen = {"scheme": tool.scheme or None, "method": tool.method or None, "settings": self.base.get("settings")}
         run = self.model.simulate(**chosen, **given)
-        values, modes = sampled(run, scene.grid, scene.states)
-        problem = None if run.stop.complete else run.stop.message
-        found = outcome(scene, Result(values, modes, lambda: run.made, problem, run), WITHIN)
+        found = outcome(scene, scene.result(run), WITHIN)
         cell = _cell(scene, found, run.stop.reason)
         if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
             cell = replace(cell, word=OTHER, why="other transitions")

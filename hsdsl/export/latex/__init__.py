@@ -13,6 +13,7 @@ from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
 from hsdsl.expression.plain import names_in
 from hsdsl.expression.scope import state
+from hsdsl.graphs import closure
 from hsdsl.system import Edge, HybridSystem, Mode
 
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
@@ -122,13 +123,8 @@ def _where(system: HybridSystem, mode: str | None, texts: Iterable[str], math: M
     """The definitions that texts use and that are a mode's own, or the whole model's, in the file's order."""
     known = {d.name: d for d in system.definitions if d.mode is None}
     known |= {d.name: d for d in system.definitions if mode is not None and d.mode == mode}
-    waiting = [name for text in texts for name in names_in(text)]
-    needed: set[str] = set()
-    while waiting:
-        name = waiting.pop()
-        if name in known and name not in needed:
-            needed.add(name)
-            waiting += names_in(known[name].text)
+    named = (name for text in texts for name in names_in(text))
+    needed = closure(named, lambda name: names_in(known[name].text) if name in known else ())
     used = [definition for definition in known.values() if definition.name in needed and definition.mode == mode]
     return equations([(math.name(d.name), math.expression(d.text)) for d in used])
 

@@ -13,6 +13,7 @@ from hsdsl.backends.c.printer import literal
 from hsdsl.defaults import DEFAULTS
 from hsdsl.export.c.text import array, function
 from hsdsl.export.parameters import derived, used_by, with_sources
+from hsdsl.graphs import closure
 from hsdsl.program import Program
 from hsdsl.simulate import Problem
 from hsdsl.simulate.control import LARGEST_SHARE
@@ -52,16 +53,19 @@ def fixed(problem: Problem) -> set[str]:
     used, bodies = used_by(program), switching_bodies(program)
     direct: set[int] = set(used["tolerance"]) if by_file(problem, "tolerance") else set()
     curved = [i for i in range(len(program.switches)) if f"line_{i}" not in bodies]
-    waiting = [int(k) for i in curved for k in _DATA.findall(bodies[f"argument_{i}"])]
     parameters, inputs = len(program.parameters), 3 * len(program.inputs)
-    while waiting:
-        k = waiting.pop()
+
+    def named(switch: int) -> list[int]:
+        return [int(k) for k in _DATA.findall(bodies[f"argument_{switch}"])]
+
+    def within(k: int) -> Iterable[int]:
+        return () if k < parameters + inputs else named(k - parameters - inputs)
+
+    for k in closure((k for i in curved for k in named(i)), within):
         if k < parameters:
             direct.add(k)
         elif k < parameters + inputs:
             direct |= used.get(f"input_{(k - parameters) // 3}", set())
-        else:
-            waiting += map(int, _DATA.findall(bodies[f"argument_{k - parameters - inputs}"]))
     if curved and by_file(problem, "until"):
         direct |= used["until"]
     return {program.parameters[i] for i in with_sources(program, used, derived(problem), direct)}

@@ -14,8 +14,8 @@ from typing import Any
 import sympy as sp
 
 from hsdsl import functions
+from hsdsl.graphs import closure
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, negative, zero
-from hsdsl.lint.dependencies import closure
 
 MOST = 32
 _SIGNS = (functions.sign, sp.sign)
