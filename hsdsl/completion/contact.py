@@ -22,12 +22,15 @@ from hsdsl.completion.nearby import (
     along,
     cancelled,
     fixed_point,
+    jacobian,
     mode_of_part,
+    product,
     rank,
     symbols,
     value_at,
 )
 from hsdsl.completion.printer import text_of
+from hsdsl.expression.derivatives import derivative
 from hsdsl.system import TIME, Edge, Mode, Surface
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
@@ -116,26 +119,26 @@ def _constrained(near: Nearby):
         return None
     moved, own = near.moved, [near.states[i] for i in near.changed]
     among = list(dict.fromkeys((*near.among(sp.Tuple(*moved)), *own)))
-    slopes = moved.jacobian(among)
-    own = moved.jacobian(own)
+    slopes, own = jacobian(moved, among), jacobian(moved, own)
     count = rank(own, at)
     if not 0 < count <= MOST_DIRECTIONS or rank(slopes, at) > count:
         return None
     part, size = sp.eye(len(near.changed)), sp.trace(own)
     for k in range(2, count + 1):  # Faddeev and LeVerrier: own part / size projects along the reset's directions
-        part = own * part - size * sp.eye(len(near.changed))
-        size = sp.trace(own * part) / k
+        part = product(own, part) - size * sp.eye(len(near.changed))
+        size = sp.trace(product(own, part)) / k
     if abs(value_at(size, at)) <= SMALL:  # the reset does not contract: a shear
         return None
     rows: dict[int, sp.Expr] = {}
-    for i, correction in zip(near.changed, part * slopes * sp.Matrix(list(map(near.flow, among))), strict=True):
+    part, away = product(part, slopes), product(part, moved)
+    for i, correction in zip(near.changed, product(part, sp.Matrix(list(map(near.flow, among)))), strict=True):
         rows[i] = cancelled(near.flow(near.states[i]) - correction / size)
     projection: dict[int, dict[sp.Symbol, sp.Expr]] = {}
-    for i, shares in zip(near.changed, (part * slopes).tolist(), strict=True):
+    for i, shares in zip(near.changed, part.tolist(), strict=True):
         found = {x: cancelled(share / size) for x, share in zip(among, shares, strict=True)}
         projection[i] = {x: share for x, share in found.items() if share != 0}
     landing = list[sp.Expr](near.states)
-    for i, correction in zip(near.changed, part * moved, strict=True):
+    for i, correction in zip(near.changed, away, strict=True):
         landing[i] = cancelled(landing[i] - correction / size)
     return rows, projection, tuple(landing), at
 
@@ -145,9 +148,9 @@ def _push(near: Nearby, at: Point):
     rate = near.along(near.guard)
     moved = {near.states[i]: change for i, change in zip(near.changed, near.moved, strict=True)}
     for order, value in ((1, near.guard), (2, rate)):
-        slopes = [(sp.diff(value, x), moved[x]) for x in near.among(value) if x in moved]
+        slopes = [(derivative(value, x), moved[x]) for x in near.among(value) if x in moved]
         by = near.among(sp.Tuple(*(change for _, change in slopes)))
-        back = [sum(g * sp.diff(change, y) for g, change in slopes) for y in by if y != TIME]
+        back = [sum(g * derivative(change, y) for g, change in slopes) for y in by if y != TIME]
         if any(abs(value_at(b, at)) > SMALL for b in back):
             return cancelled(near.along(value)), order
     return rate, None

@@ -13,6 +13,7 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.expression.derivatives import derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode
@@ -20,7 +21,7 @@ from hsdsl.system import TIME, Edge, Mode
 SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
 MOST_ROUNDS = 50  # of Newton's method
 MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
-LONG = 200  # operations, from which on a term is not simplified
+LONG = 400  # nodes, from which on a term is not simplified
 Point = dict[sp.Symbol, float]
 
 
@@ -104,14 +105,15 @@ def mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integ
 
 def along(value: sp.Expr, among: Sequence[sp.Symbol], flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
     """The derivative of an expression of ``among`` along a flow."""
-    return sp.Add(*(sp.diff(value, x) * flow(x) for x in among))
+    return sp.Add(*(derivative(value, x) * flow(x) for x in among))
 
 
 def cancelled(value: sp.Expr) -> sp.Expr:
     """The same expression, simpler where that is cheap, without SymPy's polynomials: they compile code of their own."""
-    value = sp.signsimp(sp.sympify(value))
-    if value.count_ops() > LONG:
+    value = sp.sympify(value)
+    if size((value,)) > LONG:
         return value
+    value = sp.signsimp(value)
     over, under = value.as_numer_denom()
     over = sp.expand(over)
     shorter = sp.factor_terms(over) / sp.factor_terms(under)
@@ -125,7 +127,7 @@ def fixed_point(near: Nearby) -> Point | None:
     names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
     draw = random.Random(1)
     at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
-    slopes = sp.Matrix(equations).jacobian(free) if free else sp.zeros(len(equations), 0)
+    slopes = jacobian(equations, free)
     for _ in range(MOST_ROUNDS):
         values = [value_at(e, at) for e in equations]
         if not all(map(math.isfinite, values)):
@@ -138,15 +140,47 @@ def fixed_point(near: Nearby) -> Point | None:
     return None
 
 
+def jacobian(values: Sequence[sp.Expr], among: Sequence[sp.Symbol]) -> sp.Matrix:
+    """The derivatives of values by symbols, a row for each value."""
+    return sp.Matrix(len(values), len(among), [derivative(value, x) for value in values for x in among])
+
+
+def product(left: sp.Matrix, right: sp.Matrix) -> sp.Matrix:
+    """The product of two matrices; of zero times an entry, SymPy asks at length whether that is finite."""
+
+    def entry(i: int, j: int) -> sp.Expr:
+        pairs = ((left[i, k], right[k, j]) for k in range(left.cols))
+        return sp.Add(*(x * y for x, y in pairs if x != 0 and y != 0))
+
+    return sp.Matrix(left.rows, right.cols, entry)
+
+
 def value_at(value: sp.Expr, at: Point) -> float:
     """The value of an expression at a point; not-a-number where it has none."""
-    number = sp.sympify(value)
-    number = number.xreplace({name: sp.Float(at[name]) for name in number.free_symbols if name in at}).evalf()
-    return float(number) if number.is_Number and number.is_real else math.nan
+    return _number(sp.sympify(value), dict(at))
+
+
+def _number(expr: sp.Basic, known: dict[sp.Basic, float]) -> float:
+    """The value of an expression, whose parts are each computed once."""
+    if expr not in known:
+        known[expr] = _computed(expr, [_number(part, known) for part in expr.args])
+    return known[expr]
+
+
+def _computed(expr: sp.Basic, parts: list[float]) -> float:
+    try:
+        if expr.is_Add or expr.is_Mul:
+            return math.fsum(parts) if expr.is_Add else math.prod(parts)
+        made = expr.func(*map(sp.Float, parts)) if parts else expr
+        number = made.evalf() if isinstance(made, sp.Expr) else made
+        return float(number) if number.is_Number and number.is_real else math.nan
+    except (TypeError, ValueError, ArithmeticError):
+        return math.nan
 
 
 def _values_at(matrix: sp.Matrix, at: Point) -> list[list[float]]:
-    return [[value_at(value, at) for value in row] for row in matrix.tolist()]
+    known: dict[sp.Basic, float] = dict(at)
+    return [[_number(value, known) for value in row] for row in matrix.tolist()]
 
 
 def rank(matrix: sp.Matrix, at: Point) -> int:

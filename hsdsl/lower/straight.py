@@ -8,14 +8,13 @@ derivative or a text without end. After the cut every one of these costs as much
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
-from itertools import accumulate, count
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate
 
 import sympy as sp
 
-from hsdsl.functions import below, floor, rebuilt, sign, solution
+from hsdsl.expression.derivatives import derivative, moving
+from hsdsl.functions import rebuilt, solution
 from hsdsl.lower.elimination import solved
 from hsdsl.lower.printer import LARGEST_PRODUCT
 from hsdsl.system import TIME
@@ -47,7 +46,7 @@ class Cut:
         self._powers = powers
         self.statements: list[Statement] = []
         self._letter = letter
-        self._numbers: Iterator[int] = count()
+        self._names: dict[sp.Basic, sp.Symbol] = {}
         self._done: dict[sp.Basic, tuple[sp.Basic, int]] = {}
         self._solutions: dict[tuple, list[sp.Basic]] = {}
 
@@ -55,10 +54,11 @@ class Cut:
         """Give an expression a name of its own, unless it is a name or a number."""
         if expr.is_Atom:
             return expr
-        real = {"real": True} if isinstance(expr, sp.Expr) else {}
-        symbol = sp.Symbol(f"{self._letter}{next(self._numbers)}", **real)
-        self.statements.append((symbol, expr))
-        return symbol
+        if expr not in self._names:
+            real = {"real": True} if isinstance(expr, sp.Expr) else {}
+            self._names[expr] = sp.Symbol(f"{self._letter}{len(self.statements)}", **real)
+            self.statements.append((self._names[expr], expr))
+        return self._names[expr]
 
     def down(self, expr: sp.Basic) -> sp.Basic:
         """Return the same expression with names for parts that are too large to be written out."""
@@ -138,41 +138,6 @@ class Gradient:
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
         return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
-
-
-@lru_cache(maxsize=4096)  # memory of events has many conditions, which only jump
-def moving(expr: sp.Basic) -> frozenset[Any]:
-    """The symbols outside of what only jumps: by the others the derivative is zero."""
-    if expr.is_Symbol:
-        return frozenset((expr,))
-    if isinstance(expr, (sign, floor)):
-        return frozenset()
-    parts = expr.args[2:] if isinstance(expr, below) else expr.args
-    return frozenset().union(*map(moving, parts))
-
-
-@lru_cache(maxsize=1 << 14)  # the modes of a large model have most of their derivatives in common
-def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """The derivative of an expression by a symbol: that of SymPy, which asks of every part of it whether it is zero."""
-    if symbol not in moving(expr):
-        return sp.S.Zero
-    if expr.is_Symbol:
-        return sp.S.One
-    if isinstance(expr, below):
-        return below(*expr.args[:2], *(derivative(choice, symbol) for choice in expr.args[2:]))
-    ordinary = type(expr)._eval_derivative is sp.Function._eval_derivative  # by the chain rule
-    if not (expr.is_Add or expr.is_Mul or ordinary or (expr.is_Pow and expr.exp.is_Number)):
-        return expr.diff(symbol)
-    slopes = [(i, slope) for i, part in enumerate(expr.args) if (slope := derivative(part, symbol)) != 0]
-    if not slopes:
-        return sp.S.Zero
-    if expr.is_Pow:
-        return expr * (slopes[0][1] * expr.exp / expr.base)
-    if ordinary:
-        return sp.Add(*(expr.fdiff(i + 1) * slope for i, slope in slopes))
-    if expr.is_Mul:
-        return sp.Add(*(sp.Mul(*expr.args[:i], slope, *expr.args[i + 1 :]) for i, slope in slopes))
-    return sp.Add(*(slope for _, slope in slopes))
 
 
 def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:

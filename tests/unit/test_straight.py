@@ -10,8 +10,9 @@ import sympy as sp
 from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
+from hsdsl.expression.derivatives import derivative
 from hsdsl.functions import absolute, atan2, below, cosh, floor, maximum, minimum, sign, sinh, tanh
-from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient, derivative
+from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient
 from hsdsl.model import Model
 
 MANY = multiprecision(60)
