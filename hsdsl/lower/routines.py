@@ -11,6 +11,7 @@ from functools import lru_cache
 import sympy as sp
 
 from hsdsl.lower.printer import KernelPrinter
+from hsdsl.lower.sharing import shared
 from hsdsl.lower.straight import Cut, Statement, in_order
 from hsdsl.program import Routines
 
@@ -57,7 +58,7 @@ def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[l
     given = [(symbol, cut.down(expr)) for symbol, expr in statements]
     small = [cut.down(expr) for expr in map(sp.sympify, results)]
     known = [*given, *cut.statements]
-    common, reduced = sp.cse([*(e for _, e in known), *small], symbols=sp.numbered_symbols("w", real=True))
+    common, reduced = shared([*(e for _, e in known), *small], "w")
     last = tuple(reduced)[len(known) :]
     named = zip((symbol for symbol, _ in known), reduced, strict=False)
     return in_order([*common, *named], sp.Tuple(*last)), last

@@ -52,6 +52,7 @@ class _Writer:
     def __init__(self, states) -> None:
         self._known = {TIME: 0} | {s: i for i, s in enumerate(states, 1)}
         self._moving = set(self._known)
+        self._constant: dict[sp.Basic, bool] = {}
         self._first = len(self._known)
         self._numbers: dict[sp.Expr, int] = {}
         self._written: dict[Operation, int] = {}
@@ -109,7 +110,11 @@ class _Writer:
         return self.line(unknown.xreplace(fixed))
 
     def _is_constant(self, expr) -> bool:
-        return not (expr.free_symbols & self._moving)
+        if not expr.args:
+            return expr not in self._moving
+        if expr not in self._constant:
+            self._constant[expr] = all(map(self._is_constant, expr.args))
+        return self._constant[expr]
 
     def _operation(self, kind: str, *lines: int, constant=None) -> int:
         number = None
