@@ -23,6 +23,7 @@ try:
     COMPILER = True
 except NoCompiler:
     COMPILER = False
+ENGINES = ("python", "c") if COMPILER else ("python",)
 needs_compiler = pytest.mark.skipif(not COMPILER, reason="there is no C compiler here")
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import ENGINES
 
 from hsdsl.elaborate import elaborate
 from hsdsl.model import Model
@@ -39,7 +39,6 @@ RELAXED: list[dict[str, Any]] = [
     {"method": "dopri5", "step": 0.012},
 ]
 SETTINGS = [("located", s) for s in LOCATED] + [("relaxed", s) for s in RELAXED]
-ENGINES = ("python", "c") if COMPILER else ("python",)
 
 
 class TooClose(Exception):

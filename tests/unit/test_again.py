@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER, alike, needs_compiler
+from engines import ENGINES, alike, needs_compiler
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.model.call_cache import CallCache, call_key
 
 MODELS = Path(__file__).parents[2] / "models"
-ENGINES = ("python", "c") if COMPILER else ("python",)
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"scheme": "relaxed", "method": "dopri5", "tolerance": 1e-6, "until": 10}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from engines import COMPILER, assert_engines_agree, needs_compiler
+from engines import ENGINES, assert_engines_agree, needs_compiler
 
 import hsdsl
 
@@ -22,7 +22,6 @@ initial: {mode: low, x: 0}
 experiment: {until: 3*period}
 """
 PLAIN = "hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n"
-ENGINES = ["python", *(["c"] if COMPILER else [])]
 
 
 def inputs(**outputs: str) -> Any:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER, needs_compiler
+from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl.elaborate import elaborate
@@ -20,7 +20,6 @@ from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
-ENGINES = ("python", "c") if COMPILER else ("python",)
 FAST = {"method": "dopri5", "tolerance": 1e-6, "until": 12}
 
 

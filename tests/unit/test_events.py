@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import COMPILER, ENGINES
 
 import hsdsl
 import hsdsl.store
@@ -21,7 +21,6 @@ from hsdsl.report.model import model_html
 from hsdsl.report.summary import summary
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
-ENGINES = ["python", *(["c"] if COMPILER else [])]
 
 
 def model(flow: str, transitions: str, initial: str, until: str = "10"):

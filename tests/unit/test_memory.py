@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl.errors import UsageError
@@ -15,7 +15,6 @@ from hsdsl.simulate import output_buffers
 
 MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
-ENGINES = ["python", *(["c"] if COMPILER else [])]
 LONG = {
     "located": {"step": 1e-12, "method": "dopri5"},
     "relaxed": {"step": 1e-12, "method": "rk4", "scheme": "relaxed"},
@@ -56,7 +55,7 @@ def test_rows_of_many_states_are_counted_by_their_size(engine, tmp_path):
     assert run.values.nbytes + run.coefficients.nbytes < 30_000_000
 
 
-@pytest.mark.skipif("c" not in ENGINES, reason="no compiler")
+@needs_compiler
 def test_memory_that_is_refused_by_the_system_ends_a_run_as_well(monkeypatch):
     opened = []
 
@@ -75,7 +74,7 @@ def test_memory_that_is_refused_by_the_system_ends_a_run_as_well(monkeypatch):
     assert run.stop.reason == "memory_limit" and run.times[-1] == run.stop.time > 0
 
 
-@pytest.mark.skipif("c" not in ENGINES, reason="no compiler")
+@needs_compiler
 def test_a_streamed_run_has_no_such_limit(tmp_path):
     model = hsdsl.load(OSCILLATOR, limits=Limits(memory=100_000))
     run = model.stream(tmp_path / "run.csv", step=1e-5, until=1, every=10_000, method="rk4")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER, assert_engines_agree, needs_compiler
+from engines import ENGINES, assert_engines_agree, needs_compiler
 
 import hsdsl
 from hsdsl.report import as_json, dumps
@@ -16,7 +16,6 @@ from hsdsl.store import load
 
 CASE = Path(__file__).parent.parent / "conformance" / "cases" / "outputs-of-modes.yaml"
 OF_A, OF_B = ("stretch", "pull"), ("swing",)
-ENGINES = ["python", *(["c"] if COMPILER else [])]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -51,7 +50,7 @@ def test_asked_for_alone(engine):
     assert alone.final.outputs["power"] == whole.final.outputs["power"]
 
 
-@pytest.mark.skipif(not COMPILER, reason="compiled engine")
+@needs_compiler
 def test_in_ensembles_and_streams(tmp_path):
     model = hsdsl.load(CASE)
     many = model.ensemble(parameters={"k": [1, 3]}, until=1.5, samples=[0.5, 1.25])

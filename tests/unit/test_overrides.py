@@ -8,7 +8,7 @@ from fractions import Fraction
 import mpmath as mp
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import COMPILER, ENGINES
 
 import hsdsl
 from hsdsl.cli import main
@@ -26,7 +26,6 @@ modes:
 initial: {mode: m, x: 0, v: 1}
 experiment: {until: 3, step: 0.1, method: rk4, scheme: located}
 """
-ENGINES = ["python", *(["c"] if COMPILER else [])]
 
 
 @pytest.fixture

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER
+from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl.elaborate.product import flat_part
 from hsdsl.simulate.verdict.run_view import RunView
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
-ENGINES = ("python", *(["c"] if COMPILER else []))
 WAYS = [
     {},
     {"method": "dopri5", "tolerance": 1e-8},
@@ -76,7 +75,7 @@ def test_parts_have_the_execution_of_their_product(way, engine):
     assert run.verdict == flat.verdict
 
 
-@pytest.mark.skipif(not COMPILER, reason="no compiler")
+@needs_compiler
 @pytest.mark.parametrize("name", ["runner", "centipede"])
 @pytest.mark.parametrize("way", [{}, {"scheme": "relaxed", "relaxation": 1e-3}], ids=["located", "relaxed"])
 def test_engines_agree_to_the_last_bit(name, way):
@@ -220,24 +219,28 @@ def test_automata_in_files(tmp_path):
 
 
 HEAD = "hsdsl: 1\nexperiment: {until: 1}\n"
+CLOCK = "automata: {a: {modes: {m: {flow: {x: 1}}}}}\n"
+ONE = "system: {p: {automaton: a, initial: {x: 0}}}\n"
 REFUSED = {
-    "HS350 automaton": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: b, initial: {x: 0}}}",
-    "HS351 connected": (
-        "automata: {a: {inputs: [u], modes: {m: {flow: {x: u}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
-    ),
+    "HS350 automaton": CLOCK + "system: {p: {automaton: b, initial: {x: 0}}}",
+    "HS351 connected": "automata: {a: {inputs: [u], modes: {m: {flow: {x: u}}}}}\n" + ONE,
     "HS352 q.y -> q.u -> p.y": (
-        "automata: {a: {inputs: [u], let: {y: 2*u}, modes: {m: {flow: {x: y}}}}}\nsystem:\n"
-        "  p: {automaton: a, initial: {x: 0}, inputs: {u: q.y}}\n  q: {automaton: a, initial: {x: 0}, inputs: {u: p.y}}"
+        "automata: {a: {inputs: [u], let: {y: 2*u}, modes: {m: {flow: {x: y}}}}}\n"
+        "system:\n"
+        "  p: {automaton: a, initial: {x: 0}, inputs: {u: q.y}}\n"
+        "  q: {automaton: a, initial: {x: 0}, inputs: {u: p.y}}"
     ),
     "HS354 force": (
         "automata: {a: {modes: {m: {flow: {x: 1}, let: {force: 1}, transitions: [{when: x >= 1, to: n}]}, "
         "n: {flow: {x: 0}}}}}\n"
-        "system: {p: {automaton: a, initial: {mode: m, x: 0}}}\nlet: {total: sum(a.force)}"
+        "system: {p: {automaton: a, initial: {mode: m, x: 0}}}\n"
+        "let: {total: sum(a.force)}"
     ),
-    "HS111 speed": "automata: {a: {modes: {m: {flow: {x: speed}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}",
-    "HS111 q.x": "automata: {a: {modes: {m: {flow: {x: q.x}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}",
+    "HS111 speed": "automata: {a: {modes: {m: {flow: {x: speed}}}}}\n" + ONE,
+    "HS111 q.x": "automata: {a: {modes: {m: {flow: {x: q.x}}}}}\n" + ONE,
     "HS353 fire together": (
-        "automata:\n  a: {modes: {m: {flow: {x: 1}, transitions: [{name: go, when: x >= 1, reset: {x: 0, q.x: 1}}]}}}\n"
+        "automata:\n"
+        "  a: {modes: {m: {flow: {x: 1}, transitions: [{name: go, when: x >= 1, reset: {x: 0, q.x: 1}}]}}}\n"
         "  b: {modes: {m: {flow: {x: 1}, transitions: [{on: p.go, reset: {x: 2}}]}}}\n"
         "system: {p: {automaton: a, initial: {x: 0}}, q: {automaton: b, initial: {x: 0}}}"
     ),
@@ -246,76 +249,54 @@ REFUSED = {
         "system: {p: {automaton: a, initial: {x: 0}}, q: {automaton: a, initial: {x: 0}}}"
     ),
     "HS353 twice": (
-        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, reset: {x: 0, p.x: 1}}]}}}}\n"
-        "system: {p: {automaton: a, initial: {x: 0}}}"
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, reset: {x: 0, p.x: 1}}]}}}}\n" + ONE
     ),
     "HS353 itself": (
         "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: p.go, reset: {x: 1}}, "
-        "{name: go, when: x >= 1, reset: {x: 0}}]}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
+        "{name: go, when: x >= 1, reset: {x: 0}}]}}}}\n" + ONE
     ),
     "HS323 persistent": (
-        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, persistent: false, reset: {x: 0}}]}}}}\n"
-        "system: {p: {automaton: a, initial: {x: 0}}}"
+        "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, persistent: false, "
+        "reset: {x: 0}}]}}}}\n" + ONE
     ),
-    "HS301 also a parameter": (
-        "automata: {a: {parameters: {x: 2}, modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
-    ),
+    "HS301 also a parameter": "automata: {a: {parameters: {x: 2}, modes: {m: {flow: {x: 1}}}}}\n" + ONE,
     "HS301 also an input": (
         "automata: {a: {inputs: [u, u], modes: {m: {flow: {x: u}}}}}\n"
         "system: {p: {automaton: a, initial: {x: 0}, inputs: {u: 1}}}"
     ),
-    "HS301 is a `let` name": (
-        "automata: {a: {let: {x: 2}, modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
-    ),
-    "HS301 a state of this mode": (
-        "automata: {a: {modes: {m: {flow: {x: 1}, let: {x: 2}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
-    ),
+    "HS301 is a `let` name": "automata: {a: {let: {x: 2}, modes: {m: {flow: {x: 1}}}}}\n" + ONE,
+    "HS301 a state of this mode": "automata: {a: {modes: {m: {flow: {x: 1}, let: {x: 2}}}}}\n" + ONE,
     "HS202 no modes": "automata: {a: {modes: {}}}\nsystem: {p: {automaton: a}}",
-    "HS353 either `modes`": (
-        "modes: {m: {flow: {y: 1}}}\nautomata: {a: {modes: {m: {flow: {x: 1}}}}}\n"
-        "system: {p: {automaton: a, initial: {x: 0}}}"
-    ),
-    "HS111 no automaton or instance": (
-        "automata: {a: {modes: {m: {flow: {x: sum(b.x)}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}"
-    ),
+    "HS353 either `modes`": "modes: {m: {flow: {y: 1}}}\n" + CLOCK + ONE,
+    "HS111 no automaton or instance": "automata: {a: {modes: {m: {flow: {x: sum(b.x)}}}}}\n" + ONE,
     "HS314 p.stop": (
         "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{name: go, when: x >= 1, reset: {x: 0}}]}}}}\n"
-        "system: {p: {automaton: a, initial: {x: 0}}}\nreference: {transitions: [{time: 1, edge: p.stop}]}"
+        + ONE
+        + "reference: {transitions: [{time: 1, edge: p.stop}]}"
     ),
-    "HS204 at most 9 digits": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 10000000000, initial: {x: 0}}}"
-    ),
-    "HS308 initial value": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a}}",
-    "HS303 no mode": "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {mode: k}}}",
-    "HS353 `modes` besides": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}\n"
-        "modes: {m: {flow: {y: 1}}}"
-    ),
+    "HS204 at most 9 digits": CLOCK + "system: {p: {automaton: a, count: 10000000000, initial: {x: 0}}}",
+    "HS308 initial value": CLOCK + "system: {p: {automaton: a}}",
+    "HS303 no mode": CLOCK + "system: {p: {automaton: a, initial: {mode: k}}}",
+    "HS353 `modes` besides": CLOCK + ONE + "modes: {m: {flow: {y: 1}}}",
     "HS350 no automaton 'b'": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem:\n"
-        "  p: {automaton: b, count: 2, initial: {x: 0}}\n  r: {automaton: a, initial: {x: 'p[1].x'}}\n"
+        CLOCK + "system:\n  p: {automaton: b, count: 2, initial: {x: 0}}\n"
+        "  r: {automaton: a, initial: {x: 'p[1].x'}}\n"
         "outputs: {total: sum(p.x), how_many: count(a.m), whole: count(p), one: 'p[1].x'}"
     ),
     "HS321 `count`": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 0, initial: {x: 0}}}\n"
+        CLOCK + "system: {p: {automaton: a, count: 0, initial: {x: 0}}}\n"
         "outputs: {total: sum(p.x), how_many: count(a.m)}"
     ),
-    "HS111 no automaton or instance 'b'": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, initial: {x: 0}}}\n"
-        "outputs: {total: sum(b.x**2)}"
-    ),
+    "HS111 no automaton or instance 'b'": CLOCK + ONE + "outputs: {total: sum(b.x**2)}",
     "HS111 no instance is of": (
         "automata: {a: {modes: {m: {flow: {x: 1}}}}, b: {modes: {m: {flow: {x: 1}}}}}\n"
-        "system: {p: {automaton: a, initial: {x: 0}}}\noutputs: {total: sum(b.x)}"
+        + ONE
+        + "outputs: {total: sum(b.x)}"
     ),
     "HS113 ranges over the instances of one automaton, each": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 2, initial: {x: 0}}}\n"
-        "outputs: {total: sum(p)}"
+        CLOCK + "system: {p: {automaton: a, count: 2, initial: {x: 0}}}\noutputs: {total: sum(p)}"
     ),
-    "HS111 has 2 instances": (
-        "automata: {a: {modes: {m: {flow: {x: 1}}}}}\nsystem: {p: {automaton: a, count: 2, initial: {x: 0}}}\n"
-        'let: {y: "p[3].x"}'
-    ),
+    "HS111 has 2 instances": CLOCK + 'system: {p: {automaton: a, count: 2, initial: {x: 0}}}\nlet: {y: "p[3].x"}',
 }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from engines import COMPILER, alike
+from engines import ENGINES, alike
 
 import hsdsl
 from hsdsl.elaborate import elaborate
@@ -83,7 +83,7 @@ def test_a_model_in_another_process_needs_no_file(tmp_path):
     assert copied.pipeline._files.limits == limits
 
 
-@pytest.mark.parametrize("engine", ["python", "c"] if COMPILER else ["python"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_an_ensemble_is_itself_again(engine):
     model = hsdsl.load(OSCILLATOR)
     ensemble = model.ensemble(initial={"v": [[1.0, 2.0], [3.0, 400.0]]}, samples=3, engine=engine, **FAST)

@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from engines import COMPILER
+from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl import UsageError
@@ -45,7 +45,7 @@ def test_a_mass_matrix_keeps_energy(cart, method):
     assert abs(run.final.outputs["left"]) < 1e-12
 
 
-@pytest.mark.skipif(not COMPILER, reason="no compiler")
+@needs_compiler
 @pytest.mark.parametrize("method", ["taylor", "dop853", "radau"])
 def test_engines_agree_to_the_last_bit(cart, method):
     python, c = (cart.simulate(method=method, engine=engine) for engine in ("python", "c"))
@@ -113,7 +113,7 @@ def test_derivatives():
         assert value(made.diff(name)) == exact.diff(name).xreplace(at)
 
 
-@pytest.mark.parametrize("engine", ["python", *(["c"] if COMPILER else [])])
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("method", ["taylor", "dop853"])
 def test_a_singular_start_is_a_failure_with_its_place(engine, method):
     text = """hsdsl: 1
