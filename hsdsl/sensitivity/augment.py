@@ -25,7 +25,7 @@ from dataclasses import replace
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
-from hsdsl.functions import absolute, maximum, sign
+from hsdsl.functions import below, maximum, sign
 from hsdsl.sensitivity.chain import Slopes, slopes
 from hsdsl.sensitivity.dependence import Dependence, Jump
 from hsdsl.sensitivity.derivatives import Derivatives
@@ -41,6 +41,7 @@ from hsdsl.sensitivity.state_names import (
     rate_name,
     shift_name,
     slope_name,
+    still_rate_name,
 )
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, started
 
@@ -70,7 +71,7 @@ def preferring(system: HybridSystem, firsts: Sequence[str]) -> HybridSystem:
 class _Writer:
     def __init__(self, given: Overridden, by: Sequence[Target], entries: bool, implicit: bool) -> None:
         self.base, self.labels, self.entries = given.system, [t.label for t in by], entries
-        self.implicit = implicit
+        self.implicit, self.ends_at_rest = implicit, any(not mode.states for mode in self.base.modes)
         self.of = Derivatives(given, by)
         self.start = self._start(given, by)
         self.dependence = Dependence(self.of, self.start, self.base.initial.mode)
@@ -184,16 +185,18 @@ class _Writer:
 
     def _output_names(self) -> Iterator[str]:
         for y in self.base.outputs:
-            yield from (y, rate_name(y), *(derivative_name(y, label) for label in self.labels))
+            yield from (y, rate_name(y), *([still_rate_name(y)] if self.ends_at_rest else []))
+            yield from (derivative_name(y, label) for label in self.labels)
 
     def _outputs(self, mode: Mode) -> Iterator[sp.Expr | None]:
         rows = iter(self.of.rows([y for y in mode.outputs if y is not None], mode.states))
         for y in mode.outputs:
             if y is None:
-                yield from [None] * (2 + len(self.labels))
+                yield from [None] * (2 + self.ends_at_rest + len(self.labels))
             else:
                 row = next(rows)
-                yield from (y, self.of.along(row, mode), *(self._total(row, mode, k) for k in self.columns))
+                yield from (y, self.of.along(row, mode), *([self.of.by_time(row)] if self.ends_at_rest else []))
+                yield from (self._total(row, mode, k) for k in self.columns)
 
     def _edge(self, mode: Mode, edge: Edge, jump: Jump) -> Edge:
         shifts, entered = self._shifts(mode, edge, jump), self.dependence.entered(mode, edge)
@@ -219,14 +222,15 @@ class _Writer:
         """
         (bends,) = self.of.rows([jump.rate], mode.states)
         rate = self.of.along(jump.guard, mode, self._slopes(mode))
-        margin = rate**2 - 2 * absolute(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
-        return rate * maximum(sign(margin), sp.S.Zero)
+        margin = rate**2 - 2 * _size(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
+        return below(-margin, 0, rate, sp.S.Zero)
 
     def _sizes(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
         """The sizes of the numbers that a guard is computed from."""
         guard, surface = jump.guard, edge.surface
-        sizes = [absolute(surface.left), absolute(surface.right), absolute(self.of.by_time(guard) * TIME)]
-        return sp.Add(*sizes, *(absolute(guard[x] * x) for x in map(symbol, mode.states) if x in guard))
+        terms = [surface.left, surface.right, self.of.by_time(guard) * TIME]
+        terms += [guard[x] * x for x in map(symbol, mode.states) if x in guard]
+        return sp.Add(*map(_size, terms))
 
     def _shifts(self, mode: Mode, edge: Edge, jump: Jump) -> list[sp.Expr]:
         """How fast the time of a transition moves, by each target."""
@@ -246,6 +250,11 @@ class _Writer:
 
     def _beyond(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
         """1 where the state is beyond the guard by more than round-off, or on it and does not move; else 0."""
-        bound = 32 * symbol(UNIT) * self._sizes(mode, edge, jump) + 2 * self._tie() * absolute(jump.rate)
-        above = maximum(sign(edge.surface.residual - bound), sp.S.Zero)
-        return 1 - (1 - above) * sign(jump.rate) ** 2
+        bound = 32 * symbol(UNIT) * self._sizes(mode, edge, jump) + 2 * self._tie() * _size(jump.rate)
+        moves = below(-_size(jump.rate), 0, sp.S.Zero, sp.S.One)
+        return below(bound - edge.surface.residual, 0, sp.S.One, moves)
+
+
+def _size(term: sp.Expr) -> sp.Expr:
+    """The size of a number in a reset. A step has no boundary where it bends, as it has where |u| of time does."""
+    return below(term, 0, -term, term)

@@ -12,7 +12,15 @@ import numpy as np
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import landing, parted
-from hsdsl.sensitivity.state_names import MEASURED, derivative_name, own, rate_name, shift_name, slope_name
+from hsdsl.sensitivity.state_names import (
+    MEASURED,
+    derivative_name,
+    own,
+    rate_name,
+    shift_name,
+    slope_name,
+    still_rate_name,
+)
 from hsdsl.sensitivity.ties import Tie, ties
 from hsdsl.sensitivity.touching import touched
 from hsdsl.simulate import Prepared
@@ -217,7 +225,8 @@ class Sensitivity:
         time = self._shifts(end.state) if by_event else self.setting.span
         exists = not self.breaks
         state = self._followed(end.mode, end.time, end.state, time, True)
-        outputs = {y: self._output(y, end.outputs, time) for y in self.setting.output_names}
+        rate = still_rate_name if self._rests(end.mode) else rate_name
+        outputs = {y: self._output(end.outputs, y, rate(y), time) for y in self.setting.output_names}
         mode, own = self._shown(end.mode, end.state)
         return EndSlopes(
             mode,
@@ -289,10 +298,12 @@ class Sensitivity:
         segment = plain.timeline.at(t) if after else earlier[-1]
         return plain.kernel.bind(index, segment.data).flow(t, *x)
 
-    def _output(self, y: str, values: Mapping[str, Any], time: Slopes) -> Slopes:
-        return {
-            by: values[derivative_name(y, by)] + (values[rate_name(y)] * time[by] if time[by] else 0) for by in self.wrt
-        }
+    def _rests(self, mode: str) -> bool:
+        """Whether a mode is a final one without a flow."""
+        return not next(each for each in self.setting.plain.program.modes if each.name == mode).states
+
+    def _output(self, values: Mapping[str, Any], y: str, rate: str, time: Slopes) -> Slopes:
+        return {by: values[derivative_name(y, by)] + (values[rate] * time[by] if time[by] else 0) for by in self.wrt}
 
     def sample(self, times: Any = None) -> SampleSlopes:
         """States, outputs and their derivatives at times.

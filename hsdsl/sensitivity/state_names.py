@@ -27,6 +27,11 @@ def rate_name(output: str) -> str:
     return f"d {output} / d t"
 
 
+def still_rate_name(output: str) -> str:
+    """The derivative of an output by time where states rest."""
+    return f"d {output} / d t at rest"
+
+
 def slope_name(state: str) -> str:
     """The slope of a state as the end of a step tells it."""
     return f"slope of {state}"
