@@ -219,11 +219,11 @@ class Sensitivity:
 
     @cached_property
     def final(self) -> EndSlopes:
-        """The derivatives of the end of the run."""
+        """The derivatives of the end of the run; where it leaves its domain there are none."""
         run, end = self.execution, self.execution.final
         by_event = run.stop.reason == "final" and bool(run.transitions)
         time = self._shifts(end.state) if by_event else self.setting.span
-        exists = not self.breaks
+        exists = not self.breaks and run.stop.reason != "left_domain"
         state = self._followed(end.mode, end.time, end.state, time, True)
         rate = still_rate_name if self._rests(end.mode) else rate_name
         outputs = {y: self._output(end.outputs, y, rate(y), time) for y in self.setting.output_names}

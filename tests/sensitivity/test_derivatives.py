@@ -122,6 +122,17 @@ def test_gallery(name: str) -> None:
             assert abs(mine[key] - float(value)) <= 1e-10 * size + 1e-15, (by, key)
 
 
+def test_an_end_at_a_wall() -> None:
+    """Nothing goes on behind it, and its time moves."""
+    text = "parameters: {{k: 1}}\nmodes: {{A: {{flow: {{x: k}}, domain: [x <= 2]{}}}}}"
+    text = "hsdsl: 1\n" + text + "\ninitial: {{mode: A, x: 0}}\nexperiment: {{until: 5}}"
+    hit = ", transitions: [{when: x >= 1, name: hit, to: A, reset: {x: x/2}, if: t < 1.2}]"
+    found = hsdsl.loads(text.format(hit)).sensitivity("k")
+    assert found.exists is False
+    assert found.transitions[0].time["k"] == pytest.approx(-1)
+    assert np.isnan([found.final.time["k"], found.final.state["x"]["k"]]).all()
+
+
 def test_a_start_on_a_guard() -> None:
     """Derivatives are those of the executions that start inside: below the floor a ball bounces without end."""
     model = hsdsl.load("models/gallery/event-at-start.yaml")

@@ -134,8 +134,8 @@ def factors(program: Program) -> int:
 
 
 def varied(program: Program) -> int:
-    """How many derivatives of a flow the largest mode has whose states are derivatives of others."""
-    return max(len(m.jacobian.places) if m.jacobian.varied else 0 for m in program.flows)
+    """How many derivatives of a flow the largest mode has whose states are derivatives of others; at least one."""
+    return max(max(1, len(m.jacobian.places)) if m.jacobian.varied else 0 for m in program.flows)
 
 
 def constant_bodies(program: Program) -> dict[str, str]:
