@@ -61,6 +61,10 @@ class Kernel(Protocol):
         """The same program over interval arithmetic (`hsdsl.enclosures`), many boxes at once."""
         ...
 
+    def over(self, arithmetic: Arithmetic) -> Kernel:
+        """The same program over another number type."""
+        ...
+
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
         ...

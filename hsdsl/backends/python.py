@@ -21,7 +21,7 @@ class PythonKernel:
     def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
         self.arithmetic = arithmetic
         self._program = program
-        self._enclosing: PythonKernel | None = None
+        self._over: dict[str, PythonKernel] = {}
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._apart: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
@@ -36,9 +36,13 @@ class PythonKernel:
         """The same program over interval arithmetic."""
         from hsdsl.enclosures import ENCLOSED  # only verdicts ask for it
 
-        if self._enclosing is None:
-            self._enclosing = PythonKernel(self._program, ENCLOSED)
-        return self._enclosing
+        return self.over(ENCLOSED)
+
+    def over(self, arithmetic: Arithmetic) -> PythonKernel:
+        """The same program over another number type."""
+        if arithmetic.name not in self._over:
+            self._over[arithmetic.name] = PythonKernel(self._program, arithmetic)
+        return self._over[arithmetic.name]
 
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""

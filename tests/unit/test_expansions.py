@@ -1,4 +1,7 @@
-"""Expansions of functions and steps in C (``expansions.c``, ``screen_parts.h``): no value is beyond what they bound."""
+"""Expansions of functions and steps in C (``expansions.c``, ``screen_parts.h``): no value is beyond what they bound.
+
+Those in Python (``verdict/expansions.py``) are the same.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,11 @@ import numpy as np
 import pytest
 from engines import needs_compiler
 
+from hsdsl.bernstein import around_middle, from_powers
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import FLAGS, find_compiler
+from hsdsl.simulate.verdict import expansions
+from hsdsl.simulate.verdict.expanded import EXPANDED
 
 pytestmark = needs_compiler
 ONE = """#include "screen_parts.h"
@@ -45,8 +51,16 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "tanh": lambda a, _: np.tanh(a), "atan": lambda a, _: np.arctan(a), "sign": lambda a, _: np.sign(a),
     "floor": lambda a, _: np.floor(a),
 }  # fmt: skip
+IN_PYTHON: dict[str, Callable[..., Any]] = FUNCTIONS | {
+    "power": lambda a, _: EXPANDED.functions["pow"](a, expansions.line(POWER, 0.0)),
+    **{name: EXPANDED.functions[name] for name in ("min", "max")},
+    **{
+        name: lambda a, _, name=name: EXPANDED.functions[name](a)
+        for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tanh", "atan", "sign", "floor")
+    },
+}
 U = np.linspace(-1, 1, 41)
-Expansion = ctypes.c_double * 6
+Expansion = ctypes.c_double * 7
 
 
 @pytest.fixture(scope="module")
@@ -85,10 +99,47 @@ def test_no_value_is_further_away_than_the_rest(name: str, compiled: Any) -> Non
     assert sharp >= 5 or name in ("div", "log")
 
 
-def test_the_slope_is_shown_where_its_terms_cancel(compiled: Any) -> None:
-    a, b, found = Expansion(1, 3, 0, 0, 0, 3), Expansion(1, -3, 0, 0, 0, 3), Expansion()
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_both_languages_expand_alike(name: str, compiled: Any) -> None:
+    rng = np.random.default_rng(11)
+    hidden = 0
+    for _ in range(200):
+        size = 10.0 ** rng.uniform(-2, 0.5)
+        numbers = rng.normal(size=(2, 7)) * size ** np.array([0, 1, 2, 3, 4, 4, 1])
+        numbers[:, 4:] = abs(numbers[:, 4:])
+        numbers[:, 5] = numbers[:, 4] * rng.choice([0, 0.5], size=2)
+        a, b, found = Expansion(*numbers[0]), Expansion(*numbers[1]), Expansion()
+        compiled.expand_one(structures.OPERATORS.index(name), POWER, a, b, found)
+        with np.errstate(all="ignore"):
+            same = IN_PYTHON[name](*(expansions.Expansion(each[:4, None], *each[4:, None]) for each in numbers))
+        assert [*same.terms.ravel(), same.rest, same.hidden, same.moved] == pytest.approx([*found], rel=1e-6, abs=1e-12)
+        hidden += 0 < found[5] < np.inf
+    assert hidden >= 20
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-3, 1e-6])
+def test_a_term_that_is_as_smooth_as_the_part_hides_nothing_and_a_pulse_is_hidden(width: float, compiled: Any) -> None:
+    smooth, pulse, square, found = Expansion(0, 0.9, 0, 0, 0, 0, 0), Expansion(), Expansion(), Expansion()
+    for name, of, to in (("sin", smooth, found), ("square", Expansion(1, 1 / width), square), ("exp", square, pulse)):
+        compiled.expand_one(structures.OPERATORS.index(name), 0, of, of, to)
+        square[:] = [-each for each in square[:4]] + square[4:]
+    assert found[4] > found[5] == 0
+    compiled.expand_one(structures.OPERATORS.index("add"), 0, found, pulse, found)
+    assert found[5] >= 0.5
+
+
+def test_errors_of_states_count_where_terms_cancel(compiled: Any) -> None:
+    a, b, found = Expansion(1, 3, 0, 0, 0, 0, 3), Expansion(1, -3, 0, 0, 0, 0, 3), Expansion()
     compiled.expand_one(structures.OPERATORS.index("add"), 0, a, b, found)
-    assert (found[1], found[5]) == (0, 6)
+    assert (found[1], found[6]) == (0, 6)
+
+
+@pytest.mark.parametrize("degree", [1, 4, 20])
+def test_powers_around_the_middle_are_those_of_the_polynomial(degree: int) -> None:
+    powers = np.random.default_rng(degree).normal(size=degree + 1)
+    moved = powers @ from_powers(degree) @ around_middle(degree)
+    s = (1 + U) / 2
+    assert np.polynomial.polynomial.polyval(U, moved) == pytest.approx(np.polynomial.polynomial.polyval(s, powers))
 
 
 @pytest.mark.parametrize("decay", [0.2, 0.6, 1.0])

@@ -55,8 +55,8 @@ experiment: {{until: {until}, scheme: located}}
     )
 
 
-def run_of(loaded: Any, method: str, tolerance: float) -> Any:
-    return loaded.simulate(scheme="located", method=method, tolerance=tolerance)
+def run_of(loaded: Any, method: str, tolerance: float, **parameters: float) -> Any:
+    return loaded.simulate(scheme="located", method=method, tolerance=tolerance, parameters=parameters)
 
 
 def screen_of(run: Any) -> Screen:
@@ -78,15 +78,15 @@ FLOWS = {
 UNSEEN = "a change of the flow of mode a may not have been seen"
 
 
-def both(loaded: Any, method: str, tolerance: float) -> tuple[Any, Any]:
+def both(loaded: Any, method: str, tolerance: float, **parameters: float) -> tuple[Any, Any]:
     """The verdict of a run, and that without a screen."""
-    found = run_of(loaded, method, tolerance).verdict
+    found = run_of(loaded, method, tolerance, **parameters).verdict
     with (
         patch.object(clear, "screens_of", return_value=None),
         patch.object(run_view, "screened", return_value=None),
         patch.object(verdict, "is_compiled", return_value=False),
     ):
-        return found, run_of(loaded, method, tolerance).verdict
+        return found, run_of(loaded, method, tolerance, **parameters).verdict
 
 
 def assert_alike(found: Any, expected: Any) -> None:
@@ -121,6 +121,38 @@ def test_a_pulse_between_stages_is_found() -> None:
     run = run_of(model(*FLOWS["pulse"]), "taylor", 1e-6)
     assert screen_of(run).doubts("flow change")
     assert any(reason.startswith(UNSEEN) for reason in run.verdict.reasons)
+
+
+SMALL = {  # against the other terms of the flow, of width w; and by which method
+    "time": ("-1.3*x + 0.006*exp(-((t - 1.13)/w)**2)", "radau"),
+    "state": ("-sin(x) + 0.007/(1 + ((x - 0.37)/w)**2)**2", "dop853"),
+    "speed": ("-x - 0.1*y + 0.004*(tanh((y - 0.5)/w + 1) - tanh((y - 0.5)/w - 1))", "taylor"),
+    "factor": ("-x*(1 + 0.009*exp(-((t - 0.77)/w)**4))", "taylor"),
+    "root": ("sqrt(2 + 0.01*cos((t - 1.4)/(14*w))**400) - 2*x", "taylor"),
+    "sine": ("-x + sin(2 - x + 0.012*exp(-((t - 1.6)/w)**2))", "dopri5"),
+    "input": ("u - 0.8*x", "taylor"),
+    "quotient": ("-x/(1.5 + 0.013/(1 + ((t - 1.9)/w)**2)**2)", "dopri5"),
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_pulse_that_is_small_against_other_terms_is_found(name: str) -> None:
+    flow, method = SMALL[name]
+    loaded = hsdsl.loads(f"""
+hsdsl: 1
+parameters: {{w: 1}}
+inputs: {{u: 0.005*exp(-((t - 1.2)/w)**2)}}
+modes:
+  before: {{flow: {{x: y, y: -x}}, transitions: [{{when: t >= 0.3, to: a}}]}}
+  a: {{flow: {{x: y, y: "{flow}"}}, transitions: [{{when: x >= 100, to: before}}]}}
+initial: {{mode: before, x: 0, y: 1}}
+experiment: {{until: 3, scheme: located}}
+""")
+    for width, theorem in ((0.7, "holds"), (1.5e-4, "unknown")):
+        found, expected = both(loaded, method, 1e-8, w=width)
+        assert_alike(found, expected)
+        assert found.theorem == theorem
+        assert (theorem == "unknown") == any(reason.startswith(UNSEEN) for reason in found.reasons)
 
 
 def test_a_clear_run_has_no_doubts() -> None:

@@ -1,44 +1,57 @@
-/* Routines along a part of a step: up to third order around its middle, and how far they may be from that.
+/* Routines along a part of a step: up to third order around its middle, and how far they may be from that. See
+   hsdsl/expansions.py.
 
    An expansion is a function of u from -1 to 1, no further from value + first u + second u**2 + third u**3 than `rest`;
    that is infinite where nothing is known. What is added to it for rounding is far more than rounding does, that of C's
-   library too. `shown` is the size of its slope at the middle, where no terms cancel. */
+   library too. An operation is resolved where what it makes beyond third order is no more than an eighth of its terms:
+   its result is as smooth as the part is long. `hidden` is what others may add. `moved` is how much the errors of
+   states change the result, where no terms cancel. */
 
 #include "roundoff.c"
 
 #define EXPANDED 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
+#define RESOLVED 8       /* terms are so many times what is beyond them; what moves a state by so many errors is seen */
 
 typedef struct {
-  double value, first, second, third, rest, shown;
+  double value, first, second, third, rest, hidden, moved;
 } hs_expansion;
 
-static const hs_expansion anything = {0.0, 0.0, 0.0, 0.0, INFINITY, 0.0};
+static const hs_expansion anything = {0.0, 0.0, 0.0, 0.0, INFINITY, INFINITY, 0.0};
 
-HS_INLINE hs_expansion expansion(double value, double first, double second, double third, double rest, double shown) {
-  const hs_expansion found = {value, first, second, third, rest, shown};
+HS_INLINE hs_expansion expansion(double value, double first, double second, double third, double rest, double hidden,
+                                 double moved) {
+  const hs_expansion found = {value, first, second, third, rest, hidden, moved};
   return rest <= DBL_MAX ? found : anything;
 }
 
 HS_INLINE hs_expansion constant_expansion(double value) {
-  return expansion(value, 0.0, 0.0, 0.0, fabs(value) * EXPANDED, 0.0);
+  return expansion(value, 0.0, 0.0, 0.0, fabs(value) * EXPANDED, 0.0, 0.0);
 }
 
-/* How far it may be from its value, and from zero. */
-HS_INLINE double reach(hs_expansion a) { return fabs(a.first) + fabs(a.second) + fabs(a.third) + a.rest; }
+/* How far its polynomial may be from its value, itself, and how far from zero. */
+HS_INLINE double turn(hs_expansion a) { return fabs(a.first) + fabs(a.second) + fabs(a.third); }
+HS_INLINE double reach(hs_expansion a) { return turn(a) + a.rest; }
 HS_INLINE double size_of(hs_expansion a) { return fabs(a.value) + reach(a); }
+
+/* What is hidden in the result of an operation with so large terms that makes `beyond` and leaves out `off`: where it
+   is resolved, what its operands hide. */
+HS_INLINE double hidden_in(double beyond, double terms, double hidden, double off) {
+  return beyond * RESOLVED <= terms ? hidden : off;
+}
 
 HS_INLINE hs_expansion expanded_sum(hs_expansion a, hs_expansion b) {
   return expansion(a.value + b.value, a.first + b.first, a.second + b.second, a.third + b.third,
-                   a.rest + b.rest + (size_of(a) + size_of(b)) * EXPANDED, a.shown + b.shown);
+                   a.rest + b.rest + (size_of(a) + size_of(b)) * EXPANDED, a.hidden + b.hidden, a.moved + b.moved);
 }
 
 HS_INLINE hs_expansion expanded_multiple(hs_expansion a, double by) {
   const double rest = (a.rest + size_of(a) * EXPANDED) * fabs(by);
-  return expansion(a.value * by, a.first * by, a.second * by, a.third * by, rest, a.shown * fabs(by));
+  return expansion(a.value * by, a.first * by, a.second * by, a.third * by, rest, a.hidden * fabs(by),
+                   a.moved * fabs(by));
 }
 
 HS_INLINE hs_expansion negated(hs_expansion a) {
-  const hs_expansion found = {-a.value, -a.first, -a.second, -a.third, a.rest, a.shown};
+  const hs_expansion found = {-a.value, -a.first, -a.second, -a.third, a.rest, a.hidden, a.moved};
   return found;
 }
 
@@ -49,52 +62,46 @@ HS_INLINE double higher(hs_expansion a, hs_expansion b) {
 }
 
 HS_INLINE hs_expansion expanded_product(hs_expansion a, hs_expansion b) {
-  const double size = size_of(a), other = size_of(b);
+  const double size = size_of(a), other = size_of(b), beyond = higher(a, b);
+  const double terms = turn(a) * (fabs(b.value) + turn(b)) + fabs(a.value) * turn(b) - beyond;
+  const double off = beyond + a.rest * other + b.rest * (size - a.rest), hidden = a.hidden * other + b.hidden * size;
   return expansion(a.value * b.value, a.value * b.first + a.first * b.value,
                    a.value * b.second + a.first * b.first + a.second * b.value,
                    a.value * b.third + a.first * b.second + a.second * b.first + a.third * b.value,
-                   higher(a, b) + a.rest * other + b.rest * (size - a.rest) + size * other * EXPANDED,
-                   fabs(a.value) * b.shown + a.shown * fabs(b.value));
-}
-
-/* For v that is 1/a up to third order, a v = 1 + e with |e| <= off, so 1/a is off by |v e/(1 + e)|. */
-static hs_expansion expanded_reciprocal(hs_expansion a) {
-  const double v = 1 / a.value, first = -v * v * a.first, second = -v * (a.second * v + a.first * first);
-  const double third = -v * (a.third * v + a.second * first + a.first * second);
-  const hs_expansion found = {v, first, second, third, 0.0, a.shown * v * v};
-  const double size = size_of(found), off = higher(a, found) + a.rest * size + size_of(a) * size * EXPANDED;
-  return off < 1.0 ? expansion(v, first, second, third, size * off / (1 - off), found.shown) : anything;
-}
-
-/* For s > 0 that is sqrt(a) up to third order, |a - s**2| <= off, and sqrt(a) - s = (a - s**2)/(sqrt(a) + s). */
-static hs_expansion expanded_root(hs_expansion a) {
-  if (!(a.value > 0.0)) return anything;
-  const double s = sqrt(a.value), half = 0.5 / s, first = a.first * half, second = (a.second - first * first) * half;
-  const hs_expansion found = {s, first, second, (a.third - 2 * first * second) * half, 0.0, a.shown * half};
-  const double size = size_of(found), least = s - reach(found);
-  const double off = higher(found, found) + a.rest + (size_of(a) + size * size) * EXPANDED;
-  const int known = least > 0.0 && off < least * least;
-  return known ? expansion(s, first, second, found.third, off / least, found.shown) : anything;
+                   off + size * other * EXPANDED, hidden_in(beyond, terms, hidden, off),
+                   fabs(a.value) * b.moved + a.moved * fabs(b.value));
 }
 
 /* A function with the coefficients c around an expansion's value; `further` bounds its powers from the fourth on. */
 HS_INLINE hs_expansion composed(hs_expansion a, const double c[4], double further) {
   const double by = reach(a), one = fabs(a.first), slope = fabs(c[1]), bend = fabs(c[2]), twist = fabs(c[3]);
-  const double size = fabs(c[0]) + by * (slope + by * (bend + by * twist));
-  const double rest = slope * a.rest + bend * (by * by - one * (one + 2 * fabs(a.second))) +
-                      twist * (by * by * by - one * one * one) + further;
+  const double terms = by * (slope + by * (bend + by * twist));
+  const double beyond = bend * (by * by - one * (one + 2 * fabs(a.second))) + twist * (by * by * by - one * one * one) +
+                        further, off = slope * a.rest + beyond;
+  const double hidden = a.hidden * (slope + by * (2 * bend + 3 * by * twist));
   return expansion(c[0], c[1] * a.first, c[1] * a.second + c[2] * a.first * a.first,
                    c[1] * a.third + a.first * (2 * c[2] * a.second + c[3] * a.first * a.first),
-                   rest + size * EXPANDED, slope * a.shown);
+                   off + (fabs(c[0]) + terms) * EXPANDED, hidden_in(beyond, terms, hidden, off), slope * a.moved);
 }
 
 /* What the fourth derivative of a function makes of it, that being at most `most`. */
 HS_INLINE double fourth(double by, double most) { return by * by * by * by / 24 * most; }
 
-/* The powers from the fourth on of a function with the coefficients (1/size)**k/k at most. */
-HS_INLINE double further_logarithm(double by, double size) {
-  const double share = by / size;
-  return share < 1.0 ? share * share * share * share / (4 * (1 - share)) : INFINITY;
+/* The powers of a share from the fourth on. */
+HS_INLINE double geometric(double share) {
+  return share < 1.0 ? share * share * share * share / (1 - share) : INFINITY;
+}
+
+static hs_expansion expanded_reciprocal(hs_expansion a) {
+  const double v = 1 / a.value, c[4] = {v, -v * v, v * v * v, -v * v * v * v};
+  return composed(a, c, fabs(v) * geometric(reach(a) * fabs(v)));
+}
+
+/* Of the binomials of 1/2 the fourth, 5/128, is the largest from there on. */
+static hs_expansion expanded_root(hs_expansion a) {
+  if (!(a.value > 0.0)) return anything;
+  const double s = sqrt(a.value), v = 1 / a.value, c[4] = {s, s * v / 2, -s * v * v / 8, s * v * v * v / 16};
+  return composed(a, c, s * 5 / 128 * geometric(reach(a) * v));
 }
 
 static hs_expansion expanded_exponential(hs_expansion a) {
@@ -105,7 +112,7 @@ static hs_expansion expanded_exponential(hs_expansion a) {
 static hs_expansion expanded_logarithm(hs_expansion a) {
   if (!(a.value > 0.0)) return anything;
   const double less = 1 / a.value, c[4] = {log(a.value), less, -less * less / 2, less * less * less / 3};
-  return composed(a, c, further_logarithm(reach(a), a.value));
+  return composed(a, c, geometric(reach(a) * less) / 4);
 }
 
 /* Where `here` is its sine and `across` its cosine; or its cosine, and minus its sine. */
@@ -126,7 +133,7 @@ static hs_expansion expanded_tanh(hs_expansion a) {
 /* The slope of atan has poles sqrt(1 + c**2) away. */
 static hs_expansion expanded_angle(hs_expansion a) {
   const double x = a.value, m = 1 / (1 + x * x), c[4] = {atan(x), m, -x * m * m, (x * x - 1.0 / 3) * m * m * m};
-  return composed(a, c, further_logarithm(reach(a), sqrt(1 + x * x)));
+  return composed(a, c, geometric(reach(a) * sqrt(m)) / 4);
 }
 
 static hs_expansion expanded_power(hs_expansion a, int exponent) {
@@ -141,7 +148,7 @@ static hs_expansion expanded_least(hs_expansion a, hs_expansion b) {
   return b.value - a.value > apart ? a : a.value - b.value > apart ? b : anything;
 }
 
-static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
+static hs_expansion series_of_operation(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
   const double c = a->value, r = reach(*a);
   switch (o->kind) {
   case HS_ADD: return expanded_sum(*a, *b);
@@ -165,6 +172,23 @@ static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, c
   case HS_FLOOR: return floor(c - r) == floor(c + r) ? constant_expansion(floor(c)) : anything;
   default: return anything;
   }
+}
+
+/* Where less is hidden in all that the result of an operation may be than in its series, take a constant. */
+static hs_expansion less_hidden(const hs_operation *o, const hs_expansion *a, const hs_expansion *b,
+                                          hs_expansion found) {
+  if (o->kind == HS_SQRT || !hs_finite(a->rest) || !hs_finite(b->rest)) return found;
+  const double r = reach(*a), s = reach(*b);
+  const hs_range one = {a->value - r, a->value + r}, other = {b->value - s, b->value + s};
+  const hs_range all = range_of(o, one, other);
+  const double half = (all.high - all.low) / 2, value = all.low + half;
+  if (!(half < found.hidden)) return found;
+  return expansion(value, 0.0, 0.0, 0.0, half + fabs(value) * EXPANDED, half, found.moved);
+}
+
+static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
+  const hs_expansion found = series_of_operation(o, a, b);
+  return found.hidden > 0.0 ? less_hidden(o, a, b, found) : found;
 }
 
 static void expand_operations(const hs_formulas *f, int first, int last, int base, hs_expansion *v) {

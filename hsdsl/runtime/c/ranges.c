@@ -88,7 +88,7 @@ static hs_range range_sine(hs_range a, double quarter) {
 
 HS_INLINE double sign_of(double x) { return (x > 0) - (x < 0); }
 
-static hs_range range_of(const hs_operation *o, hs_range a, hs_range b) {
+HS_INLINE hs_range range_of(const hs_operation *o, hs_range a, hs_range b) {
   hs_range found = everything;
   switch (o->kind) {
   case HS_ADD: return range_sum(a.low + b.low, a.high + b.high);

@@ -138,7 +138,6 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.enough = numbers(store, w);
   v.beyond = numbers(store, w);
   v.missed = numbers(store, (int64_t)w * model->modes);
-  v.unseen = take(store, (int64_t)(LEVELS + 2) * w, sizeof(int));
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
   v.rounded = take(store, registers, sizeof(hs_rounded));

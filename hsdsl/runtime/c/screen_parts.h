@@ -73,30 +73,47 @@ static void set_part(hs_view *v, int64_t row, int level, double start, double wi
   }
 }
 
-/* Expand the slope of a state and the state itself around the middle of a step. Sums are of powers of 1 + u. */
-static hs_expansion expand_state(const hs_view *v, int64_t row, int i, double half, hs_expansion *slope) {
+/* A part of a step around its middle m: half its width by m, 1/m, 1 by m times the step's length, and the powers of m
+   and 2 to the step's degree. */
+typedef struct {
+  double by, less, per, power, further;
+} hs_part;
+
+static hs_part part_of(const hs_view *v, int64_t row, double start, double width) {
+  const double *const times = v->s->run.times, middle = start + width / 2;
+  const double less = 1 / middle, further = ldexp(1.0, v->degree);
+  const double power = width < 1.0 ? pow(middle, v->degree) : 1 / further;
+  const hs_part part = {width / 2 * less, less, less / (times[row + 1] - times[row]), power, further};
+  return part;
+}
+
+/* Expand the slope of a state, and the state itself, around the middle of a part. Sums are of powers of 1 + v: what is
+   left of v**4 and beyond is doubled with each. With u from -1 to 1 along the part, v is u times `by`. */
+static hs_expansion expand_state(const hs_view *v, int64_t row, int i, hs_part part, hs_expansion *slope) {
   const hs_record *const run = &v->s->run;
-  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i];
+  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i], by = part.by, per = part.per;
   double value = 0.0, first = 0.0, second = 0.0, third = 0.0, rest = 0.0, at = 0.0;
-  double power = ldexp(1.0, -v->degree), further = 1 / power; /* what is left of u**4 and beyond is doubled that often */
-  for (int k = v->degree; k > 0; k--, power *= 2) {
+  double power = part.power, further = part.further;
+  for (int k = v->degree; k > 0; k--, power *= part.less) {
     const double term = c[(k - 1) * run->width] * power;
     rest += (further *= 0.5) * fabs(third);
     third += second, second += first, first += value, value += k * term;
     at += term;
   }
+  first *= by, second *= by * by, third *= by * by * by, rest *= by * by * by * by;
   rest += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANDED;
-  *slope = expansion(value / half, first / half, second / half, third / half, rest / half, 0.0);
-  rest = fabs(third) / 4 + rest / 5 + fabs(x + at) * EXPANDED;
-  return expansion(x + at, value, first / 2, second / 3, rest, fabs(value));
+  *slope = expansion(value * per, first * per, second * per, third * per, rest * per, 0.0, 0.0);
+  rest = (fabs(third) / 4 + rest / 5) * by + fabs(x + at) * EXPANDED;
+  return expansion(x + at, value * by, first * by / 2, second * by / 3, rest, 0.0, v->own[i]);
 }
 
 /* Expand the states that are cut. */
 static void expand_cut(hs_view *v, int64_t row) {
-  const double *const times = v->s->run.times, half = (times[row + 1] - times[row]) / 2;
   v->looks = 0;
-  for (int i = 0; i < v->n && !v->expanded; i++)
-    if (v->cut[i]) v->around[1 + i] = expand_state(v, row, i, half, &v->slopes[i]);
+  if (v->expanded) return;
+  const hs_part whole = part_of(v, row, 0.0, 1.0);
+  for (int i = 0; i < v->n; i++)
+    if (v->cut[i]) v->around[1 + i] = expand_state(v, row, i, whole, &v->slopes[i]);
 }
 
 /* The box of the same, from expansions. */

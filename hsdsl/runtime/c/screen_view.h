@@ -15,8 +15,6 @@
 #define END_LEVELS 6        /* the part at its end, where a surface is crossed */
 #define MOST_LOOKS 128      /* at parts of one step */
 #define COARSE_LOOKS 16     /* likewise, by expansions of the states */
-#define RESOLVED 8          /* the flow is as it seems where it varies by so much more, or moves by so many errors */
-#define SHORT 0x1p-10      /* of a step: a piece that shows how fast enclosures of the flow widen */
 #define PLACES 64           /* of a mode where the round-off of its flow is looked at */
 #define ROUNDS 48           /* of closing in on a turning point */
 #define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */
@@ -45,15 +43,16 @@ typedef struct {
   const hs_sparse *row; /* whose values `gradient` holds */
   double *x, *y, *z, *gradient, *slope, *values, *magnitudes, *at_start, *at_end;
   double *matrix, *bernstein;
-  double *enough, *missed; /* how wrong states were where each mode's nearest miss is */
-  int *open, *unseen;
+  double *enough; /* how far a step may still move states */
+  double *missed; /* how wrong states were where each mode's nearest miss is */
+  int *open;
   int *beyond_at_start; /* whether a step begins beyond each surface of an edge with an `if` */
   int *cut; /* whether a state is, where a step is cut in halves */
   int expanded, coarse; /* whether all states are expanded along the step, and whether parts are of expansions */
   hs_range *range;
   hs_rounded *rounded;
   hs_expansion *around, *slopes;
-  double *beyond; /* how far the flow may be from the slopes of states along the step */
+  double *beyond; /* how far a part may move states */
   hs_near_miss *nearest; /* of each mode */
   int looks;
 } hs_view;

@@ -22,6 +22,7 @@ allows itself.
 `tangent`       arcs that leave a surface tangentially, as where sliding ends
 `transparent`   surfaces that are passed where their condition is false
 `flows`         does the flow vary unseen, jump, or have a slope without bound?
+`expansions`    operations along parts of steps, and what they hide; `expanded`: functions of these
 `commutation`   do transitions that are reached together commute?
 `accumulation`  Zeno points and rest, which the relaxed scheme goes through without a word
 `strips`        transitions that are lost while another one waits in a strip

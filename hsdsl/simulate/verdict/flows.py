@@ -1,8 +1,8 @@
 """The flow along steps: does it vary where no step looked, jump, or have no bound on its slope?
 
-A step's polynomial knows the flow at a few points. The flow is enclosed on parts of the step and held against the
-polynomial's own derivative: what sticks out is a pulse that was not seen, unless it is small against what the step
-shows, or the enclosure's own width, which halves with the part.
+A step's polynomial knows the flow at a few points. Operations of the flow that are not as smooth as half a step is long
+may be pulses that it did not see. What they may add is held against the error, on parts of the step that are halved;
+there the flow is held against the polynomial's own derivative, too.
 """
 
 from __future__ import annotations
@@ -14,18 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.arithmetic import NOTHING
-from hsdsl.bernstein import halving
-from hsdsl.enclosures import Range, hull
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS
+from hsdsl.simulate.verdict.expanded import EXPANDED
+from hsdsl.simulate.verdict.expansions import RESOLVED, line
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView, visited
-from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
+from hsdsl.simulate.verdict.steps import MOST_PARTS, Parts, high, low, steps_of, undecided
 
 HALVINGS = 14
-RESOLVED = 8  # the flow is as it seems where it varies by so much more, or may move a state by at most so many errors
-SHORT = 2.0**-10  # of a step: a piece that shows how fast enclosures of the flow widen
+SEEN = 0.5  # of a step: every method looks at parts of such a width, and shows what is as smooth as they are long
 Array = NDArray[np.float64]
 
 
@@ -58,62 +56,42 @@ def _named(run: RunView, what: str, how: str, parts: Parts, _: Any) -> Iterator[
 
 
 def _unseen(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
-    """Parts of steps on which the flow may be what the step's polynomial does not show."""
+    """Parts of steps on which the flow may be what the step's polynomial does not show.
+
+    Parts are halved where they may move a state by more than half of their share of what is allowed for the step, as
+    long as all parts together may move it by more than that.
+    """
     number = np.zeros(int(steps.row.max(initial=0)) + 1, dtype=int)
     number[steps.row] = np.arange(len(steps))
-    enough = _shown(run, steps) / RESOLVED
-    names = run.problem.program.modes[steps.mode].states
-    digits = ROUNDOFF_UNITS * float(run.arithmetic.unit) * np.array([run.sizes.get(name, 0.0) for name in names])
+    enough, spent, parts = RESOLVED * np.maximum(steps.error, NOTHING), np.zeros(steps.error.shape), steps
+    halvings = 0
+    while True:
+        step, moved = number[parts.row], _moved_unseen(run, parts)
+        open_ = np.logical_not(moved <= enough[step] * parts.width[:, None] / 2)
+        left: NDArray[np.bool_] = np.any(open_, axis=1)
+        np.add.at(spent, step[~left], moved[~left])
+        together = spent.copy()
+        np.add.at(together, step[left], moved[left])
+        left &= np.any(np.logical_not(together <= enough), axis=1)[step]
+        if halvings == HALVINGS or not 0 < left.sum() <= MOST_PARTS // 2:
+            return parts.take(left), open_[left]
+        parts, halvings = parts.take(left).halves(), halvings + 1
 
-    def decides(parts: Parts) -> NDArray[np.bool_]:
-        beyond = _beyond(run, parts)
-        effect = beyond * parts.length[:, None]  # of all parts of a step together
-        error = np.maximum(np.maximum(parts.error, digits), NOTHING)
-        return ~((beyond <= enough[number[parts.row]]) | (effect <= RESOLVED * error))
 
-    return undecided(steps, decides, HALVINGS)
+def _moved_unseen(run: RunView, parts: Parts) -> Array:
+    """How far states may be moved along parts by what they do not show; shape (N, n).
 
-
-def _shown(run: RunView, steps: Parts) -> Array:
-    """How much steps show of the flow; shape (N, n).
-
-    What varies is the derivative of the polynomial, or terms of the flow: those of an enclosure do not cancel, and it
-    widens with a piece. The median of three places leaves out a pulse at one. Neither counts for more than what the
-    flow may be along the whole step.
+    That is what is hidden and, on parts so short that no method looks at each, how the flow differs from the slopes of
+    the states' polynomials. What errors of states change the flow by is no pulse.
     """
-    below, above = steps.slopes()
-    least, most = _enclosed(run, steps, steps.times, steps.states())
-    return np.minimum(np.maximum(above - below, np.median(_widening(run, steps), axis=0)), most - least)
-
-
-def _widening(run: RunView, steps: Parts) -> list[Array]:
-    """How much wider the flow's enclosures of short pieces become by the step's length; shape (N, n), three places."""
-    whole, degree = steps.bernstein, steps.bernstein.shape[2] - 1
-    half = whole @ halving(degree)[0]
-    ends = [(0.0, whole[..., 0], whole[..., 1] - whole[..., 0]), (1.0, whole[..., -1], whole[..., -1] - whole[..., -2])]
-    found = list[Array]()
-    for share, middle, slope in (*ends, (0.5, half[..., -1], 2 * (half[..., -1] - half[..., -2]))):
-        time, short = steps.time + share * steps.length, SHORT * steps.length
-        wide = degree * SHORT * np.abs(slope)
-        states = hull(middle - wide / 2, middle + wide / 2)
-        least, most = _enclosed(run, steps, Range(time - short / 2, time + short / 2), states)
-        found.append(np.where(np.isfinite(most - least), (most - least) / SHORT, 0.0))
-    return found
-
-
-def _beyond(run: RunView, parts: Parts) -> Array:
-    """How far the enclosed flow and the derivatives of the polynomials lie beyond each other; shape (N, n)."""
-    below, above = parts.slopes()
-    least, most = _enclosed(run, parts, parts.times, parts.states())
-    return np.maximum(np.abs(most - above), np.abs(below - least))
-
-
-def _enclosed(run: RunView, parts: Parts, times: Range, states: Sequence[Range]) -> tuple[Array, Array]:
-    """The least and the largest the flow may be; shape (N, n) each."""
-    flow, n = parts.bound(run).flow(times, *states), len(parts)
-    if not flow:
-        return np.zeros((n, 0)), np.zeros((n, 0))
-    return np.stack([low(f, n) for f in flow], axis=1), np.stack([high(f, n) for f in flow], axis=1)
+    (time, *states), slopes = parts.expanded()
+    data = [line(column, 0.0) for column in parts.data.T]
+    flow = run.problem.kernel.over(EXPANDED).bind(parts.mode, data).flow(time, *states)
+    found = np.zeros((len(parts), len(slopes)))
+    for i, (f, slope) in enumerate(zip(flow, slopes, strict=True)):
+        differs = np.where(parts.width < SEEN, (f - slope).shown, 0.0)
+        found[:, i] = np.maximum(f.hidden + differs - RESOLVED * f.moved, 0.0)
+    return found * (parts.width * parts.length)[:, None]
 
 
 def _steep(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.bernstein import from_powers, halving
+from hsdsl.bernstein import around_middle, from_powers, halving
 from hsdsl.enclosures import Range, as_range
 from hsdsl.kernel import ModeKernel
+from hsdsl.simulate.verdict.expansions import Expansion, line, polynomial
 from hsdsl.simulate.verdict.run_view import RunView
 
 Array = NDArray[np.float64]
@@ -95,11 +96,16 @@ class Parts:
         """States and all that are no further away than the error."""
         return [Range(x.low - e, x.high + e) for x, e in zip(states, self.error.T, strict=True)]
 
-    def slopes(self) -> tuple[Array, Array]:
-        """The derivatives of the states along each part, from least to largest; shape (N, n) each."""
+    def expanded(self) -> tuple[list[Expansion], list[Expansion]]:
+        """Time and states along each part, and the derivatives of these."""
         degree = self.bernstein.shape[2] - 1
-        slopes = degree * np.diff(self.bernstein, axis=2) / (self.width * self.length)[:, None, None]
-        return slopes.min(axis=2), slopes.max(axis=2)
+        powers: Array = self.bernstein @ around_middle(degree)
+        half = self.width * self.length / 2
+        slopes = powers[..., 1:] * np.arange(1.0, degree + 1) / half[:, None, None]
+        times = line(self.time + (self.start + self.width / 2) * self.length, half)
+        columns = range(powers.shape[1])
+        states = [polynomial(powers[:, i], self.error[:, i]) for i in columns]
+        return [times, *states], [polynomial(slopes[:, i], np.zeros(len(self))) for i in columns]
 
     @property
     def bound_data(self) -> list[Range]:
