@@ -9,7 +9,7 @@ warm and in turns, and compares each result with the model's exact execution.
 `judge`         the error of a result, and whether it is the right execution
 `outcome`       one word for a run: right, wrong, warned of, stopped, refused, without an end
 `stopwatch`     warm times, in turns
-`rows`          rows as text, as CSV, and as the panels of a picture
+`rows`          rows as text and as CSV; `picture` draws them
 `peers`         other tools, each run as its own documentation shows
 `translation`   a model's mathematics as functions for another tool
 `by_arcs`       the loop around a tool that stops at events

@@ -1,18 +1,17 @@
-"""A chart's rows as text, as CSV, and as the panels of a picture."""
+"""A chart's rows as text and as CSV."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import isfinite
 from typing import Any
 
 from hsdsl.chart.judge import Judgement
 from hsdsl.chart.result import Attempt
 from hsdsl.chart.stopwatch import Timed
-from hsdsl.plot.work_precision import Line, Mark, Panel
 
 COLUMNS: tuple[str, ...] = (
     "model", "tool", "scheme", "method", "size", "value", "seconds", "fastest", "slowest", "first", "error",
@@ -79,26 +78,3 @@ def duration(seconds: float) -> str:
     """Seconds in a unit that suits them."""
     unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3)) if seconds >= u[1]), ("us", 1e-6))
     return f"{seconds / size:.3g} {unit}"
-
-
-def panels(name: str, rows: Sequence[Row]) -> list[Panel]:
-    """The panels of one scene: the states' error, and rho where it was computed."""
-    drawn = [Panel(name, "largest error of a state", _lines(rows, lambda row: row.judgement.error))]
-    measured = [row for row in rows if row.judgement.rho is not None]
-    if measured:
-        drawn.append(Panel(name, "rho, at most", _lines(measured, _rho)))
-    return drawn
-
-
-def _rho(row: Row) -> float:
-    rho = row.judgement.rho
-    return rho.upper if rho is not None and rho.upper < 1e300 else nan
-
-
-def _lines(rows: Sequence[Row], error: Callable[[Row], float]) -> list[Line]:
-    lines: list[Line] = []
-    for label in dict.fromkeys(row.attempt.label for row in rows):
-        own = [row for row in rows if row.attempt.label == label]
-        group = " ".join(filter(None, (own[0].attempt.tool, own[0].attempt.scheme)))
-        lines.append(Line(label, group, [Mark(error(row), row.seconds, row.judgement.verdict) for row in own]))
-    return lines

@@ -97,14 +97,14 @@ def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) ->
 
 
 def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:
-    from hsdsl.chart.rows import as_csv, as_text, panels, record
+    from hsdsl.chart.rows import as_csv, as_text, record
 
     rows = [row for _, group in charted for row in group]
     write_table(out, lambda: as_csv(rows))
     if plot is not None:
-        from hsdsl.plot.work_precision import plot_work_precision
+        from hsdsl.chart.picture import plot_work_precision
 
-        plot_work_precision(plot, [panels(name, group) for name, group in charted])
+        plot_work_precision(plot, charted)
         say(f"wrote {plot}")
     answer.give(
         lambda: {"rows": [record(row) for row in rows]},

@@ -65,12 +65,12 @@ def stability(
 
 
 def _report(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
-    from hsdsl.chart.stability.table import as_csv, as_plain, as_text, axis, panels, shaded
+    from hsdsl.chart.stability.table import as_csv, as_plain, as_text
 
     write_table(out, lambda: as_csv(found))
     if plot is not None:
-        from hsdsl.plot.stability import plot_stability
+        from hsdsl.chart.stability.picture import plot_stability
 
-        plot_stability(plot, found.name, axis(found.x), axis(found.y), panels(found), shaded(found))
+        plot_stability(plot, found)
         say(f"wrote {plot}")
     answer.give(lambda: as_plain(found), lambda: as_text(found))

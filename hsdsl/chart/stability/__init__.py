@@ -4,7 +4,8 @@
 `axes`         what varies, read from text
 `cells`        the outcome of one run, against a reference at the same numbers
 `limits`       known limits of linear stability
-`table`        a map as CSV and as plain values
+`table`        a map as CSV, as plain values and as text
+`picture`      a map as a picture
 =============  =====================================================================
 """
 

@@ -1,16 +1,15 @@
-"""A stability map as CSV, as plain values, and as the panels of a picture."""
+"""A stability map as CSV, as plain values, and as text."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from math import isfinite, log10
+from math import isfinite
 from typing import Any
 
 from hsdsl.chart.rows import csv_text
-from hsdsl.chart.stability import Axis, Panel, StabilityMap
-from hsdsl.chart.stability.cells import CONVERGED, WORDS, Cell
-from hsdsl.plot import stability as picture
+from hsdsl.chart.stability import Panel, StabilityMap
+from hsdsl.chart.stability.cells import WORDS, Cell
 
 COLUMNS = ("tool", "scheme", "method", "outcome", "rho", "error", "transitions", "why")
 
@@ -54,33 +53,3 @@ def as_text(found: StabilityMap) -> str:
         known += f" to {max(limits):.3g}" if limits and max(limits) > 1.001 * min(limits) else ""
         lines.append(f"{panel.tool.label:{width}}  {words}{known}")
     return "\n".join(lines)
-
-
-def panels(found: StabilityMap) -> list[picture.Panel]:
-    """The panels of a picture."""
-    return [
-        picture.Panel(
-            panel.tool.label,
-            [[cell.word for cell in row] for row in panel.cells],
-            [[_shade(cell, shaded(found)) for cell in row] for row in panel.cells],
-            panel.limit,
-        )
-        for panel in found.panels
-    ]
-
-
-def _shade(cell: Cell, measure: str) -> float | None:
-    """The logarithm of a measure of a converged run; None of any other."""
-    size = getattr(cell, measure)
-    return log10(max(size, 1e-15)) if cell.word == CONVERGED and isfinite(size) else None
-
-
-def shaded(found: StabilityMap) -> str:
-    """What the shades are of: ``rho`` where most converged runs have it, else ``error``."""
-    cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
-    return "rho" if 2 * sum(isfinite(cell.rho) for cell in cells) > len(cells) else "error"
-
-
-def axis(given: Axis) -> picture.Scale:
-    """An axis of a picture."""
-    return picture.Scale(given.name, given.values, given.logarithmic)

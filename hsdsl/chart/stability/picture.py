@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from math import isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.chart.stability import Axis, Panel, StabilityMap
+from hsdsl.chart.stability.cells import CONVERGED, Cell
 from hsdsl.plot.style import to_file
+from hsdsl.plot.sweep import edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,92 +30,72 @@ LIMIT = "#f0e442"
 PALEST = 0.75  # how much white is in the colour of the least accurate converged run
 
 
-@dataclass(frozen=True)
-class Scale:
-    """An axis: its name, its values, and whether they are spaced logarithmically."""
-
-    name: str
-    values: Sequence[float]
-    logarithmic: bool
-
-    @property
-    def edges(self) -> Any:
-        """Where cells begin and end, one more than values."""
-        at = np.log10(self.values) if self.logarithmic else np.array(self.values, dtype=float)
-        middle = (at[1:] + at[:-1]) / 2
-        edges = np.concatenate([[at[0] - (middle[0] - at[0])], middle, [at[-1] + (at[-1] - middle[-1])]])
-        return 10.0**edges if self.logarithmic else edges
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A tool's words, shades (logarithms; None: none) and limits, ``words[j][i]`` at value j of y and i of x."""
-
-    title: str
-    words: Sequence[Sequence[str]]
-    shades: Sequence[Sequence[float | None]]
-    limit: Sequence[float | None] | None
-
-
 @to_file
-def plot_stability(name: str, x: Scale, y: Scale, panels: Sequence[Panel], shaded: str = "rho") -> Figure:
-    """Draw the panels to a .png or .svg file; ``shaded`` says what the shades are of."""
+def plot_stability(found: StabilityMap) -> Figure:
+    """Draw a map to a .png or .svg file: shades are of rho where most converged runs have it, else of the error."""
     from matplotlib.figure import Figure
 
+    panels = found.panels
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(max(4.2, 3.3 * columns + 0.4), 2.9 * rows + 0.9), layout="constrained")
-    shades = [s for panel in panels for row in panel.shades for s in row if s is not None]
+    measure = _measure(found)
+    shades = [s for panel in panels for row in panel.cells for cell in row if (s := _shade(cell, measure)) is not None]
     span = (min(shades), max(shades)) if shades else (0.0, 1.0)
     grid: Any = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, panel in zip(grid.flat, panels, strict=False):
-        _draw(axes, panel, x, y, span)
+        _draw(axes, found, panel, measure, span)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     for axes in grid[-1]:
-        axes.set_xlabel(x.name)
+        axes.set_xlabel(found.x.name)
     for axes in grid[:, 0]:
-        axes.set_ylabel(y.name)
-    figure.suptitle(name, fontsize=10)
-    limited = any(_has_limit(panel, x) for panel in panels)
-    _legend(
-        figure,
-        panels,
-        limited,
-        columns + (columns > 2),
-        f"{shaded} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else "",
-    )
+        axes.set_ylabel(found.y.name)
+    figure.suptitle(found.name, fontsize=10)
+    shown = f"{measure} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else ""
+    _legend(figure, found, columns + (columns > 2), shown)
     return figure
 
 
-def _draw(axes: Axes, panel: Panel, x: Scale, y: Scale, span: tuple[float, float]) -> None:
-    colours = [
-        [_shaded(word, shade, span) for word, shade in zip(words, shades, strict=True)]
-        for words, shades in zip(panel.words, panel.shades, strict=True)
-    ]
-    axes.pcolormesh(x.edges, y.edges, np.array(colours), rasterized=True)
+def _measure(found: StabilityMap) -> str:
+    cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
+    return "rho" if 2 * sum(isfinite(cell.rho) for cell in cells) > len(cells) else "error"
+
+
+def _shade(cell: Cell, measure: str) -> float | None:
+    """The logarithm of a measure of a converged run; None of any other."""
+    size = getattr(cell, measure)
+    return log10(max(size, 1e-15)) if cell.word == CONVERGED and isfinite(size) else None
+
+
+def _draw(axes: Axes, found: StabilityMap, panel: Panel, measure: str, span: tuple[float, float]) -> None:
+    x, y = found.x, found.y
+    across, up = (edges(axis.values, axis.logarithmic) for axis in (x, y))
+    colours = [[_shaded(cell.word, _shade(cell, measure), span) for cell in row] for row in panel.cells]
+    axes.pcolormesh(across, up, np.array(colours), rasterized=True)
     if x.logarithmic:
         axes.set_xscale("log")
     if y.logarithmic:
         axes.set_yscale("log")
-    axes.set_title(panel.title, fontsize=9)
+    axes.set_title(panel.tool.label, fontsize=9)
     if _has_limit(panel, x):
         known = [(h, value) for h, value in zip(panel.limit or (), y.values, strict=True) if h]
         axes.plot(*zip(*known, strict=True), color=LIMIT, linewidth=2.2)
-    axes.set_xlim(x.edges[0], x.edges[-1])
-    axes.set_ylim(y.edges[0], y.edges[-1])
+    axes.set_xlim(across[0], across[-1])
+    axes.set_ylim(up[0], up[-1])
 
 
-def _has_limit(panel: Panel, x: Scale) -> bool:
+def _has_limit(panel: Panel, x: Axis) -> bool:
     """Whether its limit lies in the picture."""
-    return any(h is not None and x.edges[0] <= h <= x.edges[-1] for h in panel.limit or ())
+    across = edges(x.values, x.logarithmic)
+    return any(h is not None and across[0] <= h <= across[-1] for h in panel.limit or ())
 
 
 def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[float, ...]:
     from matplotlib.colors import to_rgb
 
     colour = np.array(to_rgb(COLOURS[word]))
-    if shade is None and word == "converged":
+    if shade is None and word == CONVERGED:
         shade = (span[0] + span[1]) / 2  # by how much is not known
     if shade is None:
         return tuple(colour)
@@ -121,16 +103,16 @@ def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[
     return tuple(colour * (1 - white) + white)
 
 
-def _legend(figure: Figure, panels: Sequence[Panel], limited: bool, columns: int, shades: str) -> None:
+def _legend(figure: Figure, found: StabilityMap, columns: int, shades: str) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    present = {word for panel in panels for row in panel.words for word in row}
+    present = {cell.word for panel in found.panels for row in panel.cells for cell in row}
     handles: list[Any] = [
         Patch(facecolor=colour, edgecolor="#888888", label=word) for word, colour in COLOURS.items() if word in present
     ]
     if shades and handles:
         handles[0].set_label(f"converged, {shades}")
-    if limited:
+    if any(_has_limit(panel, found.x) for panel in found.panels):
         handles.append(Line2D([], [], color=LIMIT, linewidth=2.2, label="limit of linear stability"))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
