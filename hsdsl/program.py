@@ -113,8 +113,9 @@ class EdgeProgram:
     that the reset gives a value, by number, written as ``change_texts``. The others keep theirs; only where the mode
     has the same states as the target are there any. ``contact`` is the number of the motion along its guard in the
     mode; None where there is none. ``push_order`` is the order of the guard's derivative, along the flow, that presses
-    then; ``counts`` are states that the edge counts with, which keep their values there. ``releases`` is the contact
-    that an edge of `ModeProgram.held` ends. Of an edge that is part of an event ``of_event`` has its name, how its
+    then; ``counts`` are states that the edge counts with, which keep their values there. Where its reset is
+    ``branched``, that of `ModeProgram.held` is the branch for slow impacts. ``releases`` is the contact that an edge of
+    `ModeProgram.held` ends. Of an edge that is part of an event ``of_event`` has its name, how its
     condition is written, and its options.
     """
 
@@ -131,6 +132,7 @@ class EdgeProgram:
     contact: int | None = None
     push_order: int = 0
     counts: tuple[int, ...] = ()
+    branched: bool = False
     releases: int | None = None
     of_event: tuple[str, ...] = ()
 

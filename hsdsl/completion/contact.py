@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 from sympy.core.relational import Relational
 
+from hsdsl.completion.branches import branched
 from hsdsl.completion.counts import counts_of
 from hsdsl.completion.nearby import (
     SMALL,
@@ -89,6 +90,9 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
         return None
     near = Nearby(mode, edge, mode_of_part(edge, numbers))
+    near = branched(near) if near.changed and near.is_small() else near
+    if near is None:
+        return None
     near = near.without(counts) if (counts := counts_of(near)) else near
     if any(mode.states[i] in numbers for i in near.changed):
         return None

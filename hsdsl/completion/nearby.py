@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import lru_cache
 from itertools import chain
 from operator import mul, sub
@@ -40,11 +40,19 @@ class Nearby:
     """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
 
     ``changed`` has the numbers of these states, but for those in ``counts``, ``own`` their symbols, ``moved`` what the
-    reset adds to each. ``mode`` is the edge's, ``here`` that of the part that the edge belongs to.
+    reset adds to each. ``impact`` is a point of a guard before an impact, where the reset is a branch of one. ``mode``
+    is the edge's, ``here`` that of the part that the edge belongs to.
     """
 
-    def __init__(self, mode: Mode, edge: Edge, here: dict[sp.Symbol, sp.Integer], counts: Sequence[int] = ()) -> None:
-        self._here, self.mode = here, mode
+    def __init__(
+        self,
+        mode: Mode,
+        edge: Edge,
+        here: dict[sp.Symbol, sp.Integer],
+        counts: Sequence[int] = (),
+        impact: Point | None = None,
+    ) -> None:
+        self._here, self.mode, self.impact = here, mode, impact
         self.states, self.edge = symbols(mode.states), edge
         self.guard = sp.sympify(edge.surface.residual).xreplace(here)
         self._flow = _rows(mode.states, mode.flow)
@@ -55,7 +63,11 @@ class Nearby:
 
     def without(self, counts: Sequence[int]) -> Nearby:
         """The same with a reset that leaves some states as they are."""
-        return Nearby(self.mode, self.edge, self._here, counts)
+        return Nearby(self.mode, self.edge, self._here, counts, self.impact)
+
+    def by(self, edge: Edge, impact: Point) -> Nearby:
+        """The same of an edge with another reset, which is that of impacts as at a point."""
+        return Nearby(self.mode, edge, self._here, (), impact)
 
     def flow(self, x: sp.Symbol) -> Any:
         """The rate of time or of a state."""
@@ -122,11 +134,22 @@ def cancelled(value: sp.Expr) -> sp.Expr:
 
 def fixed_point(near: Nearby) -> Point | None:
     """A random point of a guard where its reset changes nothing, by Newton's method; None where none is found."""
-    equations, flows = [near.guard, *near.moved], near.flows()
+    equations = [near.guard, *near.moved]
     free = [x for x in near.among(sp.Tuple(*equations)) if x != TIME]
-    names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in (*equations, *flows)))
-    draw = random.Random(1)
+    return solved(equations, free, drawn((*equations, *near.flows()), 1) | (near.impact or {}))
+
+
+def drawn(expressions: Sequence[sp.Expr], seed: int, either: Collection[Any] = ()) -> Point:
+    """Random values of the names in expressions, from 1 to 2; those of names in ``either`` with either sign."""
+    names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in expressions))
+    draw = random.Random(seed)
     at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
+    return {name: -value if name in either and draw.random() < 0.5 else value for name, value in at.items()}
+
+
+def solved(equations: Sequence[sp.Expr], free: Sequence[Any], start: Point) -> Point | None:
+    """Solve equations for some names from a point on, by Newton's method; None where no solution is found."""
+    at = dict(start)
     slopes = jacobian(equations, free)
     for _ in range(MOST_ROUNDS):
         values = [value_at(e, at) for e in equations]

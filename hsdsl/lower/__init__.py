@@ -107,7 +107,10 @@ def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tu
     """A mode's edges with what a run knows of motion along their guards."""
     whole = list(edges)
     for i, motion in enumerate(found.contacts):
-        whole[motion.edge] = replace(edges[motion.edge], contact=i, push_order=motion.order, counts=motion.counts)
+        whole[motion.edge] = replace(
+            edges[motion.edge], contact=i, push_order=motion.order, counts=motion.counts,
+            branched=motion.near.impact is not None,
+        )  # fmt: skip
     return tuple(whole)
 
 

@@ -107,16 +107,19 @@ def lifts_next(run: Run, looked: ModeState, k: int) -> bool:
     return False
 
 
-def reset_but_counts(here: ModeState, k: int, t: Number, x: State) -> State:
-    """What the reset of edge k makes of a state, but for states that it counts with."""
-    after, counts = here.kernel.resets[k](t, *x), here.mode.edges[k].counts
+def reset_but_counts(run: Run, here: ModeState, k: int, t: Number, x: State) -> State:
+    """What the reset of edge k, its branch for slow impacts, makes of a state, but for states that it counts with."""
+    kernel, counts = here.kernel, here.mode.edges[k].counts
+    if here.mode.edges[k].branched:
+        kernel = in_contact(run, here, ()).kernel
+    after = kernel.resets[k](t, *x)
     return tuple(x[i] if i in counts else a for i, a in enumerate(after)) if counts else after
 
 
 def keeps(run: Run, here: ModeState, k: int) -> bool:
     """Whether the reset of edge k leaves the state where it is."""
     noise = (SAME_UNITS * run.arithmetic.unit * s for s in here.arc.scales)
-    after = reset_but_counts(here, k, here.t, here.x)
+    after = reset_but_counts(run, here, k, here.t, here.x)
     return all(abs(a - b) <= most for a, b, most in zip(after, here.x, noise, strict=True))
 
 

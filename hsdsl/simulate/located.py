@@ -68,7 +68,7 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
         crossing, edges = outcome.crossing, here.mode.edges
         if not held.surfaces.releases(crossing.edge):
             ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
-            x = held_exactly(run, here, held, crossing.time, crossing.state).x
+            x = held_exactly(run, here, held, crossing.time, crossing.state, [crossing.edge]).x
             others = tuple(name for name in outcome.alternatives if name not in ends)
             return replace(outcome, crossing=replace(crossing, state=x), alternatives=others)
         t, x, ends = crossing.time, crossing.state, True
@@ -135,10 +135,10 @@ def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing
 
 
 def stands(here: ModeState, crossing: Crossing) -> bool:
-    """Whether a crossing's state is on a surface that the state was on that it came from."""
+    """Whether a crossing's state is on a surface that the state was on that it came from, or one holds it."""
     t, q, surfaces = crossing.time, crossing.state, here.surfaces
-    if not surfaces.active:
-        return False
+    if surfaces.touched or not surfaces.active:
+        return bool(surfaces.touched)
     r = here.kernel.surfaces(t, *q)
     return any(k == crossing.edge or abs(r[k]) <= surfaces.roundoff_bound(k, t, q) for k in surfaces.active)
 
@@ -168,11 +168,11 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
 
 
 def unseen(run: Run, here: ModeState, span: Span, first: Crossing, seen: set[int]) -> list[Crossing]:
-    """Crossings before a first one of surfaces with an `if` that rise by less than a step's polynomials are off by."""
+    """Crossings before a first one of surfaces that rise by less than a step's polynomials are off by."""
     t, x, found = span.t, span.x, list[Crossing]()
     start, end = here.kernel.surfaces(t, *x), here.kernel.surfaces(first.time, *first.state)
-    for k, edge in enumerate(here.mode.edges):
-        if k in seen or not edge.conditional or here.surfaces.releases(k) or not first.theta > 0:
+    for k in range(len(here.mode.edges)):
+        if k in seen or here.surfaces.releases(k) or not first.theta > 0:
             continue
         bound = here.surfaces.roundoff_bound
         if not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):

@@ -137,7 +137,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
 
 def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
-    kept = partial(fixed_point, here)
+    kept = partial(fixed_point, run, here)
     most = reach(run, here) if len(edges) > 1 else ()
     if most and not all(is_near(here.x, kept(k, here.t, here.x), most) for k in edges):
         return None  # the limit is no nearer than what each of them keeps
@@ -164,17 +164,19 @@ def is_near(x: State, q: State, most: Sequence[Number]) -> bool:
     return all(abs(a - b) <= far for a, b, far in zip(q, x, most, strict=True))
 
 
-def held_exactly(run: Run, here: ModeState, held: ModeState, t: Number, x: State) -> ModeState:
+def held_exactly(
+    run: Run, here: ModeState, held: ModeState, t: Number, x: State, reached: Sequence[int] = ()
+) -> ModeState:
     """The mode itself again, the state without what steps along its guards were off by: they may hold it again.
 
-    It is off them by the round-off of what it has ever been computed from.
+    It stays on those that it has ``reached``. It is off them by the round-off of what it has ever been computed from.
     """
     touched, after = in_touch(here, held), after_contact(here, held, t, x)
     scale = tuple(map(max, after.surfaces.scale, here.arc.scales))
     after = replace(after, surfaces=replace(after.surfaces, scale=scale))
     try:
-        q = in_turn(partial(onto_guard, after), touched, t, x)
-        q = in_turn(partial(fixed_point, after), touched, t, q)
+        q = in_turn(partial(onto_guard, after), [*touched, *reached], t, x)
+        q = in_turn(partial(fixed_point, run, after), touched, t, q)
         return after.moved(t, q) if all(keeps(run, after.moved(t, q), k) for k in touched) else after
     except DOMAIN_ERRORS:
         return after
@@ -213,9 +215,9 @@ def meets_another(here: ModeState, there: ModeState, edges: list[int]) -> bool:
     return False
 
 
-def fixed_point(here: ModeState, k: int, t: Number, x: State) -> State:
+def fixed_point(run: Run, here: ModeState, k: int, t: Number, x: State) -> State:
     """The point that repeated resets run to."""
-    return limit(lambda x: reset_but_counts(here, k, t, x), x)
+    return limit(lambda x: reset_but_counts(run, here, k, t, x), x)
 
 
 def limit(step: Callable[[State], State], x: State) -> State:

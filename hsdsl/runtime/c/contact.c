@@ -22,9 +22,13 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
-/* What the reset of an edge makes of a state, but for states that it counts with, to `out`. */
-static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const hs_real *x, hs_real *out) {
-  if (hs_changed(edge, edge->reset, run->here.p, t, x, x, out)) return RAISED;
+/* What the reset of edge k, its branch for slow impacts, makes of a state, but for states that it counts with, to
+   `out`. */
+static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *out) {
+  const hs_mode *const own = run->here.table;
+  const hs_edge *const edge = &own->edge[k];
+  const hs_edge *const by = edge->branched ? &run->model->mode[own->held].edge[k] : edge;
+  if (hs_changed(by, by->reset, run->here.p, t, x, x, out)) return RAISED;
   for (int i = 0; i < edge->counts; i++) out[edge->count[i]] = x[edge->count[i]];
   return 0;
 }
@@ -32,9 +36,8 @@ static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const h
 /* Whether the reset of edge k leaves the state where it is. */
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
-  const hs_edge *edge = &here->table->edge[k];
   int still = 1;
-  if (reset_but_counts(run, edge, t, x, run->after)) return RAISED;
+  if (reset_but_counts(run, k, t, x, run->after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
     still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
   return still;

@@ -223,7 +223,7 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 
 /* contact.c */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope);
-static int reset_but_counts(hs_run *run, const hs_edge *edge, hs_time t, const hs_real *x, hs_real *out);
+static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *out);
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);
 static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks);
 static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched);
@@ -243,7 +243,7 @@ static const hs_made *made_before(const hs_run *run, int back);
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
 static hs_time flown(const hs_run *run, hs_time t);
 static int of_contacts(hs_run *run);
-static void be_held_exactly(hs_run *run, hs_time t, hs_real *x);
+static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached);
 static int close_tail(hs_run *run, int k);
 
 /* touching.c */

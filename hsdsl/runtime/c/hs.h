@@ -90,6 +90,7 @@ typedef struct {
   int push_order; /* the derivative of the guard along the flow that presses then */
   int counts;     /* states that it counts with, which motion along its guard leaves as they are */
   const int *count;
+  int branched;   /* whether its reset in the mode with motion along guards is a branch of this one, for slow impacts */
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 

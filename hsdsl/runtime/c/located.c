@@ -78,9 +78,9 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   return touched(run, k, crossing);
 }
 
-/* Whether a crossing's state is on a surface that the state was on that it came from: 1, 0 or RAISED. */
+/* Whether a crossing's state is on a surface that the state was on that it came from, or one holds it: 1, 0 or RAISED. */
 static int stands(hs_run *run, const hs_crossing *crossing) {
-  int stood = 0;
+  int stood = run->here.p == run->held_p;
   for (int k = 0; run->here.standing && k < run->here.table->surfaces && !stood; k++) {
     hs_real r, noise;
     if (!run->active_surfaces[k]) continue;
@@ -138,8 +138,8 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   return count;
 }
 
-/* Add crossings before the first one, of `count`, of surfaces with an `if` that rise by less than the step's polynomials
-   are off by: how many there are then, or RAISED. */
+/* Add crossings before the first one, of `count`, of surfaces that rise by less than the step's polynomials are off by:
+   how many there are then, or RAISED. */
 static int with_unseen(hs_run *run, int count) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
@@ -149,7 +149,7 @@ static int with_unseen(hs_run *run, int count) {
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
   if (!(first->theta > 0)) return count;
   for (int k = 0; k < mode->edges; k++) {
-    int was = !mode->edge[k].conditional || releases(run, k);
+    int was = releases(run, k);
     for (int i = 0; i < seen; i++) was |= run->crossings[i].edge == k;
     if (was) continue;
     hs_real start, end, before, noise, s = 0.0;
@@ -265,7 +265,7 @@ static void drop_releases(hs_run *run) {
 /* Go on in the mode itself from run->x, which a guard no longer holds. */
 static int released(hs_run *run, hs_time t) {
   hs_mode_state *const here = &run->here;
-  be_held_exactly(run, t, run->x);
+  be_held_exactly(run, t, run->x, -1);
   const int standing_before = here->standing;
   copy(run->scale, run->landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
@@ -294,9 +294,9 @@ static int along_guards(hs_run *run, hs_time limit) {
     }
     if (outcome == LANDED) {
       drop_releases(run);
-      be_held_exactly(run, run->chosen.time, run->chosen.state);
+      be_held_exactly(run, run->chosen.time, run->chosen.state, end);
     } else if (outcome == AT_BOUNDARY) {
-      be_held_exactly(run, here->t, run->x);
+      be_held_exactly(run, here->t, run->x, -1);
     } else {
       run->still = same_state(run->began, run->x, here->dimension);
       after_contact(run);

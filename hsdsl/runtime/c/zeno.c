@@ -38,13 +38,12 @@ static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
 /* The point that repeated resets of edge k run to from run->z, to run->z. */
 static int fixed_point(hs_run *run, int k, hs_time t) {
   const hs_mode_state *here = &run->here;
-  const hs_edge *edge = &here->table->edge[k];
   const int n = here->dimension;
   hs_real *const x = run->z, *const one = run->after, *const two = run->at;
   for (int i = 0; i < MOST_ROUNDS; i++) {
-    if (reset_but_counts(run, edge, t, x, one)) return RAISED;
+    if (reset_but_counts(run, k, t, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
-    if (reset_but_counts(run, edge, t, one, two)) return RAISED;
+    if (reset_but_counts(run, k, t, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
   }
   return 0;
@@ -95,8 +94,9 @@ static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count,
 }
 
 /* Be in the mode itself again at t, the state x without what steps along its guards were off by: they may hold it
-   again. It is off them by the round-off of what it has ever been computed from. */
-static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
+   again. It stays on that of the edge that it has `reached`, -1 for none. It is off them by the round-off of what it has
+   ever been computed from. */
+static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached) {
   const hs_mode_state *here = &run->here;
   const int edges = run->model->mode[here->mode].edges;
   int count = 0, held = 1;
@@ -106,7 +106,10 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x) {
   for (int s = 0; s < here->dimension; s++) run->scale[s] = hs_max(run->scale[s], run->scales[s]);
   for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
   copy(run->z, x, here->dimension);
-  if (in_turn(run, onto_guard, count, t) || in_turn(run, fixed_point, count, t)) return;
+  if (reached >= 0) run->tail[reached] = 1;
+  if (in_turn(run, onto_guard, count + (reached >= 0), t)) return;
+  if (reached >= 0) run->tail[reached] = 0;
+  if (in_turn(run, fixed_point, count, t)) return;
   for (int k = 0; k < edges && held; k++) held = !run->tail[k] || keeps(run, t, run->z, k) == 1;
   if (held) copy(x, run->z, here->dimension);
 }
