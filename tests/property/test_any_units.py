@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -56,13 +54,11 @@ METHODS = ("taylor", "dopri5", "dop853", "radau")
 FACTORS = {"x": 1, "v": 2, "y": None}
 
 
-def in_units(folder: Path, name: str, factors: tuple[float, float, float], **asked: object) -> hsdsl.Execution:
+def in_units(name: str, factors: tuple[float, float, float], **asked: object) -> hsdsl.Execution:
     modes, initial, until = SCENES[name]
     numbers = dict(zip("TXW", map(repr, factors), strict=True))
-    path = folder / "m.yaml"
     text = HEAD.replace("{modes}", modes.replace("{", "{{").replace("}", "}}")).format(initial=initial, **numbers)
-    path.write_text(f"{text}experiment: {{until: {until}*T}}\n")
-    return hsdsl.load(path).simulate(**asked)
+    return hsdsl.loads(f"{text}experiment: {{until: {until}*T}}\n").simulate(**asked)
 
 
 def assert_scaled(one: hsdsl.Execution, other: hsdsl.Execution, factors: tuple[float, float, float]) -> None:
@@ -84,37 +80,37 @@ def powers(exponents: tuple[int, int, int]) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SCENES)
-def test_located_runs_do_not_know_units(name: str, method: str, tmp_path: Path) -> None:
-    one = in_units(tmp_path, name, (1.0, 1.0, 1.0), method=method, relaxation=2.0**-20)
+def test_located_runs_do_not_know_units(name: str, method: str) -> None:
+    one = in_units(name, (1.0, 1.0, 1.0), method=method, relaxation=2.0**-20)
     for exponents in UNITS:
         factors = powers(exponents)
-        other = in_units(tmp_path, name, factors, method=method, relaxation=2.0**-20 * factors[0])
+        other = in_units(name, factors, method=method, relaxation=2.0**-20 * factors[0])
         assert_scaled(one, other, factors)
     assert one.transitions
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", list(SCENES)[1:])
-def test_relaxed_runs_do_not_know_units_that_the_relaxation_has(name: str, method: str, tmp_path: Path) -> None:
-    one = in_units(tmp_path, name, (1.0, 1.0, 1.0), scheme="relaxed", method=method, relaxation=2.0**-10)
+def test_relaxed_runs_do_not_know_units_that_the_relaxation_has(name: str, method: str) -> None:
+    one = in_units(name, (1.0, 1.0, 1.0), scheme="relaxed", method=method, relaxation=2.0**-10)
     for exponent in (-20, 5, 20):
         factors = powers((exponent, exponent, exponent))
         asked = {"scheme": "relaxed", "method": method, "relaxation": 2.0**-10 * factors[0]}
-        assert_scaled(one, in_units(tmp_path, name, factors, **asked), factors)
+        assert_scaled(one, in_units(name, factors, **asked), factors)
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_python_loop_does_not_either(name: str, tmp_path: Path) -> None:
+def test_the_python_loop_does_not_either(name: str) -> None:
     asked = {"engine": "python", "tolerance": 1e-6}
-    one = in_units(tmp_path, name, (1.0, 1.0, 1.0), relaxation=2.0**-20, **asked)
+    one = in_units(name, (1.0, 1.0, 1.0), relaxation=2.0**-20, **asked)
     factors = powers((21, -17, 33))
-    assert_scaled(one, in_units(tmp_path, name, factors, relaxation=2.0, **asked), factors)
+    assert_scaled(one, in_units(name, factors, relaxation=2.0, **asked), factors)
 
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("factors", [(1e-9, 1.0, 1e9), (1e12, 1e-12, 1e-12), (1.0, 1e12, 1e12), (1e-12, 1e5, 1e-9)])
-def test_any_units_by_default_settings(name: str, factors: tuple[float, float, float], tmp_path: Path) -> None:
-    one, other = in_units(tmp_path, name, (1.0, 1.0, 1.0)), in_units(tmp_path, name, factors)
+def test_any_units_by_default_settings(name: str, factors: tuple[float, float, float]) -> None:
+    one, other = in_units(name, (1.0, 1.0, 1.0)), in_units(name, factors)
     common = min(len(one.transitions), len(other.transitions))  # how long a Zeno tail is followed: `relaxation`
     assert common == len(one.transitions) or "ball" in name
     assert [t.edge for t in one.transitions[:common]] == [t.edge for t in other.transitions[:common]]

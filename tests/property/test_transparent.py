@@ -8,7 +8,7 @@ zero. Draws are kept apart from near misses, ties and conditions at their edge.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 import pytest
 from engines import ENGINES
+from numpy.polynomial.polynomial import polyadd, polyder, polymul, polyval
 
 from hsdsl.elaborate import elaborate
 from hsdsl.model import Model
 
-Poly = list[Fraction]
+Poly = Sequence[Fraction]  # the coefficient of 1 first
 APART = 0.06  # roots of one surface, crossings of different ones
 CLEAR = 2e-2  # how far conditions and turning points are from deciding otherwise
 TANGENTIAL = 1e-3  # a fourth root of round-off: a surface may rise with the fourth power of time
@@ -45,23 +46,6 @@ class TooClose(Exception):
     """A draw that round-off or the error of a method may decide."""
 
 
-def times(a: Poly, b: Poly) -> Poly:
-    product = [Fraction(0)] * (len(a) + len(b) - 1)
-    for i, p in enumerate(a):
-        for j, q in enumerate(b):
-            product[i + j] += p * q
-    return product
-
-
-def plus(a: Poly, b: Poly) -> Poly:
-    longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
-    return [p + (shorter[i] if i < len(shorter) else 0) for i, p in enumerate(longer)]
-
-
-def at(p: Poly, s: float) -> float:
-    return float(sum(float(c) * s**k for k, c in enumerate(p)))
-
-
 def roots(p: Poly) -> list[float]:
     """Positive real roots, zero ones taken out before; of a draw that is well apart from double ones."""
     shifted = list(p)
@@ -71,9 +55,9 @@ def roots(p: Poly) -> list[float]:
         shifted.pop()
     found = sorted(r.real for r in np.roots([float(c) for c in reversed(shifted)]) if abs(r.imag) < 1e-7)
     found = [float(r) for r in found if r > 1e-9]
-    slope = [k * c for k, c in enumerate(p)][1:] or [Fraction(0)]
-    turns = [r.real for r in np.roots([float(c) for c in reversed(slope)] or [1.0]) if abs(r.imag) < 0.3]
-    if any(abs(at(p, s)) < CLEAR for s in turns if s > 1e-9):
+    slope = polyder(p)
+    turns = [r.real for r in np.roots([float(c) for c in reversed(slope)]) if abs(r.imag) < 0.3]
+    if any(abs(polyval(s, p)) < CLEAR for s in turns if s > 1e-9):
         raise TooClose
     if any(b - a < APART for a, b in pairwise([0.0, *found])):
         raise TooClose
@@ -92,17 +76,16 @@ class Surface:
         first = next((c for c in self.along if c != 0), Fraction(0))
         if self.along[0] == 0 and first > 0:
             yield 0.0
-        slope = [k * c for k, c in enumerate(self.along)][1:]
-        yield from (s for s in roots(self.along) if at(slope, s) > 0)
+        yield from (s for s in roots(self.along) if polyval(s, polyder(self.along)) > 0)
 
     def fires(self) -> float | None:
         """When it fires."""
         for s in self.crossings():
             if self.margin is None:
                 return s
-            if abs(at(self.margin, s)) < CLEAR:
+            if abs(polyval(s, self.margin)) < CLEAR:
                 raise TooClose
-            if at(self.margin, s) > 0:
+            if polyval(s, self.margin) > 0:
                 return s
         return None
 
@@ -115,10 +98,10 @@ def surface(rng: random.Random, x: Poly, y: Poly) -> Surface:
     """A surface that the mode is often entered on; one without `if` is not begun beyond."""
     k = fraction(rng)
     kinds = [
-        (f"x + ({k})*y", plus(x, times([k], y))),
-        (f"x**2 + ({k})*y", plus(times(x, x), times([k], y))),
-        ("x*y", times(x, y)),
-        (f"x - ({k})*s**2", plus(x, [Fraction(0), Fraction(0), -k])),
+        (f"x + ({k})*y", polyadd(x, polymul([k], y))),
+        (f"x**2 + ({k})*y", polyadd(polymul(x, x), polymul([k], y))),
+        ("x*y", polymul(x, y)),
+        (f"x - ({k})*s**2", polyadd(x, [Fraction(0), Fraction(0), -k])),
     ]
     text, along = rng.choice(kinds)
     if rng.random() < 0.5:
@@ -126,9 +109,9 @@ def surface(rng: random.Random, x: Poly, y: Poly) -> Surface:
     level = along[0] if rng.random() < 0.7 else along[0] + fraction(rng)
     conditional = rng.random() < 0.75 or level < along[0]
     a, b, c = (fraction(rng) for _ in range(3))
-    margin = plus(times([a], y), [c, b])
+    margin = polyadd(polymul([a], y), [c, b])
     condition = f"({a})*y + ({b})*s >= {-c}"
-    along = plus(along, [-level])
+    along = polyadd(along, [-level])
     if all(c == 0 for c in along):
         raise TooClose
     return Surface(f"{text} >= {level}", along, condition, margin if conditional else None)

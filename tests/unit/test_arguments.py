@@ -90,7 +90,7 @@ def test_any_backend_of_matplotlib_may_be_named(named, tmp_path):
     assert (tmp_path / "x.svg").stat().st_size > 1000
 
 
-def test_times_of_samples_in_no_order_have_a_place(tmp_path):
+def test_times_of_samples_in_no_order_have_a_place():
     text = """hsdsl: 1
 parameters: {T: 1.25}
 inputs:
@@ -99,9 +99,8 @@ modes: {a: {flow: {x: pulse}}}
 initial: {mode: a, x: 0}
 experiment: {until: 4}
 """
-    (tmp_path / "m.yaml").write_text(text)
-    model = hsdsl.load(tmp_path / "m.yaml")
+    model = hsdsl.loads(text)
     model.simulate()
-    with pytest.raises(UsageError, match=r"m\.yaml:4:30: .* pulse do not increase: 3\.0 after 3\.5") as refused:
+    with pytest.raises(UsageError, match=r"<text>:4:30: .* pulse do not increase: 3\.0 after 3\.5") as refused:
         model.simulate(parameters={"T": 1.75})
     assert refused.value.hint == "give each time once, the earliest first"

@@ -47,10 +47,8 @@ def test_a_run_that_fills_its_memory_keeps_what_was_computed(engine, kind):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_rows_of_many_states_are_counted_by_their_size(engine, tmp_path):
-    path = tmp_path / "wide.yaml"
-    path.write_text(WIDE)
-    run = hsdsl.load(path, limits=Limits(memory=3_000_000)).simulate(engine=engine, method="rk4")
+def test_rows_of_many_states_are_counted_by_their_size(engine):
+    run = hsdsl.loads(WIDE, limits=Limits(memory=3_000_000)).simulate(engine=engine, method="rk4")
     assert run.stop.reason == "memory_limit"
     assert run.values.nbytes + run.coefficients.nbytes < 30_000_000
 
