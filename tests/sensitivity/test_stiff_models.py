@@ -34,7 +34,9 @@ COUNTER = hsdsl.loads("""
 hsdsl: 1
 parameters: {a: 0.8}
 modes:
-  A: {flow: {x: 1, y: 0, n: 0}, transitions: [{name: up, when: x >= a + y, to: A, reset: {x: x - a, y: y + n, n: n + 1}}]}
+  A:
+    flow: {x: 1, y: 0, n: 0}
+    transitions: [{name: up, when: x >= a + y, to: A, reset: {x: x - a, y: y + n, n: n + 1}}]
 initial: {mode: A, x: 0, y: 0.2, n: 0}
 experiment: {until: 1.2}
 """)
