@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import sympy as sp
 
 from hsdsl.completion.nearby import SMALL, Nearby, fixed_point, symbols, value_at
@@ -17,7 +15,7 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
     A sum that converges, as that of what impacts dissipate, is none: its increment vanishes where the state rests. Nor
     is what repeated resets take to a limit of its own.
     """
-    unused = _unused(near.mode) if near.changed else ()
+    unused = _unused_of(near.mode) if near.changed else ()
     few = tuple(i for i in near.changed if i in unused)
     if not few or not near.is_small() or (found := fixed_point(near.without(few))) is None:
         return ()
@@ -31,7 +29,15 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
     return tuple(i for i, change in zip(near.changed, near.moved, strict=True) if i in few and is_count(i, change))
 
 
-@lru_cache(maxsize=16)
+_last: list[tuple[Mode, frozenset[int]]] = []  # of a mode all edges in turn; to hash one takes longer than this does
+
+
+def _unused_of(mode: Mode) -> frozenset[int]:
+    if not _last or _last[0][0] is not mode:
+        _last[:] = [(mode, _unused(mode))]
+    return _last[0][1]
+
+
 def _unused(mode: Mode) -> frozenset[int]:
     """The states without a flow that no flow, surface, `if` or other state depends on while the mode lasts."""
     states = dict(zip(symbols(mode.states), range(len(mode.states)), strict=True))
