@@ -165,3 +165,6 @@ def thermostat(switches, heats="on", cools="off"):
             after = cools if mode == heats else heats
             draft.transition(float(j + 1), float(j + 1), f"{mode}->{after}", mode, after, {"T": high}, {"T": high})
     return draft.make()
+
+
+EVERY = (bouncing_ball, modes_of_different_size, jumping_input, ends_in_strip, blow_up)

@@ -169,16 +169,7 @@ def test_without_pandas_it_says_what_to_install(monkeypatch):
         hand_made.jumping_input().to_pandas()
 
 
-MADE = [
-    hand_made.bouncing_ball,
-    hand_made.modes_of_different_size,
-    hand_made.jumping_input,
-    hand_made.ends_in_strip,
-    hand_made.blow_up,
-]
-
-
-@pytest.mark.parametrize("make", MADE)
+@pytest.mark.parametrize("make", hand_made.EVERY)
 def test_equal_when_made_again(make):
     assert make() == make()
     assert replace(make(), output_function=lambda mode, t, state: ()) == make()

@@ -45,18 +45,7 @@ def odd_settings():
     return replace(hand_made.ends_in_strip(), settings=settings)
 
 
-MADE = [
-    hand_made.bouncing_ball,
-    hand_made.modes_of_different_size,
-    hand_made.jumping_input,
-    hand_made.ends_in_strip,
-    hand_made.blow_up,
-    fifty_digits,
-    odd_settings,
-]
-
-
-@pytest.mark.parametrize("make", MADE)
+@pytest.mark.parametrize("make", [*hand_made.EVERY, fifty_digits, odd_settings])
 def test_npz_loses_nothing(make, tmp_path):
     run = make()
     assert run.save(tmp_path / "run.npz") == (tmp_path / "run.npz",)
