@@ -33,14 +33,16 @@ static int all_known(const hs_view *v) {
 }
 
 /* Whether states may be moved along a part by more than is left of what is allowed for the step, `enough`, after the
-   parts before: halves are looked at until no part takes more than half its share. */
+   parts before: halves are looked at until no part takes more than half its share, or than a quarter of what is left. */
 static int flow_open(hs_view *v, int64_t row, int level, double start, double width) {
   int open = 0;
   if (++v->looks > MOST_LOOKS) return 1;
   expand_flow(v, row, start, width);
   if (level == 0 && v->f->steep && !all_known(v)) return 1;
-  for (int i = 0; i < v->n; i++)
-    open |= !((v->beyond[i] = moved_unseen(v, row, i, width)) <= RESOLVED * hs_max(v->own[i], HS_NOTHING) * width / 2);
+  for (int i = 0; i < v->n; i++) {
+    const double share = RESOLVED * hs_max(v->own[i], HS_NOTHING) * width / 2;
+    open |= !((v->beyond[i] = moved_unseen(v, row, i, width)) <= hs_max(share, v->enough[i] / 4));
+  }
   if (open && level < LEVELS)
     return flow_open(v, row, level + 1, start, width / 2) ||
            flow_open(v, row, level + 1, start + width / 2, width / 2);
