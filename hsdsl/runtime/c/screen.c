@@ -136,7 +136,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
   v.beyond_at_start = take(store, m, sizeof(int));
   v.enough = numbers(store, w);
-  v.beyond = numbers(store, w);
+  v.drift = numbers(store, w);
   v.missed = numbers(store, (int64_t)w * model->modes);
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));

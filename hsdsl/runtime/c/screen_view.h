@@ -52,7 +52,7 @@ typedef struct {
   hs_range *range;
   hs_rounded *rounded;
   hs_expansion *around, *slopes;
-  double *beyond; /* how far a part may move states */
+  double *drift;  /* how far parts of a step have moved states unseen */
   hs_near_miss *nearest; /* of each mode */
   int looks;
 } hs_view;

@@ -58,6 +58,11 @@ class Expansion:
         return np.abs(self.terms).sum(axis=0)
 
     @property
+    def mean(self) -> Array:
+        """The mean of the polynomial."""
+        return self.terms[0] + self.terms[2] / 3
+
+    @property
     def reach(self) -> Array:
         """How far the function may be from that."""
         return self.turn + self.rest
@@ -84,11 +89,15 @@ class Expansion:
 
     def __mul__(self, other: Expansion) -> Expansion:
         if other is self:
-            return at_most(product(self, self), lambda value: value * value, self)
+            return at_most(product(self, self), _square, self)
         return at_most(product(self, other), Range.__mul__, self, other)
 
     def __truediv__(self, other: Expansion) -> Expansion:
         return at_most(product(self, reciprocal(other)), Range.__truediv__, self, other)
+
+
+def _square(value: Range) -> Range:
+    return value * value
 
 
 def line(value: Any, slope: Any) -> Expansion:

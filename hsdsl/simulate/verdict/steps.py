@@ -67,10 +67,9 @@ class Parts:
 
     def halves(self) -> Parts:
         """Both halves of each, the first ones before the second ones."""
-        left, right = halving(self.bernstein.shape[2] - 1)
-        both = replace(self, bernstein=self.bernstein @ left, width=self.width / 2)
-        other = replace(both, bernstein=self.bernstein @ right, start=self.start + both.width)
-        return _joined([both, other])
+        left, right = (self.bernstein @ half for half in halving(self.bernstein.shape[2] - 1))
+        both = replace(self, bernstein=left, width=self.width / 2)
+        return joined([both, replace(both, bernstein=right, start=self.start + both.width)])
 
     @property
     def times(self) -> Range:
@@ -103,9 +102,8 @@ class Parts:
         half = self.width * self.length / 2
         slopes = powers[..., 1:] * np.arange(1.0, degree + 1) / half[:, None, None]
         times = line(self.time + (self.start + self.width / 2) * self.length, half)
-        columns = range(powers.shape[1])
-        states = [polynomial(powers[:, i], self.error[:, i]) for i in columns]
-        return [times, *states], [polynomial(slopes[:, i], np.zeros(len(self))) for i in columns]
+        states = [polynomial(powers[:, i], error) for i, error in enumerate(self.error.T)]
+        return [times, *states], [polynomial(slope, np.zeros(len(self))) for slope in slopes.swapaxes(0, 1)]
 
     @property
     def bound_data(self) -> list[Range]:
@@ -164,7 +162,8 @@ def _data(run: RunView, times: Array) -> Array:
     return np.array([s.data for s in segments], dtype=float)[which]
 
 
-def _joined(parts: Sequence[Parts]) -> Parts:
+def joined(parts: Sequence[Parts]) -> Parts:
+    """Parts in one mode together."""
     first = parts[0]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     data = first.data if len(first.data) == 1 else np.concatenate([part.data for part in parts])
