@@ -2,8 +2,8 @@
 
 #include "screen_view.h"
 
-#define FEWEST 3  /* the order of the companion's first series */
-#define FURTHER 2 /* by how much it grows where that is not enough */
+#define FEWEST 3     /* the order of the companion's first series */
+#define MORE_TERMS 2 /* by how much it grows where that is not enough */
 
 /* Turn the companion's coefficients into differences from those of the run's step, and find how far it is away at the
    end, to y; whether the last ones are so small that all steps together leave out little. */
@@ -29,7 +29,7 @@ static int take_differences(const hs_view *v, const hs_companion *c) {
 
 /* Expand the companion along the run's step. */
 static int expand_companion(const hs_view *v, hs_companion *c) {
-  for (;; c->order = c->order + FURTHER < v->s->order ? c->order + FURTHER : v->s->order) {
+  for (;; c->order = c->order + MORE_TERMS < v->s->order ? c->order + MORE_TERMS : v->s->order) {
     if (!c->table->series || c->table->series(c->p, c->order, c->t, c->x, c->lines)) return 0;
     if (take_differences(v, c) || c->order == v->s->order) return 1;
   }
