@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.arithmetic import FLOAT64
+from hsdsl.defaults import DEFAULTS
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.model.differentiate import FINEST
@@ -20,7 +21,7 @@ from hsdsl.names import did_you_mean
 from hsdsl.orbits.branch import Branch
 from hsdsl.orbits.continuation import Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
-from hsdsl.orbits.section import NoReturn, Return, Section
+from hsdsl.orbits.section import LONGER, NoReturn, Return, Section
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.parts import meant_alone, numbers_of
 from hsdsl.sensitivity.result import Sensitivity
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
+ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
 SHRUNK = 1e-6  # a period below this share of the guess is none
 
 
@@ -42,13 +44,16 @@ Entered = tuple[str, tuple[str, ...]]
 class Guess:
     """A state after a transition of the section, at a time, and how long it took to come back.
 
-    ``entered`` has its mode and the states of that.
+    ``entered`` has its mode and the states of that, ``sizes`` the largest sizes that states have nearby, ``most`` how
+    many transitions are made there.
     """
 
     point: Array
     phase: float
     time: float
     entered: Entered
+    sizes: Mapping[str, float] = field(default_factory=dict[str, float])
+    most: int = 0
 
 
 class Orbits:
@@ -68,7 +73,7 @@ class Orbits:
         self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
         self._parameters = overrides_of(arguments, "parameters", self.model.program)
         self._stiff = False
-        self._at: Entered | None = None  # the product mode of a system of parts
+        self._guess: Guess | None = None
 
     def forcing(self, parameters: Mapping[str, Any]) -> float | None:
         """The period of the forcing with these parameters."""
@@ -94,18 +99,21 @@ class Orbits:
         elif arguments.get("tolerance") is None and not self._stiff:
             arguments["tolerance"] = FINEST
 
-        def run(start: Mapping[str, float], phase: float, until: float, wrt: Sequence[str]) -> Sensitivity:
+        def run(start: Mapping[str, float], phase: float, until: float, most: int, wrt: Sequence[str]) -> Sensitivity:
             given = dict(parameters) | ({self._phase: phase} if self._phase else {})
-            initial = {"mode": mode, **start}
-            return self._moving.sensitivity(wrt, until=until, initial=initial, parameters=given, **arguments)
+            call: dict[str, Any] = {"max_transitions": most, **arguments}
+            return self._moving.sensitivity(wrt, until=until, initial={"mode": mode, **start}, parameters=given, **call)
 
-        parts = self.model.program.parts
-        return Section(self.edge, mode, states, self.laps, self._phase, run, numbers_of(parts, mode) if parts else {})
+        parts, near = self.model.program.parts, self._guess
+        numbers = numbers_of(parts, mode) if parts else {}
+        sizes = np.array([near.sizes.get(x, 0.0) if near else 0.0 for x in states])
+        most = ENOUGH * (near.most + 1) if near else DEFAULTS["max_transitions"]
+        return Section(self.edge, mode, states, self.laps, self._phase, run, numbers, sizes, most)
 
     def _entered(self) -> Entered:
         """The mode and the states that a lap begins with; after a final mode without a flow, those of the start."""
-        if self._at is not None:
-            return self._at
+        if self._guess is not None:
+            return self._guess.entered
         program = self.model.program
         edge = next(e for m in program.modes for e in m.edges if e.name == self.edge)
         target = program.modes[edge.target]
@@ -142,7 +150,7 @@ class Orbits:
             found.append((np.inf, Guess(points[0], times[0], times[0], places[0])))
         least = run.settings["until"] * TIE
         lasting = [(change, guess) for change, guess in found if guess.time > least]
-        return [guess for _, guess in sorted(lasting, key=lambda each: each[0])][:MOST_GUESSES]
+        return [_with_sizes(guess, run) for _, guess in sorted(lasting, key=lambda each: each[0])[:MOST_GUESSES]]
 
     def _entered_by(self, made: Transition) -> Entered:
         """The mode and the states that a transition of the section leads to."""
@@ -190,7 +198,7 @@ class Orbits:
 
         Raises NotClosed: there is none.
         """
-        self._at = guess.entered
+        self._guess = guess
         forcing = self.forcing(parameters)
         multiple = None if forcing is None else forcing * max(1, round(guess.time / forcing))
         phase = guess.phase if forcing is None else guess.phase % forcing
@@ -218,18 +226,26 @@ class Orbits:
         self.arguments["parameters"] = self._parameters
         first = self.find()
         multiple = None if first.phase is None else round(first.period / (self.forcing(self._parameters) or 1.0))
+        lasted = first.period
 
         def passage(point: Array, phase: float, at: float) -> tuple[Return, float | None, float]:
+            nonlocal lasted
             parameters = self._parameters | {parameter: at}
-            found = self.section(parameters).follow(point, phase, 1.5 * first.period, parameter)
+            found = self.section(parameters).follow(point, phase, 1.5 * lasted, parameter, longer=1)
+            lasted = found.time if lasted / LONGER < found.time < lasted * LONGER else lasted
             if multiple is None:
                 return found, None, 0.0
             step = 1e-6 * abs(high - low)
             around = [multiple * (self.forcing(parameters | {parameter: at + way}) or 0.0) for way in (-step, 0, step)]
             return found, around[1], (around[2] - around[0]) / (2 * step)
 
-        follower = Follower(passage, first.closed, value, (low, high))
-        parts = [branch(follower, way) for way in (-1.0, 1.0)]
+        try:
+            follower = Follower(passage, first.closed, value, (low, high))
+            parts = [branch(follower, -1.0)]
+            lasted = first.period
+            parts.append(branch(follower, 1.0))
+        except NoReturn as error:
+            raise UsageError(f"the orbit at {parameter} = {value:g} cannot be followed: {error}") from None
         points = [*reversed(parts[0][0]), *parts[1][0][1:]]
         bifurcations = [*reversed(parts[0][1]), *parts[1][1]]
         names = self._entered()[1]
@@ -242,7 +258,7 @@ class Orbits:
         sensitivity = passage.sensitivity
         multipliers = multipliers_of(found, passage.slopes, forced)
         verdict, reason = judged(multipliers, self._error(found, parameters, multipliers, forced))
-        broken = tuple(why for _, why in sensitivity.breaks)
+        broken = tuple(why for when, why in sensitivity.breaks if when <= passage.time * (1 + TIE))
         verdict, reasons = "undecided" if broken else verdict, (reason, *broken)
         states = self._entered()[1]
         return Orbit(
@@ -282,6 +298,19 @@ class Orbits:
                 if not np.isnan(slopes).any():
                     sides[edge] = multipliers_of(found, slopes, forced)
         return sides
+
+
+def _with_sizes(guess: Guess, run: Execution) -> Guess:
+    """A guess with what the run does from a lap before it to a lap behind."""
+    start, end = guess.phase - guess.time, guess.phase + guess.time
+    times, sizes = np.asarray(run.times, float), dict[str, float]()
+    for arc in run.arcs:
+        first, last = np.searchsorted(times[arc.first : arc.last + 1], [start, end])
+        for k, name in enumerate(arc.states) if last > first else ():
+            column = np.abs(np.asarray(run.values[arc.first + first : arc.first + last, k], float))
+            sizes[name] = max(sizes.get(name, 0.0), float(np.max(column)))
+    made = sum(start <= float(each.time) <= end for each in run.transitions)
+    return replace(guess, sizes=sizes, most=made)
 
 
 def _still(found: Closed) -> bool:

@@ -9,8 +9,10 @@ import numpy as np
 
 from hsdsl.execution import Array, Execution
 from hsdsl.sensitivity.result import Sensitivity
+from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 
-Differentiate = Callable[[Mapping[str, float], float, float, Sequence[str]], Sensitivity]
+Differentiate = Callable[[Mapping[str, float], float, float, int, Sequence[str]], Sensitivity]
+ROUNDOFF = ROUNDOFF_UNITS * float(np.finfo(float).eps)
 LONGER = 4  # a run that does not return is made so many times longer,
 MOST_LONGER = 4  # as often as this
 
@@ -40,11 +42,14 @@ class Return:
 
 @dataclass(frozen=True)
 class Section:
-    """A section and its map; ``run`` makes a run from a state, a phase, until a time, by names of derivatives.
+    """A section and its map.
+
+    ``run`` makes a run from a state, a phase, until a time, for so many transitions, by names of derivatives.
 
     ``edge`` is its transition, ``mode`` and ``states`` those it leads to, ``laps`` how many transitions of it close an
     orbit. ``phase`` is the name of the parameter of the phase, None where the system does not depend on time.
-    ``numbers`` has those of the modes of parts, which an orbit comes back to.
+    ``numbers`` has those of the modes of parts, which an orbit comes back to. A state at round-off of its size, from
+    ``sizes``, is zero: on a guard through zero, not beyond it. A run makes ``most`` transitions at first.
     """
 
     edge: str
@@ -54,6 +59,8 @@ class Section:
     phase: str | None
     run: Differentiate
     numbers: Mapping[str, int]
+    sizes: Array
+    most: int
 
     def follow(
         self, point: Array, phase: float, horizon: float, parameter: str | None = None, longer: int = MOST_LONGER
@@ -64,16 +71,18 @@ class Section:
         """
         names = [f"initial.{x}" for x in self.states]
         wrt = [*names, *([self.phase] if self.phase else []), *([parameter] if parameter else [])]
-        start = dict(zip(self.states, point.tolist(), strict=True))
-        found = self.run(start, phase, horizon, wrt)
+        there = np.where(np.abs(point) <= ROUNDOFF * self.sizes, 0.0, point)
+        start, most = dict(zip(self.states, there.tolist(), strict=True)), self.most
+        found = self.run(start, phase, horizon, most, wrt)
         for tried in range(1 + longer):
             passed = [made.index for made in found.execution.transitions if made.edge == self.edge]
             if len(passed) >= self.laps:
                 return self._return(found, passed[self.laps - 1], wrt, parameter)
-            if found.execution.stop.reason != "until" or tried == longer:
+            reason = found.execution.stop.reason
+            if reason not in ("until", "transition_limit") or tried == longer:
                 break
-            horizon *= LONGER
-            found = self.run(start, phase, horizon, wrt)
+            horizon, most = (horizon * LONGER, most) if reason == "until" else (horizon, most * LONGER)
+            found = self.run(start, phase, horizon, most, wrt)
         stop = found.execution.stop
         if found.breaks:
             raise NoReturn(found.breaks[0][1])

@@ -84,3 +84,46 @@ def test_bad_ranges(text: str, sentence: str, tmp_path: Path, capsys: pytest.Cap
 def test_bad_call() -> None:
     with pytest.raises(UsageError, match="no transition"):
         hsdsl.loads(OSCILLATOR.format(F=0.6, W=0.8)).continuation("hit", "F", 0, 1)
+
+
+def test_section_through_zero() -> None:
+    """A guard through zero begins and ends the same mode: a start at round-off of it is on it, not beyond.
+
+    The multiplier of the orbit of small mu is exp(-2 pi mu) to first order; the period for mu = 1 is that of many.
+    """
+    flow = "flow: {x: y, y: mu*(1 - x**2)*y - x}"
+    model = hsdsl.loads(f"""
+hsdsl: 1
+parameters: {{mu: 1}}
+modes:
+  neg: {{{flow}, transitions: [{{when: x >= 0, to: pos, name: up}}]}}
+  pos: {{{flow}, transitions: [{{when: x <= 0, to: neg, name: down}}]}}
+initial: {{mode: neg, x: -1, y: 1}}
+experiment: {{until: 40}}
+""")
+    found = model.continuation("up", "mu", 0.1, 6)
+    assert [round(point.parameter, 9) for point in (found.points[0], found.points[-1])] == [0.1, 6]
+    assert not found.bifurcations
+    assert len(found.points) < 80
+    assert found.points[0].multipliers[0].real == pytest.approx(np.exp(-0.2 * np.pi), rel=0.01)
+    assert found.first.period == pytest.approx(6.6632868593231301896996820305, rel=1e-11)
+
+
+@pytest.mark.slow
+def test_branch_that_ends_where_transitions_accumulate() -> None:
+    """Laps of two tanks become ever shorter as the inflow falls to what flows out of both."""
+    model = hsdsl.loads("""
+hsdsl: 1
+parameters: {w: 1.8, r: 0.5}
+modes:
+  one: {flow: {h: w - 0.8, k: -0.7*sqrt(k)}, transitions: [{when: k <= r, to: two, name: to_two}]}
+  two: {flow: {h: -0.8*sqrt(h), k: w - 0.7}, transitions: [{when: h <= r, to: one, name: to_one}]}
+initial: {mode: one, h: 1, k: 1.2}
+experiment: {until: 60}
+""")
+    found = model.continuation("to_one", "w", 1, 1.9)
+    level = np.sqrt(0.5)
+    assert found.points[-1].parameter == pytest.approx(1.9)
+    first = found.points[0]
+    assert first.period < 0.01 * found.first.period
+    assert (first.parameter - 0.8) * (first.parameter - 0.7) == pytest.approx(0.8 * 0.7 * level**2, rel=0.01)
