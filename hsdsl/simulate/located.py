@@ -7,7 +7,7 @@ time, unless more than `FREE` transitions fall within the relaxation: then each 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
@@ -23,7 +23,7 @@ from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
-from hsdsl.simulate.surfaces import Crossing, StepFailure, close_bracket
+from hsdsl.simulate.surfaces import NONE, Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
 from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts
 
@@ -70,7 +70,8 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
             ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
             x = held_exactly(run, here, held, crossing.time, crossing.state, [crossing.edge]).x
             others = tuple(name for name in outcome.alternatives if name not in ends)
-            return replace(outcome, crossing=replace(crossing, state=x), alternatives=others)
+            held_by = tuple(in_touch(here, held))
+            return replace(outcome, crossing=replace(crossing, state=x), alternatives=others, held=held_by)
         t, x, ends = crossing.time, crossing.state, True
         if not crossing.edge < len(edges):
             t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
@@ -252,12 +253,24 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     flowed = run.has_flowed(t)
     run.record(here, crossing, resumed, after, event.alternatives)
     waited = t if resumed > t else None
-    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, since, reset_at=waited)
+    stood = still_on(here, event) if edge.target == here.index else NONE
+    target = edge.target, edge.target_states
+    entered = enter(run, *target, resumed, after, scale, here, since, reset_at=waited, stood=stood)
     if isinstance(entered, Stop):
         return entered
     if run.cascade.returns(flowed, entered.index, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
     return close_tail(run, entered, crossing.edge)
+
+
+def still_on(here: ModeState, event: Event) -> Mapping[int, Number]:
+    """How far off surfaces a transition's state is, of those that hold it or that it was on with no flow since."""
+    crossing = event.crossing
+    on = here.surfaces.active if crossing.theta == 0 else event.held
+    try:
+        return here.surfaces.off(crossing.time, crossing.state, on)
+    except DOMAIN_ERRORS:
+        return NONE
 
 
 def same_instant(run: Run, t: Number) -> bool:

@@ -33,12 +33,16 @@ NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"
 
 @dataclass(frozen=True)
 class Event:
-    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that."""
+    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that.
+
+    The guards of edges ``held`` held the state until then.
+    """
 
     crossing: Crossing
     alternatives: tuple[str, ...]
     t1: Number
     scale: State
+    held: tuple[int, ...] = ()
 
 
 Found = Sequence[Crossing] | StepFailure  # no crossing: the step ended inside the domain
@@ -210,9 +214,10 @@ def go_on(run: Run, here: ModeState) -> ModeState | Stop:
     if run.timeline.at(t).jump:
         try:
             inside = surfaces.inside(t, x)
+            stood = surfaces.off(t, x, surfaces.active - surfaces.emerging)
         except DOMAIN_ERRORS:
             return standstill(run, here).not_finite([(t, x)])
-        return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside)
+        return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside, stood=stood)
     after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
     after.surfaces.emerging.update(surfaces.emerging)
     return after

@@ -6,7 +6,7 @@ the step's interpolant, never on the flow.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -21,6 +21,7 @@ TIE = 1e-12  # times closer than TIE max(|t|, length of the run) are the same in
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
 Condition = Callable[[int, Number, State], bool]
+NONE: Mapping[int, Number] = {}
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
 
 
@@ -153,16 +154,18 @@ class Surfaces:
         since: Number = 0,
         inside: frozenset[int] = frozenset(),
         reset_at: Number = None,
+        stood: Mapping[int, Number] = NONE,
     ) -> list[int]:
         """Look at the surfaces on entry: return those the state is beyond, and note those it is on.
 
         A surface that the flow passes within the time ``since`` is active. So is one that the state was not beyond when
-        it was reset, before it waited in a strip. A state on a surface ``inside`` counts as beyond it.
+        it was reset, before it waited in a strip. A state on a surface ``inside`` counts as beyond it. It ``stood`` on
+        some surfaces, off them by numbers: no further off them it still does.
         """
         beyond: list[int] = []
         then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)
         for k, r in enumerate(values):
-            noise = self.roundoff_bound(k, t, x, entry=True)
+            noise = max(self.roundoff_bound(k, t, x, entry=True), abs(stood.get(k, self.arithmetic.zero)))
             if since and abs(r) > noise:
                 noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
             if r > noise and not then[k] > noise:
@@ -179,6 +182,11 @@ class Surfaces:
         """Edges without an `if` whose surfaces the state has not reached."""
         values, plain = self.kernel.surfaces(t, *x), [k for k, edge in enumerate(self.edges) if not edge.conditional]
         return frozenset(k for k in plain if values[k] < -self.roundoff_bound(k, t, x))
+
+    def off(self, t: Number, x: State, surfaces: Collection[int]) -> dict[int, Number]:
+        """How far off some surfaces a state is."""
+        values = self.kernel.surfaces(t, *x) if surfaces else ()
+        return {k: values[k] for k in surfaces}
 
     def leave(self, t: Number, x: State) -> None:
         """Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false."""

@@ -91,6 +91,8 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->alternatives = take(store, e, sizeof(int));
   run->held_p = numbers(store, run->model->data + run->model->contacts);
   run->others = take(store, m, sizeof(int));
+  run->stood = numbers(store, m);
+  for (int i = 0; store->numbers && i < m; i++) run->stood[i] = 0.0;
   run->cascade.x = numbers(store, w);
   run->source = numbers(store, w);
   run->trial.piece = polynomial(store, run);

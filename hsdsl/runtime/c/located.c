@@ -273,6 +273,13 @@ static int released(hs_run *run, hs_time t) {
   return GOES_ON;
 }
 
+/* Note how far the chosen crossing's state is off those of the first surfaces that it stands on. */
+static void stand(hs_run *run, const int *on, int surfaces) {
+  const hs_mode_state *here = &run->here;
+  if (here->table->values(here->p, run->chosen.time, run->chosen.state, run->values)) return;
+  for (int k = 0; k < surfaces; k++) run->stood[k] = on[k] ? run->values[k] : 0.0;
+}
+
 /* Flow along guards until one lets go of the state. */
 static int along_guards(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
@@ -295,6 +302,7 @@ static int along_guards(hs_run *run, hs_time limit) {
     if (outcome == LANDED) {
       drop_releases(run);
       be_held_exactly(run, run->chosen.time, run->chosen.state, end);
+      stand(run, run->kept, here->table->edges);
     } else if (outcome == AT_BOUNDARY) {
       be_held_exactly(run, here->t, run->x, -1);
     } else {
@@ -350,6 +358,9 @@ static int jump(hs_run *run) {
   const int mode = run->here.mode;
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
+  if (crossing->theta == 0 && run->here.standing) stand(run, run->active_surfaces, run->here.table->surfaces);
+  if (edge->target != mode)
+    for (int j = 0; j < run->model->surfaces; j++) run->stood[j] = 0.0;
   const int waits = crowded(run, crossing), without_value = reset(run, run->landed);
   if (waits) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);

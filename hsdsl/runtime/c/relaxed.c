@@ -220,6 +220,8 @@ static int continued(hs_run *run, int jumped) {
   const hs_mode_state before = run->here;
   if (jumped) {
     if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
+    for (int k = 0; k < run->here.table->surfaces; k++)
+      run->stood[k] = run->active_surfaces[k] && !run->emerging[k] ? run->values[k] : 0.0;
     return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
   }
   place(run, run->here.mode, run->here.dimension, t, 0);

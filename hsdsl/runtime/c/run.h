@@ -211,6 +211,7 @@ typedef struct {
   hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
   const hs_real *own_p; /* what they are bound to else */
   int *kept, *held; /* one for each edge: whether it may hold the state, and does */
+  hs_real *stood;   /* one for each surface: how far off it a state is that stood on it, on entry */
   int *others;      /* one for each edge: whether it holds the state where the `if` of another is looked at */
   int *tail;        /* one for each surface: whether it is that of an edge of a Zeno tail */
   hs_real *turn;    /* 2 width: where a tail's edges take a state in turn */

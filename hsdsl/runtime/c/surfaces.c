@@ -92,7 +92,8 @@ static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int e
 /* Look at the surfaces on entry, whose values are run->ahead: mark in run->beyond those the state is beyond, and note
    those it stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the
    state was not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one that run->beyond
-   marks as not reached before counts as beyond. */
+   marks as not reached before counts as beyond. It stood on others, off them by run->stood: no further off them it still
+   does. */
 static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_time reset_at) {
   const hs_real *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
   int *const beyond = run->beyond;
@@ -102,7 +103,8 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
     hs_real noise, rate;
     const int inside = jumped && beyond[k];
     run->active_surfaces[k] = run->emerging[k] = beyond[k] = 0;
-    noise = bound_from(run, run->magnitudes, k, t, run->x, 1);
+    noise = hs_max(bound_from(run, run->magnitudes, k, t, run->x, 1), fabs(run->stood[k]));
+    run->stood[k] = 0.0;
     if (since != 0 && fabs(values[k]) > noise) {
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
