@@ -118,7 +118,7 @@ def reset_but_counts(run: Run, here: ModeState, k: int, t: Number, x: State) -> 
 
 def keeps(run: Run, here: ModeState, k: int) -> bool:
     """Whether the reset of edge k leaves the state where it is."""
-    noise = (SAME_UNITS * run.arithmetic.unit * s for s in here.arc.scales)
+    noise = (SAME_UNITS * run.arithmetic.unit * s for s in here.sizes)
     after = reset_but_counts(run, here, k, here.t, here.x)
     return all(abs(a - b) <= most for a, b, most in zip(after, here.x, noise, strict=True))
 
@@ -154,9 +154,10 @@ def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Col
     if edge.contact is not None:
         left = in_contact(run, here, sorted({*others, k})).kernel.flow(t, *x)
         slope = tuple(f - g for f, g in zip(slope, left, strict=True))
+    sizes = here.sizes
     for i in edge.changes:
         if slope[i] != 0:
-            after = max(after, ZERO_UNITS * run.arithmetic.unit * here.arc.scales[i] / abs(slope[i]))
+            after = max(after, ZERO_UNITS * run.arithmetic.unit * sizes[i] / abs(slope[i]))
     after = after or run.arithmetic.unit * run.settings.until  # where these states have been zero only
     return tuple(a + after * f for a, f in zip(x, slope, strict=True))
 

@@ -104,13 +104,14 @@ class Prepared(Problem):
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
         from hsdsl.simulate.entry import enter
+        from hsdsl.simulate.scales import start_sizes
 
         if watch is not None:
             watch(run.recorder)
         zero = run.arithmetic.zero
         began = time.perf_counter()
         try:
-            here = enter(run, self.mode, self.states, zero, self.x, tuple(zero for _ in self.x))
+            here = enter(run, self.mode, self.states, zero, self.x, start_sizes(run, self.mode, self.x))
             stop = SCHEMES[self.settings.scheme](run, here)
         except KeyboardInterrupt:
             if not run.recorder.arcs:

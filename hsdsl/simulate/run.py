@@ -39,6 +39,11 @@ class ModeState:
     t: Number
     x: State
 
+    @property
+    def sizes(self) -> State:
+        """The sizes that the states have had, or those of the numbers that they were computed from on entry."""
+        return tuple(map(max, self.arc.scales, self.surfaces.scale))
+
     def moved(self, t: Number, x: State) -> ModeState:
         """Return the same place in the mode's life, later."""
         return replace(self, t=t, x=x)

@@ -12,6 +12,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.linear import Vector
 from hsdsl.integrators.scales import resolved, rows_of
 from hsdsl.integrators.stepper import State, Stepper
+from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
 
 
@@ -38,7 +39,7 @@ def error_ratio(
 
 def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
     """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
-    mode, scales = here.flow, here.arc.scales
+    mode, scales = here.flow, here.sizes
     found: Vector = []
     rows = rows_of(run.kernel.jacobian(mode, here.segment.data)(here.t, *here.x), len(here.x))
     for f, row in zip(slope, rows, strict=True):
@@ -47,6 +48,30 @@ def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
             total = total + abs(d) * s
         found.append(total)
     return found
+
+
+def start_sizes(run: Run, mode: int, x: State) -> State:
+    """The sizes that the flow gives the states within the run, from a start at x in a mode with motion along guards.
+
+    A start on a guard is off it by the round-off of these. Elsewhere they are zero.
+    """
+    program, segment, zero = run.program.modes[mode], run.timeline.at(run.arithmetic.zero), run.arithmetic.zero
+    nothing = tuple(zero for _ in x)
+    if program.held is None:
+        return nothing
+    try:
+        slope = run.kernel.bind(mode, segment.data).flow(zero, *x)
+        rows = rows_of(run.kernel.jacobian(mode, segment.data)(zero, *x), len(x))
+    except DOMAIN_ERRORS:
+        return nothing
+    back = zero
+    for i, row in enumerate(rows):
+        back = max(back, total((abs(d) * abs(rows[k][i]) for k, d in enumerate(row)), zero))
+    time = run.settings.until / (1 + run.settings.until * run.arithmetic.sqrt(back))  # in which motion turns back
+    first = tuple(max(abs(a), time * abs(f)) for a, f in zip(x, slope, strict=True))
+    moved = (time * total((abs(d) * s for d, s in zip(row, first, strict=True)), zero) for row in rows)
+    found = tuple(map(max, first, moved))
+    return found if all(map(run.arithmetic.isfinite, found)) else nothing
 
 
 def instant(run: Run, here: ModeState, slope: State) -> Number:

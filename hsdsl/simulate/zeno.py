@@ -172,8 +172,7 @@ def held_exactly(
     It stays on those that it has ``reached``. It is off them by the round-off of what it has ever been computed from.
     """
     touched, after = in_touch(here, held), after_contact(here, held, t, x)
-    scale = tuple(map(max, after.surfaces.scale, here.arc.scales))
-    after = replace(after, surfaces=replace(after.surfaces, scale=scale))
+    after = replace(after, surfaces=replace(after.surfaces, scale=here.sizes))
     try:
         q = in_turn(partial(onto_guard, after), [*touched, *reached], t, x)
         q = in_turn(partial(fixed_point, run, after), touched, t, q)
@@ -195,7 +194,7 @@ def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
         r, gradient = here.kernel.surfaces(t, *x)[k], here.kernel.gradients[k](t, *x)[1:]
         if abs(r) <= here.surfaces.roundoff_bound(k, t, x):
             break
-        weights = [g * s * s for g, s in zip(gradient, here.arc.scales, strict=True)]
+        weights = [g * s * s for g, s in zip(gradient, here.sizes, strict=True)]
         across = total((g * w for g, w in zip(gradient, weights, strict=True)), r * 0)
         if across > 0:
             x = tuple(a - r / across * w for a, w in zip(x, weights, strict=True))

@@ -104,3 +104,34 @@ experiment: {until: 5, relaxation: 1e-3, scheme: relaxed}
     run = assert_engines_agree(hsdsl.loads(text), **arguments)
     assert run.stop.reason == "until"
     assert run.final.state["x"] == pytest.approx(3, abs=1e-3)
+
+
+STACK = """
+hsdsl: 1
+inputs: {{u: {{times: [0, 1], values: [0, 1], hold: zero}}}}
+modes:
+  a:
+    flow: {{x: v, y: w, v: -10, w: '-10 + 16*u'}}
+    transitions:
+      - {{name: floor, when: x <= 0, {low}to: a, reset: {{v: -v/3}}}}
+      - {{name: meet, when: y <= x, {high}to: a, reset: {{v: (v + w)/2, w: (v + w)/2}}}}
+initial: {{mode: a, x: {x}, y: {y}, v: {v}, w: {w}}}
+experiment: {{until: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "v", "w", "conditional"),
+    [
+        ("0", "1.8e-40", "0", "0", True),
+        ("-2e-17", "-3e-17", "1e-18", "-1e-19", True),
+        ("-4e-17", "0", "0", "0", False),
+        ("1e-200", "0", "-1e-160", "0", False),
+    ],
+)
+def test_a_run_goes_on_from_a_state_at_rest(x: str, y: str, v: str, w: str, conditional: bool) -> None:
+    """What is left of zeros is nothing to what gravity makes of them; the upper body is lifted at t = 1."""
+    low, high = ("if: v < 0, ", "if: w < v, ") if conditional else ("", "")
+    run = assert_engines_agree(hsdsl.loads(STACK.format(x=x, y=y, v=v, w=w, low=low, high=high)))
+    assert run.stop.reason == "until"
+    assert [run.final.state[name] for name in "xyvw"] == pytest.approx([0, 3, 0, 6], abs=1e-12)

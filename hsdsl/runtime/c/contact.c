@@ -9,6 +9,9 @@
 #define ZERO_UNITS 16
 #define FURTHER 16
 
+/* The size that a state has had, or that of the numbers that it was computed from on entry. */
+static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], run->scale[s]); }
+
 /* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
   const int n = run->here.dimension;
@@ -17,9 +20,47 @@ static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   for (int i = 0; i < n; i++) run->flow_sizes[i] = fabs(slope[i]);
   for (int k = 0; k < rows->count; k++) {
     hs_real *const size = &run->flow_sizes[rows->place[k] / n];
-    *size = *size + fabs(run->jacobian[k]) * run->scales[rows->place[k] % n];
+    *size = *size + fabs(run->jacobian[k]) * state_size(run, rows->place[k] % n);
   }
   return 0;
+}
+
+/* The entry of a sparse matrix, whose places rise, at a place; 0.0 where it has none. */
+static hs_real entry_at(const hs_sparse *rows, const hs_real *values, int place) {
+  int low = 0, high = rows->count;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (rows->place[middle] < place)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < rows->count && rows->place[low] == place ? values[low] : 0.0;
+}
+
+/* The sizes that the flow gives the states within the run, from a start in a mode with motion along guards, to
+   run->scale. See simulate/scales.py. */
+static void start_sizes(hs_run *run, int mode, hs_time t) {
+  const hs_mode *const table = &run->model->mode[mode];
+  const hs_sparse *const rows = &table->jacobian;
+  const int n = table->dimension;
+  const hs_real *const p = segment_data(run, segment_at(run->task->timeline, t));
+  hs_real back = 0.0, all = 0.0, *const first = run->at, *const moved = run->near;
+  if (table->held < 0 || table->flow(p, t, run->x, first) || rows->values(p, t, run->x, run->jacobian)) return;
+  for (int i = 0; i < n; i++) moved[i] = 0.0;
+  for (int e = 0; e < rows->count; e++) {
+    const int i = rows->place[e] / n, k = rows->place[e] % n;
+    moved[i] = moved[i] + fabs(run->jacobian[e]) * fabs(entry_at(rows, run->jacobian, k * n + i));
+  }
+  for (int i = 0; i < n; i++) back = hs_max(back, moved[i]), moved[i] = 0.0;
+  const hs_real time = run->until / (1 + run->until * sqrt(back)); /* in which motion turns back */
+  for (int i = 0; i < n; i++) first[i] = hs_max(fabs(run->x[i]), time * fabs(first[i]));
+  for (int e = 0; e < rows->count; e++) {
+    hs_real *const size = &moved[rows->place[e] / n];
+    *size = *size + fabs(run->jacobian[e]) * first[rows->place[e] % n];
+  }
+  for (int i = 0; i < n; i++) all = all + (moved[i] = hs_max(first[i], time * moved[i]));
+  for (int i = 0; i < n && hs_finite(all); i++) run->scale[i] = moved[i];
 }
 
 /* What the reset of edge k, its branch for slow impacts, makes of a state, but for states that it counts with, to
@@ -39,7 +80,7 @@ static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   int still = 1;
   if (reset_but_counts(run, k, t, x, run->after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
-    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * run->scales[s];
+    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * state_size(run, s);
   return still;
 }
 
@@ -117,7 +158,7 @@ static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *t
   }
   for (int i = 0; i < edge->changes; i++) {
     const int s = edge->change[i];
-    if (slope[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * run->scales[s] / fabs(slope[s]));
+    if (slope[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * state_size(run, s) / fabs(slope[s]));
   }
   if (!(after > 0)) after = HS_UNIT * run->until; /* where these states have been zero only */
   for (int s = 0; s < n; s++) run->after[s] = x[s] + after * slope[s];

@@ -91,6 +91,7 @@ static void lay_out(hs_run *run, hs_store *store) {
   run->alternatives = take(store, e, sizeof(int));
   run->held_p = numbers(store, run->model->data + run->model->contacts);
   run->others = take(store, m, sizeof(int));
+  run->jacobian = numbers(store, run->model->derivatives);
   run->stood = numbers(store, m);
   for (int i = 0; store->numbers && i < m; i++) run->stood[i] = 0.0;
   run->cascade.x = numbers(store, w);
@@ -122,7 +123,6 @@ static hs_span lay_out_span(const hs_run *run, hs_store *store) {
 static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
   const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
-  run->jacobian = numbers(store, run->model->derivatives);
   run->kept = take(store, m, sizeof(int));
   run->held = take(store, m, sizeof(int));
   run->tail = take(store, m, sizeof(int));
@@ -213,6 +213,7 @@ static hs_run open_run(hs_task *task) {
 
 void hs_simulate(hs_task *task) {
   hs_run run = open_run(task);
+  start_sizes(&run, task->mode, 0.0);
   const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
   if (task->settings.scheme == HS_LOCATED)
     located(&run, entered);

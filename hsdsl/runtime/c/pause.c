@@ -72,6 +72,7 @@ static void restore(hs_run *run, hs_pause *pause) {
 
 void hs_begin(hs_task *task, hs_pause *pause, hs_time start) {
   hs_run run = open_run(task);
+  start_sizes(&run, task->mode, start);
   const int outcome = enter(&run, task->mode, task->dimension, start, 0, 0.0, 0, start);
   save(&run, pause, outcome == GOES_ON ? PAUSED : outcome);
 }

@@ -60,7 +60,7 @@ static int onto_guard(hs_run *run, int k, hs_time t) {
     if (fabs(r) <= noise) break;
     hs_real across = r * 0;
     for (int s = 0; s < n; s++) {
-      weights[s] = run->gradient[s + 1] * run->scales[s] * run->scales[s];
+      weights[s] = run->gradient[s + 1] * state_size(run, s) * state_size(run, s);
       across = across + run->gradient[s + 1] * weights[s];
     }
     if (across > 0)
@@ -103,7 +103,7 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached) {
   run->still = same_state(run->began, x, here->dimension);
   for (int k = 0; k < edges; k++) count += run->kept[k] = in_touch(run, k);
   after_contact(run);
-  for (int s = 0; s < here->dimension; s++) run->scale[s] = hs_max(run->scale[s], run->scales[s]);
+  for (int s = 0; s < here->dimension; s++) run->scale[s] = state_size(run, s);
   for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
   copy(run->z, x, here->dimension);
   if (reached >= 0) run->tail[reached] = 1;

@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from .contact import is_possible
 from .control import accepted, error_ratio
-from .functions import frozen
-from .lane import CROSS, DEEP, FLAT, INWARD
+from .functions import frozen, when
+from .lane import CROSS, DEEP, FLAT, INWARD, scales_here
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, hermite
 from .surfaces import SCAN, each_at, last_up_crossing, states_at
@@ -60,7 +61,10 @@ def crossings(model, config, bound, lane, trial):
     times = jnp.where(share == 0, t, t + share * h)
     turned = beyond & ~passed & (back > 0)
     here, facts = facts_here_and_at(bound, lane, beyond, times, states)
-    found = beyond & ~passed & jnp.diagonal(facts.conditions) & ~turned
+    found = beyond & ~passed & ~turned
+    found = found & (
+        jnp.diagonal(facts.conditions) | holds_next(model, bound, lane, trial, own, share, values, found, facts)
+    )
     flat, deep = found & ~(norm > 0), found & ~(values <= config.relaxation * norm + noise)
     later = share + (1 - share) * jnp.arange(1, SCAN)[:, None] / SCAN
     flank = jax.vmap(lambda s: each_at(bound, mode, t, h, x, own, s))(later)
@@ -70,6 +74,22 @@ def crossings(model, config, bound, lane, trial):
     kind = jnp.where(turned[blocked], INWARD, jnp.where(flat[blocked], FLAT, DEEP))
     depth = jnp.minimum(config.relaxation, values / jnp.where(norm > 0, norm, 1.0))
     return (found, share, times, states, here, facts), depth, bad.any(), kind, blocked
+
+
+def holds_next(model, bound, lane, trial, pieces, share, values, found, facts):
+    """Whether an `if` holds next, of a surface that the state is on: where a hop ends that round-off hides."""
+    returns = model.of(model.loops, lane.mode) & ((share == 0) | lane.active)
+    asked = found & returns & ~jnp.diagonal(facts.conditions)
+    back = -jnp.diagonal(facts.rates) * trial.h
+    hop = share + jnp.where(back > 0, (1 - share) * back / (jnp.where(back > 0, back, 0.0) + values), 0.0)
+    points, scales = states_at(trial.x, pieces, jnp.where(asked, hop, share)), scales_here(model, lane)
+
+    def look():
+        times = trial.t + hop * trial.h
+        each = jnp.arange(model.M), times, points
+        return jax.vmap(lambda k, t, x: is_possible(model, bound, lane.mode, k, t, x, scales))(*each)
+
+    return asked & when(asked.any(), look, asked)
 
 
 def relaxed_crossing(model, config, p, lane):

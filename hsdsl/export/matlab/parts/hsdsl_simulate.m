@@ -1173,7 +1173,8 @@ function [ok, one] = strip_crossing(w, here, k, t, h, t1, x, k1, z, k2, C, finit
     ok = false;
     return
   end
-  if ~holds(w, q, k, time, y, d)
+  on = share == 0 || here.active(k);
+  if ~holds(w, q, k, time, y, d) && ~(on && holds_next(w, here, k, t, h, x, C, share, value, d))
     return
   end
   if too_deep(w, q, k, t1, z, d, value, noise)
@@ -1189,6 +1190,22 @@ function [ok, one] = strip_crossing(w, here, k, t, h, t1, x, k1, z, k2, C, finit
     end
   end
   one = struct('k', k, 't', time, 'x', y, 'depth', min(w.s.relaxation, value / norm_of), 'share', share);
+end
+
+function yes = holds_next(w, here, k, t, h, x, C, share, value, d)
+% Whether the `if` of an edge holds next, on whose surface the state is: where a hop ends that round-off hides.
+  q = here.q;
+  yes = w.m.edge_target{q}(k) == q;
+  if ~yes
+    return
+  end
+  back = -w.m.rate{q}{k}(t + share * h, along(x, C, share), w.p, d) * h;
+  if back > 0
+    share = share + (1 - share) * (back / (back + value));
+  end
+  y = along(x, C, share);
+  sizes = max(w.sizes(w.m.state_index{q}), abs(y));
+  yes = possible(w, q, k, t + share * h, y, slope(w, q, t + share * h, y, d), sizes, d);
 end
 
 function share = last_rise(w, q, k, t, h, x, C, d, small)
