@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
 ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
+SHORTER = "passages become ever shorter, so the execution ends in a point"
 SHRUNK = 1e-6  # a period below this share of the guess is none
 
 
@@ -205,7 +206,7 @@ class Orbits:
         sections = self.section(parameters), self.section(parameters, COARSER)
         found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple)
         if not found.passage.time > SHRUNK * guess.time:
-            raise NotClosed("passages become ever shorter, so the execution ends in a point")
+            raise NotClosed(SHORTER)
         if self.forced is False and _still(found):
             raise NotClosed("it closes where the flow is at rest, so the execution ends in a point")
         return self.judge(found, parameters, forcing)
@@ -232,6 +233,8 @@ class Orbits:
             nonlocal lasted
             parameters = self._parameters | {parameter: at}
             found = self.section(parameters).follow(point, phase, 1.5 * lasted, parameter, longer=1)
+            if not found.time > SHRUNK * first.period:
+                raise NoReturn(SHORTER)
             lasted = found.time if lasted / LONGER < found.time < lasted * LONGER else lasted
             if multiple is None:
                 return found, None, 0.0
