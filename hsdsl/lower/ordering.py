@@ -28,6 +28,7 @@ def ordering(places: Sequence[int], n: int) -> tuple[int, ...]:
 def _minimum_degree(places: Sequence[int], n: int) -> tuple[int, ...]:
     """The order that takes an unknown with the fewest neighbours next; all that it leaves are then neighbours.
 
+    Of several it takes the one behind the fewest others in turn, for all of which a processor must wait.
     See A. George and J. W. H. Liu, The evolution of the minimum degree ordering algorithm, SIAM Review 31, 1989
     (doi:10.1137/1031001).
     """
@@ -36,16 +37,18 @@ def _minimum_degree(places: Sequence[int], n: int) -> tuple[int, ...]:
         if i != j:
             near[i].add(j)
             near[j].add(i)
-    waiting = [(len(others), i) for i, others in enumerate(near)]
+    waiting = [(len(others), 0, i) for i, others in enumerate(near)]
     heapify(waiting)
+    behind = [0] * n
     order = dict[int, None]()
     while waiting:
-        degree, i = heappop(waiting)
+        degree, _, i = heappop(waiting)
         if i in order or degree != len(near[i]):  # it has lost or won neighbours since
             continue
         order[i] = None
         for j in near[i]:
             near[j] |= near[i]
             near[j] -= {i, j}
-            heappush(waiting, (len(near[j]), j))
+            behind[j] = max(behind[j], behind[i] + 1)
+            heappush(waiting, (len(near[j]), behind[j], j))
     return tuple(order)
