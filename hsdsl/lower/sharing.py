@@ -13,7 +13,7 @@ from itertools import combinations
 
 import sympy as sp
 
-from hsdsl.lower.straight import Statement
+Statement = tuple[sp.Symbol, sp.Basic]
 
 
 def shared(expressions: Sequence[sp.Basic], letter: str) -> tuple[list[Statement], list[sp.Basic]]:

@@ -17,11 +17,11 @@ from hsdsl.expression.derivatives import derivative, moving
 from hsdsl.functions import rebuilt, solution
 from hsdsl.lower.elimination import solved
 from hsdsl.lower.printer import LARGEST_PRODUCT
+from hsdsl.lower.sharing import Statement, shared
 from hsdsl.system import TIME
 
 LARGEST = 80  # nodes of one statement
 WIDEST = 16  # terms or factors of one statement
-Statement = tuple[sp.Symbol, sp.Basic]
 
 
 def replaced(expr: sp.Basic, mapping: dict, done: dict) -> sp.Basic:
@@ -59,6 +59,10 @@ class Cut:
             self._names[expr] = sp.Symbol(f"{self._letter}{len(self.statements)}", **real)
             self.statements.append((self._names[expr], expr))
         return self._names[expr]
+
+    def define(self, symbol: sp.Symbol, expr: sp.Basic) -> None:
+        """Add a statement; the parts of it that are too large come before it."""
+        self.statements.append((symbol, self.down(expr)))
 
     def down(self, expr: sp.Basic) -> sp.Basic:
         """Return the same expression with names for parts that are too large to be written out."""
@@ -117,8 +121,15 @@ class Gradient:
     def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol], letter: str = "g") -> None:
         self._arguments = arguments
         self._order = {argument: i for i, argument in enumerate(arguments)}
+        given = tuple(expressions)
         self._cut = Cut(letter)
-        small = [self._cut.down(e) for e in expressions]
+        small = [self._cut.down(e) for e in given]
+        if self._cut.statements:  # what comes more than once is differentiated once
+            common, small = shared(given, f"{letter}_")
+            self._cut = Cut(letter)
+            for symbol, expr in common:
+                self._cut.define(symbol, expr)
+            small = [self._cut.down(e) for e in small]
         self._slopes: dict[sp.Symbol, dict[sp.Symbol, sp.Expr]] = {}
         for symbol, expr in tuple(self._cut.statements):
             self._slopes[symbol] = {a: self._cut.name(d) for a, d in self._row(expr).items()}

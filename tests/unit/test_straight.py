@@ -12,6 +12,7 @@ from hsdsl.backends.python import PythonKernel
 from hsdsl.elaborate import elaborate
 from hsdsl.expression.derivatives import derivative
 from hsdsl.functions import absolute, atan2, below, cosh, floor, maximum, minimum, sign, sinh, tanh
+from hsdsl.lower.routines import written_out
 from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient
 from hsdsl.model import Model
 
@@ -135,3 +136,20 @@ def test_functions_that_come_up_by_themselves_have_their_values(flow):
     expected = eval(flow, known)
     kernel = PythonKernel(model.program, FLOAT64)
     assert kernel.bind(0, ()).flow(0.0, 0.3, 0.2)[1] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("levels", range(1, 7))
+def test_derivatives_cost_as_much_as_the_function_for_each_column(levels):
+    columns = sp.symbols("x0:4", real=True)
+    a, b, c, d = columns
+    f, g = sp.sin(a - b) * c**2 + sp.cos(a) * d, sp.sqrt(1 + sp.cos(a - b) ** 2)
+    for _ in range(levels):
+        f, g = (f * g + sp.sin(f)) / (1 + g**2), g + f * sp.cos(a - b) * c
+    slopes = Gradient((f * g, f / g), columns)
+    derivatives = tuple(slope for row in slopes.sparse for slope in row.values())
+    assert operations(derivatives, slopes.statements) < (2 + len(columns)) * operations((f * g, f / g))
+
+
+def operations(results, statements=()):
+    known, last = written_out(results, statements)
+    return sum(map(sp.count_ops, (*(expr for _, expr in known), *last)))
