@@ -155,6 +155,13 @@ experiment: {{until: 3, scheme: located}}
         assert (theorem == "unknown") == any(reason.startswith(UNSEEN) for reason in found.reasons)
 
 
+@pytest.mark.parametrize(("method", "tolerance"), [("dopri5", 3e-7), ("dop853", 1e-7)])
+def test_how_polynomials_swing_around_the_flow_is_no_pulse(method: str, tolerance: float) -> None:
+    found, expected = both(model("y", "-x + 0.5/(1 + exp(-25*(t - 2)))", until=5), method, tolerance)
+    assert_alike(found, expected)
+    assert found.theorem == "holds"
+
+
 def test_a_clear_run_has_no_doubts() -> None:
     screen = screen_of(run_of(model("y", "-x + cos(2*t)"), "taylor", 1e-9))
     assert not screen.doubts()
