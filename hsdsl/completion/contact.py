@@ -164,7 +164,7 @@ def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Ex
     """Whether a value is zero all along the guard, and rises where the flow presses: what it decides never ends."""
     constrained = {near.states[i]: row for i, row in rows.items()}
     stays = along(value, near.among(value), lambda x: constrained[x] if x in constrained else near.flow(x))
-    presses = value_at(near.along(value), at) * value_at(push, at) > SMALL
+    presses = value_at(near.along(value), at) * value_at(push, at) > 0
     return presses and abs(value_at(value, at)) <= SMALL and abs(value_at(stays, at)) <= SMALL
 
 
