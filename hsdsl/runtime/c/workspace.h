@@ -20,7 +20,7 @@
 #define HS_SPACE(w, m, e, lines, states, data, factors, kind, stages, extra, order, degree)                        \
   (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
    ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + HS_IMPLICIT_SPACE(kind, w, factors) +                 \
-   5 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 4 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
+   6 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 4 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
    HS_NUMBERS(data) +                                                                                              \
    2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
