@@ -30,7 +30,8 @@ SHORT = {
 }
 # reasons that MATLAB's own infinities hide, and returns that are noticed earlier than here
 NOT_ALIKE = {"m10-overflow-in-time", "m10-sliding", "m4-chattering"}
-RELAXED_APART = {"m11-counts", "m11-rest-with-an-if"}  # in the strips of a tail round-off decides how often a step is halved
+# in the strips of a tail round-off decides how often a step is halved
+RELAXED_APART = {"m11-counts", "m11-rest-with-an-if"}
 FLAT = {"flat-surface": 1e-5}  # (x - 1)**3 is zero to round-off in an interval that long
 
 
