@@ -17,24 +17,24 @@
 #define HS_PIECE(w, degree) HS_NUMBERS(HS_LARGER(degree, 3) * (w))
 #define HS_STAGES(w, all) (HS_TAKEN(all, hs_real *) + ((all)-1) * HS_NUMBERS(w))
 #define HS_SPAN(w, degree) (2 * HS_NUMBERS(w) + HS_PIECE(w, degree))
-#define HS_SPACE(w, m, e, lines, states, data, factors, kind, stages, extra, order, degree)                        \
+#define HS_SPACE(w, m, e, lines, states, data, derivatives, factors, kind, stages, extra, order, degree)           \
   (19 * HS_NUMBERS(w) + HS_NUMBERS(states) + HS_TAKEN(w, int) + HS_STAGES(w, (stages) + 1 + (extra)) +            \
    ((kind) == HS_TAYLOR ? HS_NUMBERS((lines) * ((order) + 2)) : 0) + HS_IMPLICIT_SPACE(kind, w, factors) +                 \
    6 * HS_NUMBERS(m) + HS_NUMBERS((w) + 1) + HS_NUMBERS(2 * (w)) + 4 * HS_TAKEN(m, int) + 2 * HS_TAKEN(e, int) +   \
-   HS_NUMBERS(data) +                                                                                              \
+   HS_NUMBERS(data) + HS_NUMBERS(derivatives) +                                                                    \
    2 * HS_PIECE(w, degree) + HS_TAKEN(m, hs_crossing) + (m) * HS_NUMBERS(w))
 
 #define HS_MOST_DEGREE(order, degree) HS_LARGER(HS_LARGER(order, degree), LEAST_MOST_DEGREE)
-#define HS_LOCATED_SPACE_OF(w, m, modes, derivatives, stages, extra, degree, most)                           \
-  (HS_NUMBERS(derivatives) + 3 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
+#define HS_LOCATED_SPACE_OF(w, m, modes, stages, extra, degree, most)                                        \
+  (3 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
    HS_NUMBERS(2 * (w)) + \
    HS_STAGES(w, (stages) + 1 + (extra)) + 3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
    (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
    HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
    2 * HS_NUMBERS(MOST_PARTS) + HS_NUMBERS(MOST_PARTS * (m) * ((most) + 1)) + HS_NUMBERS(MOST_PARTS * (m)) +       \
    2 * HS_TAKEN(MOST_PARTS * (m), int))
-#define HS_LOCATED_SPACE(w, m, modes, derivatives, stages, extra, order, degree) \
-  HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, derivatives, stages, extra, degree, HS_MOST_DEGREE(order, degree))
+#define HS_LOCATED_SPACE(w, m, modes, stages, extra, order, degree) \
+  HS_LOCATED_SPACE_OF(w, HS_LARGER(m, 1), modes, stages, extra, degree, HS_MOST_DEGREE(order, degree))
 
 /* Memory of a paused run. */
 #define HS_PAUSE_NUMBERS(w, modes, states) (5 * (w) + (states) + (modes))
