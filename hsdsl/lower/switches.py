@@ -70,9 +70,9 @@ class Switches:
         return switch
 
     def between(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        """The larger of two."""
-        first = _HALF + _HALF * self.number("sign", a - b)
-        return first * a + (1 - first) * b
+        """The larger of two; the other one's share is exactly zero, so that it seems to move nothing."""
+        first = self.number("sign", a - b)
+        return (1 + first) * a * _HALF + (1 - first) * b * _HALF
 
     def angle(self, y: sp.Expr, x: sp.Expr) -> sp.Expr:
         """The angle of (x, y): behind the origin that of the opposite point, and a half turn."""

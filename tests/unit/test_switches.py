@@ -99,3 +99,19 @@ def test_thousands_of_changes_are_followed() -> None:
     run = hsdsl.loads(MODEL.format("sign(sin(t) - (50*t - floor(50*t)))", "20*pi")).simulate()
     assert len(run.arcs) > 4000
     assert run.verdict.theorem == "holds"
+
+
+@pytest.mark.parametrize("text", ["abs(max(sin(t), 0.4) - 0.4)", "max(max(sin(t), 0.4) - 0.4, 0)"])
+def test_a_level_that_an_input_stays_at(text: str) -> None:
+    """It is off the level while the sine is above 0.4."""
+    model = hsdsl.loads(f"""
+hsdsl: 1
+inputs: {{u: "{text}"}}
+modes: {{A: {{flow: {{x: u}}}}}}
+initial: {{mode: A, x: 0}}
+experiment: {{until: 6}}
+""")
+    start = math.asin(0.4)
+    assert model.simulate().final.state["x"] == pytest.approx(
+        2 * math.cos(start) - 0.4 * (math.pi - 2 * start), rel=1e-9
+    )
