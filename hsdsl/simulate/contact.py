@@ -212,7 +212,7 @@ def behind_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x:
     """
     touched, after = in_touch(here, held), run.arithmetic.unit * run.settings.until
     own = next(j for j in touched if here.mode.edges[j].contact == held.mode.edges[k].releases)
-    later = x
+    later, most = x, run.arithmetic.sqrt(run.arithmetic.unit) * run.settings.until  # further on a line is no motion
     try:
         slope = held.kernel.flow(t, *x)
         while True:
@@ -221,7 +221,7 @@ def behind_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x:
             if not all(is_possible(run, here, j, time, later, touched) for j in touched):
                 return time, later, True
             r = held.kernel.surfaces(time, *pressed(run, here, own, time, later, touched))[k]
-            if r > held.surfaces.roundoff_bound(k, time, later) or not time < here.segment.end:
+            if r > held.surfaces.roundoff_bound(k, time, later) or not (after < most and time < here.segment.end):
                 return time, later, False
             after = after * 2
     except DOMAIN_ERRORS:

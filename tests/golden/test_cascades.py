@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -135,3 +136,20 @@ def test_a_run_goes_on_from_a_state_at_rest(x: str, y: str, v: str, w: str, cond
     run = assert_engines_agree(hsdsl.loads(STACK.format(x=x, y=y, v=v, w=w, low=low, high=high)))
     assert run.stop.reason == "until"
     assert [run.final.state[name] for name in "xyvw"] == pytest.approx([0, 3, 0, 6], abs=1e-12)
+
+
+def test_an_if_that_round_off_ends_moves_no_body_along_a_line() -> None:
+    """Fixed steps leave the speed across an incline at a round-off that is not looked at far ahead."""
+    text = """
+hsdsl: 1
+parameters: {th: 0.3}
+let: {n: u*sin(th) + v*cos(th)}
+modes:
+  a:
+    flow: {x: u, y: v, u: 0, v: -9.81}
+    transitions: [{when: y + x*tan(th) <= 0, if: n < 0, to: a, reset: {u: u - 1.6*n*sin(th), v: v - 1.6*n*cos(th)}}]
+initial: {mode: a, x: 0, y: 0, u: 0, v: 0}
+experiment: {until: 2}
+"""
+    run = hsdsl.loads(text).simulate(method="rk4", step=1e-3)
+    assert run.final.state["x"] == pytest.approx(2 * 9.81 * math.sin(0.3) * math.cos(0.3), rel=1e-9)

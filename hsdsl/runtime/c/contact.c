@@ -312,6 +312,7 @@ static int behind_end(hs_run *run, int j, hs_time *t) {
   const hs_mode_state *here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   const hs_time from = *t;
+  const hs_real most = sqrt((hs_real)HS_UNIT) * run->until; /* further on a line is no motion */
   hs_real r, noise;
   int of = 0, raised = held->flow(here->p, from, run->x, run->end);
   while (own->edge[of].contact != held->edge[j].releases) of++;
@@ -326,7 +327,7 @@ static int behind_end(hs_run *run, int j, hs_time *t) {
     bind_contacts(run, run->kept, run->kept);
     if (!holds) return 1;
     raised = raised || surface(run, j, *t, run->after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);
-    if (!raised && (r > noise || !(*t < segment_end(run)))) return 0;
+    if (!raised && (r > noise || !(after < most && *t < segment_end(run)))) return 0;
   }
   *t = from;
   copy(run->z, run->x, here->dimension);
