@@ -165,9 +165,10 @@ class Steps:
 
     def scales(self, closer: bool) -> Sequence[Number]:
         """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
-        if closer and self._smooth and self._tried is not None:
+        if closer and self._tried is not None:
+            derivatives = None if self._smooth else self._jacobian
             with suppress(*DOMAIN_ERRORS):
-                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic)
+                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, derivatives)
                 lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
                 self._floors = list(self._scales) if lifted else []
         return self._scales

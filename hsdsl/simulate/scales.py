@@ -23,13 +23,14 @@ def error_ratio(
     control, had = run.control, here.arc.scales
     scales: Sequence[Number] = had if method.scales is None else method.scales(False)
     ratio = control.ratio(h, error, z, scales, had)
-    if not ratio > 1 or here.mode.jumps or not control.looks_closer(t):
+    if not ratio > 1 or not control.looks_closer(t):
         return ratio
     try:
         if method.scales is not None:
             scales = method.scales(True)
         else:
-            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic)
+            derivatives = run.kernel.jacobian(here.flow, here.segment.data) if here.mode.jumps else None
+            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, derivatives)
     except DOMAIN_ERRORS:
         return ratio
     ratio = control.ratio(h, error, z, scales, had)

@@ -50,7 +50,9 @@ class Standstill:
         grown = any(a * a * unit > 1 for a in self.x)
         if not grown and (found := self._without_value_later()):
             return Stop("not_finite", t, found)
-        return Stop("not_finite", t, f"{self._largest()} grows beyond all numbers at t = {show(t)} in mode {name}")
+        how = "grows beyond all numbers" if grown else "changes faster than time can tell"
+        state = self._largest() if grown else self._fastest()
+        return Stop("not_finite", t, f"{state} {how} at t = {show(t)} in mode {name}")
 
     def stuck(self, failure: StepFailure, slope: State) -> Stop:
         """Stop where no step is short enough, and say why; ``slope`` is the flow here."""
@@ -135,9 +137,20 @@ class Standstill:
         return not all(map(self.problem.arithmetic.isfinite, slopes))
 
     def _largest(self) -> str:
-        sized = zip(self.x, self.mode.states, self.mode.flow_texts, strict=True)
-        value, state, text = max(sized, key=lambda entry: abs(entry[0]))
-        return f"{state}, whose flow is {text} and whose value is {show(value)},"
+        return self._described(max(range(len(self.x)), key=lambda i: abs(self.x[i])))
+
+    def _fastest(self) -> str:
+        """The state whose flow is largest against its scale."""
+        try:
+            slope = self.problem.kernel.bind(self.index, self.segment.data).flow(self.t, *self.x)
+        except DOMAIN_ERRORS:
+            return self._largest()
+        moving = [i for i, s in enumerate(self.scales) if s > 0]
+        return self._described(max(moving or [0], key=lambda i: abs(slope[i] / (self.scales[i] or 1))))
+
+    def _described(self, i: int) -> str:
+        state, text = self.mode.states[i], self.mode.flow_texts[i]
+        return f"{state}, whose flow is {text} and whose value is {show(self.x[i])},"
 
     def _state(self, x: State) -> str:
         return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.mode.states, x, strict=True))

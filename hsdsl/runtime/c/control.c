@@ -42,7 +42,7 @@ static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
 /* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */
 HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
   const hs_real ratio = ratio_to(run, h, error_scales(run));
-  return !(ratio > 1) || run->here.table->jumps ? ratio : ratio_closer(run, h, ratio);
+  return !(ratio > 1) ? ratio : ratio_closer(run, h, ratio);
 }
 
 static hs_real factor(const hs_control *control, hs_real ratio) {

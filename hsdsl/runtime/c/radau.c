@@ -82,7 +82,7 @@ static void radau_forget(hs_run *run) {
 /* Have the scales of the states over a step of length h; `closer`, with a look at the terms of the flow. */
 static void radau_scales(hs_run *run, hs_time t, hs_real h, int closer) {
   hs_radau *const radau = &run->radau;
-  if (!closer || run->here.table->jumps || resolved(run, t, h, run->x, radau->rows)) return;
+  if (!closer || resolved(run, t, h, run->x, radau->rows)) return;
   radau->scales = run->resolved;
   radau->lifted = 0;
   for (int s = 0; s < run->here.dimension; s++) {
