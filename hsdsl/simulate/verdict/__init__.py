@@ -65,6 +65,9 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
+    if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
+        left = diagnostics.departures
+        return Verdict("left", _once(left)) if left else Verdict("unknown", _once(diagnostics.doubts, [_incomplete(run.stop)]))
     noted = diagnostics.departures or diagnostics.doubts
     if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
         accompanied = replace(run, accompanied=True)
@@ -125,9 +128,13 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
         yield from dict.fromkeys(f.sentence for f in of if f.kind == kind)
 
 
+def _incomplete(stop: Stop) -> str:
+    return f"the run did not get to its end: {stop.message}"
+
+
 def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
     if stop.reason in INCOMPLETE:
-        yield f"the run did not get to its end: {stop.message}"
+        yield _incomplete(stop)
     elif run.errors is None and run.problem.settings.tolerance is not None:
         yield "the finer run was interrupted, so no margin can be held against the error"
     elif run.errors is None:

@@ -123,8 +123,8 @@ def _most(one: Expansion, other: Expansion) -> Expansion:
 
 
 def _below(number: Expansion, bound: Expansion, one: Expansion, other: Expansion) -> Expansion:
-    more = bound.terms[0] - number.terms[0]
-    return chosen(np.abs(more) > number.reach + bound.reach, chosen(more > 0, one, other), NOTHING_KNOWN)
+    more, apart = bound.terms[0] - number.terms[0], number.reach + bound.reach
+    return chosen((more > apart) | (more <= -apart), chosen(more > 0, one, other), NOTHING_KNOWN)
 
 
 def _bounded(name: str, series: Callable[..., Expansion]) -> Callable[..., Expansion]:
