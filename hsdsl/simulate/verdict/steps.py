@@ -164,10 +164,11 @@ def _data(run: RunView, times: Array) -> Array:
 
 def joined(parts: Sequence[Parts]) -> Parts:
     """Parts in one mode together."""
-    first = parts[0]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
-    data = first.data if len(first.data) == 1 else np.concatenate([part.data for part in parts])
-    return Parts(mode=first.mode, **joined, data=data)
+    data = parts[0].data
+    if any(len(part.data) > 1 or not np.array_equal(part.data, data) for part in parts):
+        data = np.concatenate([np.broadcast_to(part.data, (len(part), data.shape[1])) for part in parts])
+    return Parts(mode=parts[0].mode, **joined, data=data)
 
 
 def undecided(
