@@ -30,14 +30,14 @@ def resolved(
 ) -> Vector:
     """The scales over a step of length h, none below a share of what the terms of its flow could move the state by.
 
-    What that is follows from what the last digits of time and states change in the flow, or from its ``derivatives``,
-    which a flow that jumps needs. A state that they lift moves others in turn. ``rows`` are the derivatives of the flow,
-    where the method is implicit: there a fast decay forgets round-off.
+    What that is follows from what the last digits of time and states change in the flow or, where it jumps, from its
+    ``derivatives``. A state that they lift moves others in turn. ``rows`` are those of an implicit method: there a fast
+    decay forgets round-off.
     """
     slope, moved, lifted = flow(t, *x), list(scales), [False for _ in x]
-    by = None if derivatives is None else rows_of(derivatives(t, *x), len(x))
+    by = rows_of(derivatives(t, *x), len(x)) if derivatives else None
     for _ in x:
-        terms = flow_terms(flow, t, x, slope, moved, arithmetic) if by is None else _derived_terms(by, moved, arithmetic)
+        terms = _derived_terms(by, moved, arithmetic) if by else flow_terms(flow, t, x, slope, moved, arithmetic)
         least = [h * size for size in terms]
         if rows:
             least = [a / (1 + h * abs(row[i])) for i, (a, row) in enumerate(zip(least, rows, strict=True))]

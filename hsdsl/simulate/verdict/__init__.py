@@ -66,8 +66,9 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         What the loop itself noted.
     """
     if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
-        left = diagnostics.departures
-        return Verdict("left", _once(left)) if left else Verdict("unknown", _once(diagnostics.doubts, [_incomplete(run.stop)]))
+        if diagnostics.departures:
+            return Verdict("left", _once(diagnostics.departures))
+        return Verdict("unknown", _once(diagnostics.doubts, [_incomplete(run.stop)]))
     noted = diagnostics.departures or diagnostics.doubts
     if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
         accompanied = replace(run, accompanied=True)
