@@ -451,6 +451,165 @@ def test_inputs_drive_model_exchange(version: int, made: Any) -> None:
     assert [result["x"][-1], result["v"][-1]] == pytest.approx(list(run.final.state.values()), abs=1e-5)
 
 
+# Surfaces with `if` that a state begins beyond; inputs and switches of time that jump. Most of a model, and its end.
+CROSSINGS = {
+    "entry beyond": (
+        """
+modes:
+  up: {flow: {y: v, v: -9.81}, transitions: [{name: land, when: y <= 1, if: v < 0, to: down}]}
+  down: {flow: {y: 0, v: 0}}
+initial: {mode: up, y: 0.9, v: 2}
+""",
+        1.0,
+    ),
+    "floor": (
+        """
+modes:
+  wait: {flow: {x: 0}, transitions: [{name: go, when: t - floor(t) <= 0, to: run}]}
+  run: {flow: {x: 1}, transitions: [{name: back, when: since >= 0.25, to: wait}]}
+initial: {mode: wait, x: 0}
+""",
+        3.6,
+    ),
+    "sample": (
+        """
+inputs: {u: {times: [0, 0.3, 0.7, 1.1], values: [0, 1, 0.25, 2], hold: zero}}
+modes:
+  off: {flow: {x: 1}, transitions: [{name: on, when: u >= 1, to: on}]}
+  on: {flow: {x: -2}, transitions: [{name: off, when: u <= 0.25, to: off}]}
+initial: {mode: off, x: 0}
+""",
+        1.5,
+    ),
+    "onto a state": (
+        """
+inputs: {u: {times: [0, 0.4, 0.9], values: [0, 3, 0], hold: zero}}
+modes:
+  low: {flow: {x: 0, n: 1}, transitions: [{name: lift, when: u >= x, to: low, reset: {x: x + 2*n}}]}
+initial: {mode: low, x: 3, n: 0}
+""",
+        1.5,
+    ),
+    "transparent": (
+        """
+inputs: {u: {times: [0, 0.3, 0.6], values: [0, 2, 0], hold: zero}}
+modes:
+  a: {flow: {x: 1, y: 0}, transitions: [{name: up, when: x + u >= 1, if: x > -9, to: a, reset: {x: 0, y: y + 1}}]}
+initial: {mode: a, x: 0, y: 0}
+""",
+        1.5,
+    ),
+    "two guards": (
+        """
+inputs: {u: {times: [0, 0.5], values: [0, 1], hold: zero}}
+modes:
+  a:
+    flow: {x: 1}
+    transitions:
+      - {name: first, when: u >= 1, to: b}
+      - {name: second, when: 2*u >= 1, to: c, priority: 1}
+  b: {flow: {x: 2}}
+  c: {flow: {x: 3}, transitions: [{name: home, when: x >= 1, to: b}]}
+initial: {mode: a, x: 0}
+""",
+        1.5,
+    ),
+    "second time": (
+        """
+modes:
+  a:
+    flow: {x: v, v: -4*x}
+    transitions:
+      - {name: in, when: x <= 0.25, if: v < 0 and t > 2, to: a, reset: {x: 1, v: 0}}
+      - {name: out, when: x >= 0.5, if: v > 0 and t > 3, to: b}
+  b: {flow: {x: 0, v: 0}}
+initial: {mode: a, x: 1, v: 0}
+""",
+        5.0,
+    ),
+    "reset beyond": (
+        """
+modes:
+  up:
+    flow: {y: v, v: -9.81}
+    transitions: [{name: land, when: y <= 1, if: v < 0, to: down, reset: {v: 3, y: 0.5}}]
+  down:
+    flow: {y: v, v: -9.81}
+    transitions: [{name: back, when: y >= 0.8, to: up, reset: {y: 0.75}}]
+initial: {mode: up, y: 0.9, v: 2}
+""",
+        3.0,
+    ),
+    "switches": (
+        """
+modes:
+  off: {flow: {x: 1}, transitions: [{name: on, when: sign(sin(5*t)) >= 1, to: on}]}
+  on: {flow: {x: -x}, transitions: [{name: off, when: floor(3*t) - 2*floor(3*t/2) <= 0, to: off}]}
+initial: {mode: off, x: 0}
+""",
+        4.0,
+    ),
+}
+# the same input from the importing tool as in the file
+FOLLOWED = CROSSINGS["sample"][0].replace("{times: [0, 0.3, 0.7, 1.1], values: [0, 1, 0.25, 2], hold: zero}", "0.5 - t")
+
+
+def crossing(text: str, until: float) -> str:
+    return f"hsdsl: 1\n{text}experiment: {{until: {until}}}\n"
+
+
+def assert_follows(result: Any, text: str) -> None:
+    """The transitions and the end of a run, within 1e-6."""
+    run = loaded(text).simulate()
+    states = run.final.state
+    assert jumps(result, [*states, "mode"]) == pytest.approx([made.time for made in run.transitions], abs=1e-6)
+    assert {state: result[state][-1] for state in states} == pytest.approx(states, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        pytest.param(name, version, marks=[pytest.mark.slow] if k > 3 or k % 2 == i else [])
+        for k, name in enumerate(CROSSINGS)
+        for i, version in enumerate(VERSIONS)  # one version of each in turn
+    ],
+)
+def test_surfaces_are_crossed_and_jumped_over_as_in_a_run(name: str, version: int, made: Any) -> None:
+    text, until = crossing(*CROSSINGS[name]), CROSSINGS[name][1]
+    result = fmpy.simulate_fmu(
+        made(text, version),
+        fmi_type="ModelExchange",
+        relative_tolerance=1e-11,
+        stop_time=until,
+        output_interval=until / 100,
+    )
+    assert_follows(result, text)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_surface_that_a_state_begins_beyond_fires_when_it_is_crossed_again(version: int, made: Any) -> None:
+    """From many speeds, as searches for roots of indicators end at zero or on either side of it."""
+    path = made(crossing(*CROSSINGS["entry beyond"]), version)
+    for speed in (1 + k / 4 for k in range(13)):
+        result = fmpy.simulate_fmu(
+            path, fmi_type="ModelExchange", relative_tolerance=1e-10, stop_time=1, start_values={"v": speed}
+        )
+        rise = speed**2 - 2 * 9.81 * 0.1  # whether the height of 1 is reached
+        exact: list[float] = [(speed + math.sqrt(rise)) / 9.81] if rise > 0 else []
+        assert jumps(result, ["mode"]) == pytest.approx(exact, abs=1e-6)
+
+
+def test_an_input_of_the_importing_tool_jumps_onto_a_guard(made: Any) -> None:
+    times = [0, 0.3, 0.3, 0.7, 0.7, 1.1, 1.1, 1.5]
+    values = [0, 0, 1, 1, 0.25, 0.25, 2, 2]
+    signals = np.array(list(zip(times, values, strict=True)), dtype=[("time", float), ("u", float)])
+    path = made(crossing(FOLLOWED, 1.5), 3)
+    result = fmpy.simulate_fmu(
+        path, fmi_type="ModelExchange", relative_tolerance=1e-11, stop_time=1.5, output_interval=0.03, input=signals
+    )
+    assert_follows(result, crossing(*CROSSINGS["sample"]))
+
+
 def test_directional_derivatives_are_those_of_differences(made: Any) -> None:
     unit = Stepped(made(DRIVEN, 3))
     unit.go_to(0.7)

@@ -2,7 +2,8 @@
 
    Surface k of a mode has the indicator max(margin - r, -length * rate): positive inside the domain, and beyond the
    surface as long as the flow leads back. It falls through zero where the state is beyond by the margin and moves on
-   outwards. That of an edge with a condition is margin - r, as a state may be beyond it without having crossed it.
+   outwards. A state may be beyond an edge with a condition without having crossed it: inside, the indicator is
+   margin - r; outside, margin / 4 - r. So an event is on the side that it leads to, even where an indicator is zero.
    The margin is far above what a search for roots leaves, so that nothing stays undecided, and far below any
    state. The state is then taken back along the flow onto the surface, so no reset begins beyond it. */
 
@@ -13,6 +14,7 @@
 #include "hs_math.h"
 
 #define MARGIN 0x1p-32    /* relative to the sizes of states */
+#define ROUNDOFF 0x1p-14  /* of a margin: what counts as on a surface where an input jumps */
 #define MOST_AT_ONCE 1000 /* transitions at one instant */
 #define MOST_RESETS 60    /* until they change nothing */
 
@@ -97,7 +99,7 @@ static int indicator(const fmu *unit, int k, const double *p, const double *x, c
   const hs_mode *mode = fmu_table(unit);
   const int plain = k < mode->edges && mode->edge[k].conditional;
   double rate;
-  *z = now->margin[k] - r[k];
+  *z = (now->outside[k] ? now->margin[k] / 4 : now->margin[k]) - r[k];
   if (!plain && !rate_of(mode, k, p, now->time, x, &rate)) /* the flow may end at the surface */
     *z = hs_max(*z, -length_of() * rate);
   return !hs_finite(*z);
@@ -163,6 +165,15 @@ static int holds(const hs_mode *mode, int k, const double *p, double t, const do
   return 1;
 }
 
+/* Whether the state is beyond surface k on entry: also an edge that an input's jump carried from inside onto zero. */
+static int entered_beyond(const fmu *unit, int k, double r) {
+  const fmu_data *now = &unit->now;
+  const hs_mode *mode = fmu_table(unit);
+  const double noise = ROUNDOFF * now->margin[k];
+  if (k < mode->edges && mode->edge[k].conditional) return 0;
+  return r > now->margin[k] || (k < mode->edges && now->left_known && now->left[k] < -noise && r >= -noise);
+}
+
 /* Whether surface k fires: crossed since the last event and above a level, or beyond on `entry`. A flow that has no
    value beyond a surface counts as leading out. */
 static int fires(const fmu *unit, int k, const double *p, const double *x, const double *r, double level, int entry) {
@@ -170,7 +181,7 @@ static int fires(const fmu *unit, int k, const double *p, const double *x, const
   const hs_mode *mode = fmu_table(unit);
   const int wall = k >= mode->edges;
   double rate, t = now->time, q[PROBLEM_WIDTH + 1];
-  if (entry && (wall || !mode->edge[k].conditional) && r[k] > now->margin[k]) return 1;
+  if (entry && entered_beyond(unit, k, r[k])) return 1;
   if (now->outside[k] || !(r[k] > level)) return 0;
   if (!rate_of(mode, k, p, t, x, &rate) && !(rate > 0)) return 0;
   if (wall) return 1;
@@ -186,10 +197,10 @@ static int first_of(const fmu *unit, const double *p, const double *x, const dou
   int chosen = -1;
   for (int k = 0; k < mode->surfaces && chosen < 0; k++)
     if (fires(unit, k, p, x, r, margin[k] / 2, entry)) chosen = k;
-  if (chosen < 0 || entry) return chosen;
+  if (chosen < 0) return chosen;
   for (int k = 0; k < mode->edges; k++) {
     const int later = chosen < mode->edges && mode->edge[k].priority <= mode->edge[chosen].priority && k > chosen;
-    if (k != chosen && !later && fires(unit, k, p, x, r, -margin[k], 0))
+    if (k != chosen && !later && fires(unit, k, p, x, r, entry ? margin[k] / 2 : -margin[k], entry))
       if (chosen >= mode->edges || mode->edge[k].priority >= mode->edge[chosen].priority) chosen = k;
   }
   return chosen;
@@ -237,6 +248,7 @@ static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int 
   const hs_mode *mode = fmu_table(unit);
   double x[PROBLEM_WIDTH + 1], r[PROBLEM_SURFACES + 1];
   memset(now->outside, 0, sizeof now->outside);
+  now->left_known = 0;
   if (set_margins(unit)) return 1;
   fmu_local(unit, x);
   if (mode->values(fmu_bind(unit), t, x, r)) return 0;
@@ -264,12 +276,30 @@ static const char *make(fmu *unit, int k, const double *p, double *x, const doub
   return !now->ended && enter_surfaces(unit, t, mode, crossed) ? "not_finite" : 0;
 }
 
-/* Which surfaces the state is beyond without having fired. */
-static int set_outside(fmu *unit) {
-  double z[PROBLEM_SURFACES + 1];
-  if (fmu_get_indicators(unit, z)) return 1;
-  for (int k = 0; k < PROBLEM_SURFACES; k++) unit->now.outside[k] = !(z[k] > 0);
+/* The values of all surfaces now. */
+static int values_now(fmu *unit, double *r) {
+  double x[PROBLEM_WIDTH + 1];
+  const double *p = fmu_bind(unit);
+  fmu_local(unit, x);
+  return !p || fmu_table(unit)->values(p, unit->now.time, x, r);
+}
+
+/* Which edges with a condition the state is beyond and did not fire; where inputs `jumped`, those that it was inside
+   before, as it has not crossed them. */
+static int set_outside(fmu *unit, int jumped) {
+  fmu_data *const now = &unit->now;
+  const hs_mode *mode = fmu_table(unit);
+  double r[PROBLEM_SURFACES + 1];
+  if (values_now(unit, r)) return 1;
+  for (int k = 0; k < mode->edges; k++)
+    if (mode->edge[k].conditional && (!jumped || !(now->left[k] > now->margin[k] / 2)))
+      now->outside[k] = r[k] > now->margin[k] / 2;
   return 0;
+}
+
+void fmu_enter_events(fmu *unit) {
+  fmu_data *const now = &unit->now;
+  now->left_known = !unit->co_simulation && !now->ended && !values_now(unit, now->left);
 }
 
 /* Make the transitions that are due; why the run ends, if it does. */
@@ -289,12 +319,15 @@ static const char *transitions(fmu *unit, int entry) {
       if (enter_surfaces(unit, now->time, 0, 0)) return "not_finite";
       continue;
     }
-    const char *const ends = make(unit, k, p, x, r, entry && r[k] > now->margin[k]);
+    const char *const ends = make(unit, k, p, x, r, entry && entered_beyond(unit, k, r[k]));
     if (ends) return ends;
     entry = 1;
   }
   return now->ended ? 0 : "zeno: more than a thousand transitions at one instant";
 }
+
+/* Whether a time is reached, to the round-off of sums. */
+static int has_come(double time, double start) { return time >= start - 0x1p-50 * fabs(start); }
 
 fmu_status fmu_update(fmu *unit, int *jumped, double *next) {
   fmu_data *const now = &unit->now;
@@ -309,15 +342,17 @@ fmu_status fmu_update(fmu *unit, int *jumped, double *next) {
     return FMU_OK;
   }
   if (!fmu_bind(unit)) return FMU_ERROR;
-  while (now->segment + 1 < segments && now->time >= problem_timeline.start[now->segment + 1] * (1 - 0x1p-50)) {
+  while (now->segment + 1 < segments && has_come(now->time, problem_timeline.start[now->segment + 1])) {
     now->segment++;
     entry |= problem_timeline.jump[now->segment];
     unit->bound = 0;
   }
   now->changed = 0;
   if (!now->events++ && enter_surfaces(unit, now->time, 0, 0)) return FMU_ERROR;
+  if (entry && now->left_known && !now->ended) (void)set_outside(unit, 1); /* no value ends the run below */
   if (!now->ended && (unit->complaint = transitions(unit, entry)) != 0) now->ended = 1;
-  if (!now->ended && set_outside(unit)) return FMU_ERROR;
+  now->left_known = 0;
+  if (!now->ended && set_outside(unit, 0)) return FMU_ERROR;
   *jumped = now->jumps != jumps || now->resting != resting;
   if (now->segment + 1 < segments) *next = problem_timeline.start[now->segment + 1];
   return FMU_OK;

@@ -17,7 +17,9 @@ typedef struct {
   int32_t segment;
   double state[PROBLEM_STATES + 1], scale[PROBLEM_STATES + 1];
   int state_set[PROBLEM_STATES + 1];
-  int outside[PROBLEM_SURFACES + 1]; /* whether the state was beyond a surface that did not fire, at the last event */
+  int outside[PROBLEM_SURFACES + 1]; /* whether the state was beyond an `if` that did not fire, at the last event */
+  int left_known; /* whether there are values of surfaces before inputs jump at this event, in `left` */
+  double left[PROBLEM_SURFACES + 1];
   double margin[PROBLEM_SURFACES + 1];
   double parameters[PROBLEM_PARAMETERS + 1];
   double input[FMU_INPUTS + 1];
@@ -62,6 +64,9 @@ fmu_status fmu_get_indicators(fmu *unit, double *z);
 
 /* Derive what depends on parameters; then enter the initial mode. */
 fmu_status fmu_initialize(fmu *unit);
+
+/* Keep the values of surfaces before inputs jump: an event begins. */
+void fmu_enter_events(fmu *unit);
 
 /* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
 fmu_status fmu_update(fmu *unit, int *jumped, double *next);
