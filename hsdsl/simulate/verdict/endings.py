@@ -43,11 +43,8 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
         if finding is None:
             continue
         if crossed is None:
-            yield Finding(
-                "order",
-                "unknown",
-                f"an input jumps at t = {show(place.t)}, within the error of reaching the surface of {place.name(k)}",
-            )
+            what = f"an input or function of time jumps at t = {show(place.t)}"
+            yield Finding("order", "unknown", f"{what}, within the error of reaching the surface of {place.name(k)}")
         elif k < len(place.mode.edges) and not commute(
             run, place, (crossed, k), TWICE * -place.value(k) / place.rate(k)
         ):

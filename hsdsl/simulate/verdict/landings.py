@@ -71,8 +71,9 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
     late = SAFE * run.errors.late_by(place.t)
     if conditional and place.conditions(k, run.around(place, arc.first), late) == {False}:
         return
-    margin = abs(value) / shift if shift > 0 else 0.0
-    yield Finding("landing", "unknown", f"the reset of {made.edge} lands {times(margin)} the error away from {where}")
+    on = abs(value) <= noise or not shift > 0
+    away = f"on {where}" if on else f"{times(abs(value) / shift)} the error away from {where}"
+    yield Finding("landing", "unknown", f"the reset of {made.edge} lands {away}")
 
 
 def _soon(run: RunView, place: Place, row: int) -> State:
@@ -123,7 +124,7 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     where = f"{made.edge} at t = {show(made.time)}"
     late = SAFE * run.errors.late_by(made.time)
     if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
-        yield Finding("input", "unknown", f"an input jumps within the error of the time of {where}")
+        yield Finding("input", "unknown", f"an input or function of time jumps within the error of the time of {where}")
     edge = place.mode.edges[k]
     if made.after is None or not any(map(CURVED.search, edge.reset_texts)):
         return
