@@ -17,9 +17,10 @@ from export.c_builds import COMPILERS, USING, WARNINGS
 from shipped import assert_golden
 
 import hsdsl
+from hsdsl.execution.run import Execution
 from hsdsl.export import files_of, source_of
 from hsdsl.export.fmi import archive
-from hsdsl.export.fmi.variables import unit_of
+from hsdsl.export.fmi.variables import nominals, unit_of
 from hsdsl.model import Model
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
@@ -550,6 +551,7 @@ initial: {mode: off, x: 0}
         4.0,
     ),
 }
+DOWN = "to: down, reset: {w: 0}}"
 # the same input from the importing tool as in the file
 FOLLOWED = CROSSINGS["sample"][0].replace("{times: [0, 0.3, 0.7, 1.1], values: [0, 1, 0.25, 2], hold: zero}", "0.5 - t")
 
@@ -584,6 +586,13 @@ def test_surfaces_are_crossed_and_jumped_over_as_in_a_run(name: str, version: in
         output_interval=until / 100,
     )
     assert_follows(result, text)
+
+
+def test_states_that_a_finer_run_ends_before_have_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = loaded(crossing(*CROSSINGS["entry beyond"]).replace("v: 0}}", "v: 0, w: 4}}").replace("to: down}", DOWN))
+    short = model.simulate(until=0.1)
+    monkeypatch.setattr(Execution, "finer", property(lambda run: short))
+    assert nominals(source_of(model, {})) == [2, 2, 4]
 
 
 @pytest.mark.parametrize("version", VERSIONS)

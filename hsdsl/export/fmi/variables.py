@@ -156,7 +156,10 @@ def _is_roundoff(run: Execution, name: str) -> bool:
     if finer is None:
         return False
     end = min(float(run.time_span[1]), float(finer.time_span[1]))
-    both = [np.asarray(each.sample(_SHARES * end)[name], dtype=float) for each in (run, finer)]
+    taken = [each.sample(_SHARES * end) for each in (run, finer)]
+    if not all(name in each.states for each in taken):  # the finer run may end before a mode that has the state
+        return False
+    both = [np.asarray(each[name], dtype=float) for each in taken]
     sizes = np.fmax(*np.abs(both))
     changes = np.abs(both[0] - both[1])[sizes > 0] / sizes[sizes > 0]
     return len(changes) > 0 and not np.nanmedian(changes) < 1 / 2
