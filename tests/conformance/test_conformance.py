@@ -166,7 +166,7 @@ def parameters() -> list[Any]:
     ]
 
 
-@lru_cache
+@lru_cache(maxsize=4)  # a model that ran holds memory for each of its settings
 def model(name: str) -> Any:
     """A case's model, loaded once."""
     return hsdsl.load(CASES[name].with_name(f"{name}.yaml"))
